@@ -1,4 +1,5 @@
-//! Steps for a wanted error: kept at every tenth of the motion, or refused with the cause; and claims that are found false along it.
+//! Runs with a requested accuracy: the error is at most the requested one, or the run is refused with the cause; and
+//! false declarations of structure, which are found along the motion.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
@@ -7,21 +8,21 @@ use discrete_herglotz::{
 };
 use exact_lagrangian::herglotz_flow;
 
-/// One type for all systems of this file, since each is compiled with every integrator: a mechanical system, and others that claim more
-/// than is true of them.
+/// One type for all systems of this file, since each type is compiled with every integrator: a mechanical system, and
+/// others with a false structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     /// The formula of [`Bench`].
     Mechanical,
     /// `v q - q^2/2 - z/10`: W vanishes.
     Singular,
-    /// A rate that depends on time, and not to first order at t = 0.
+    /// A rate that depends on time, with vanishing derivative at t = 0.
     Rate,
-    /// A force of the same kind.
+    /// A force that depends on time in the same way.
     Force,
     /// Drag beyond q = 1.
     Region,
-    /// A wall that is nothing near 0.
+    /// A wall away from q = 0.
     Wall,
     /// A cubic potential, all of it scaled by 1e-12.
     Small,
@@ -122,7 +123,7 @@ fn by(name: &str) -> AnyIntegrator {
     name.parse().unwrap()
 }
 
-/// A step that resonates with the drive: runs of 4 and 8 steps see no force at all.
+/// The steps of the first trial runs resonate with the drive: runs of 4 and 8 steps evaluate no force at all.
 #[test]
 fn steps_that_resonate_with_the_drive() {
     let driven = Bench { gamma: -0.1, force: 1.0, omega: std::f64::consts::TAU, ..FREE };
@@ -135,7 +136,7 @@ fn steps_that_resonate_with_the_drive() {
     }
 }
 
-/// Steps that are a thousand times the period leave an oscillator where it was; spans of a thousand to a million periods.
+/// With steps of a thousand periods an oscillator does not move; spans of a thousand to a million periods.
 #[test]
 fn steps_far_beyond_the_period() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
@@ -150,13 +151,13 @@ fn steps_far_beyond_the_period() {
     }
 }
 
-/// A run to an error of a millionth, by an integrator or by the one that is chosen.
+/// A run with a relative error of a millionth, by a named integrator or by the default.
 fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>) -> Run<'p, 'o, Bench, 1> {
     let run = problem.accuracy(1e-6);
     if let Some(name) = name { run.by(by(name)) } else { run }
 }
 
-/// A kick that is short beside the span is found, by methods of low and high order, down to a thousandth of it.
+/// A short kick is found by methods of low and high order, down to a thousandth of the span.
 #[test]
 fn short_kicks() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
@@ -182,7 +183,7 @@ fn tiny_motions_and_none() {
     let damped = Bench { gamma: -0.1, quartic: 1.0, ..OSCILLATOR };
     for size in [1e-160, 1e-300, 0.0] {
         let start = VelocityPoint::new([size], [0.0], 0.0);
-        // So small that the quartic term is nothing: the oscillator's closed form.
+        // The quartic term is below round-off, so that the closed form is that of the oscillator.
         let w = (1.0f64 - 0.0025).sqrt();
         let (sin, cos) = (10.0 * w).sin_cos();
         let decay = size * (-0.5f64).exp();
@@ -195,7 +196,7 @@ fn tiny_motions_and_none() {
     }
 }
 
-/// A run that goes back keeps the accuracy as one that goes on: what is damped grows there, and a kick is met from its other side.
+/// A run backward is as accurate as one forward: damped motion grows there, and the kick is met from its other side.
 #[test]
 fn spans_that_go_back() {
     let start = VelocityPoint::new([1.0], [0.5], 0.0);
@@ -209,7 +210,7 @@ fn spans_that_go_back() {
     }
 }
 
-/// What cannot be reached is refused with its cause.
+/// An accuracy that cannot be reached is refused with the cause.
 #[test]
 fn causes() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
@@ -221,7 +222,8 @@ fn causes() {
     let cause = refused(&chaotic, start, 500.0);
     let Some(InputError::Accuracy { cause: SelectionFailure::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
     assert!(t < 500.0);
-    // Up to that time it is not refused, and right: the exact flow's own round-off grows there to no more than 1e-7.
+    // Up to half of that time the run is accepted and accurate: the round-off of the exact flow grows to at most 1e-7
+    // there.
     let trusted = 0.5 * t;
     let problem = problem(&chaotic, start);
     let error = error(to_a_millionth(&problem, None), trusted, truth(&chaotic, &start, trusted));
@@ -232,7 +234,8 @@ fn causes() {
     let Some(InputError::Accuracy { cause: SelectionFailure::Halted { t, .. }, .. }) = cause else {
         panic!("{cause:?}")
     };
-    // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has its pole at 1/w0.
+    // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has
+    // its pole at 1/w0.
     let pole = 1.0 / (1.0 + 0.5f64.sqrt());
     assert!((t - pole).abs() < 1e-3, "{t}, not {pole}");
     let nan = Bench { gamma: f64::NAN, ..OSCILLATOR };
@@ -242,10 +245,10 @@ fn causes() {
     assert!(matches!(refused, Some(InputError::FirstStep(StepError::Singular { .. }))), "{refused:?}");
 }
 
-/// Claims that are true at the start and false elsewhere are found: before the run by times of the whole span and by its first steps, or
-/// in it, as a status; with steps that are given and with steps that are chosen.
+/// Declared properties that hold at the start and not elsewhere are found: before the run, at times of the whole span
+/// and along its first steps, or during the run, as a status; with given steps and with steps that are chosen.
 #[test]
-fn claims_are_probed_along_the_motion() {
+fn claims_are_checked_along_the_motion() {
     let mechanical = Structure { separable: true, constant_mass: true, ..Structure::default() };
     let at = |q: f64, v: f64| VelocityPoint::new([q], [v], 0.0);
     let cases = [
@@ -293,7 +296,7 @@ fn claims_are_probed_along_the_motion() {
     }
 }
 
-/// The estimate of an error is that of the run, and what is wanted beside the final state does not change it.
+/// The error estimate is that of the run, and outputs in addition to the final state do not change it.
 #[test]
 fn the_estimate_is_of_the_run() {
     let start = VelocityPoint::new([1.5], [0.0], 0.0);

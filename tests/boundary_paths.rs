@@ -1,22 +1,30 @@
-//! Critical paths between given ends: against the discrete Herglotz equations, the differential of the action, the flow and closed forms. (Against Newton's
-//! method on a sparse factorisation: `scale --case path`.)
+//! Critical paths between given ends: against the discrete Herglotz equations, the differential of the action, the flow
+//! and closed forms. (`scale --case path` compares them with Newton's method on a sparse factorisation.)
 
-// What a test cannot go on without is a failure of it.
-#![allow(clippy::unwrap_used)]
+// In a test a missing value is a failure.
+#![allow(missing_docs, clippy::unwrap_used)]
 
+// Other targets use the rest of it.
+#[allow(dead_code)]
+mod common;
+
+use common::lagrangians::Bratu;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ,
     Relativistic, System,
 };
 use contact_geom::{
-    DiscretePoint, GeometryError, Lagrangian, MaxAbsOrNan, PhasePoint, Scalar, VelocityPoint, legendre, max_abs_or_nan,
+    DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre,
+    numbers::{MaxAbsOrNan, max_abs_or_nan},
 };
+use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
 use discrete_herglotz::{
-    AnyDiscreteLagrangian, DiscreteLagrangian, DiscretePath, Gauss, InputError, Method, Midpoint, StepError,
-    discrete_action, discrete_flow, legendre_minus, legendre_plus,
+    DiscreteLagrangian, InputError, StepError,
+    gauss::Gauss,
+    rules::{AnyDiscreteLagrangian, Method, Midpoint},
+    theory::{DiscretePath, discrete_action, discrete_flow, legendre_minus, legendre_plus},
 };
-use discrete_herglotz::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -30,8 +38,8 @@ fn largest_of<const N: usize>(v: &[SVector<f64, N>]) -> f64 {
     max_abs_or_nan(v.iter().map(MaxAbsOrNan::max_abs_or_nan))
 }
 
-/// The size of the terms of the discrete Herglotz equations along a path: momenta, and what rounding moves of them through the
-/// positions.
+/// The size of the terms of the discrete Herglotz equations along a path: the momenta, and the change of a momentum by
+/// the rounding of the positions.
 fn size<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, t0: f64, path: &CriticalPath<N>) -> f64 {
     let of = |k: usize| {
         let x = DiscretePoint { q0: path.points[k], q1: path.points[k + 1], z0: path.actions[k] };
@@ -43,12 +51,13 @@ fn size<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, t0: f64, path: &Critic
     max_abs_or_nan((0..path.points.len() - 1).map(of))
 }
 
-/// What holds for each path that is found: the discrete Herglotz equations, `dA_d`, the action, the flow.
+/// Checks that every path that is found must pass: the discrete Herglotz equations, `dA_d`, the action, the flow.
 fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64), found: &CriticalPath<N>, units: f64) {
     assert_eq!(found.status, PathStatus::Found, "{}", found.status);
     let path = found.path().unwrap();
-    // Each of the three positions of an equation is rounded, and the equation is a sum of a few terms: some units in the last
-    // place of the largest. `units` is 1 for closed forms, more where L_d is itself the result of an iteration.
+    // Each of the three positions of an equation is rounded, and the equation is a sum of a few terms: some units in
+    // the last place of the largest. `units` is 1 for closed forms, and larger where L_d is itself the result of an
+    // iteration.
     let bound = 16.0 * units * EPS * size(ld, t0, found);
     let residuals = path.herglotz_residuals(ld, t0, z0).unwrap();
     assert!(largest_of(&residuals) <= bound, "residual {:e} of {bound:e}", largest_of(&residuals));
@@ -57,13 +66,13 @@ fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64),
     let differential = path.action_differential(ld, t0, z0).unwrap();
     let steps = path.steps();
     assert!(largest_of(&differential[1..steps]) <= bound.max(bound * (-found.log_factor).exp()));
-    // The action is its own recursion, to the last bit but for another order of rounding.
+    // The action is the sum of its recursion, up to the rounding of another order of summation.
     let action = discrete_action(ld, t0, path.points(), z0).unwrap();
     assert!(
         (action - found.action()).abs() <= 16.0 * EPS * units * max_abs_or_nan(found.actions.iter().copied()),
         "{action}"
     );
-    // The flow from the first two points: an error in the second one grows as the motion's neighbours separate.
+    // The flow from the first two points: an error in the second one grows like the distance of neighbouring motions.
     let h = ld.step_size();
     let mut x = DiscretePoint { q0: found.points[0], q1: found.points[1], z0 };
     let mut worst: f64 = 0.0;
@@ -71,7 +80,8 @@ fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64),
         x = discrete_flow(ld, t0 + k as f64 * h, &x).unwrap();
         worst = worst.max((x.q1 - found.points[k + 2]).amax());
     }
-    // The first velocity is known to eps q / h and is followed over the span; `e^span` for what separates (rates of about one).
+    // The error of the first velocity is eps q / h, and grows along the span, by `e^span` where motions separate (with
+    // rates of about one).
     let span = h * steps as f64;
     let growth = span * span.exp() / h;
     assert!(worst <= 64.0 * units * EPS * largest_of(&found.points).max(1.0) * growth, "flow {worst:e}");
@@ -106,16 +116,16 @@ fn every_method_finds_critical_paths() {
 fn gauss_collocation_finds_critical_paths() {
     let ld = Gauss::new(QuadraticInZ { c: 0.7 }, 3, 0.25).unwrap();
     let found = BoundaryPath::new(&ld, 8, [at([0.3]), at([-1.0])]).unwrap().starting_at(0.0, 0.8).unwrap().search();
-    // Its jets come from stages that are solved for: some more units.
+    // Its jets depend on stages that are found by iteration, with an error of some more units.
     check(&ld, (0.0, 0.8), &found, 16.0);
     let ld = Gauss::new(DoublePendulum::default(), 2, 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [at([0.0, 0.1]), at([0.5, 0.2])]).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 16.0);
 }
 
-/// The midpoint rule on the damped oscillator: with `a = 1/h^2 + 1/4` and `b = 1/h^2 - 1/4` the discrete Herglotz equation is
-/// `a q2 - (1 + sigma) b q1 + sigma a q0 = 0`, whose solutions are `sigma^(k/2) (A cos k theta + B sin k theta)`,
-/// `cos theta = (1 + sigma) b / (2 sqrt(sigma) a)`.
+/// The midpoint rule on the damped oscillator: with `a = 1/h^2 + 1/4` and `b = 1/h^2 - 1/4` the discrete Herglotz
+/// equation is `a q2 - (1 + sigma) b q1 + sigma a q0 = 0`, whose solutions are `sigma^(k/2) (A cos k theta + B sin k
+/// theta)`, `cos theta = (1 + sigma) b / (2 sqrt(sigma) a)`.
 #[test]
 fn the_damped_oscillator_in_closed_form() {
     let (gamma, h, steps) = (-0.2, 0.05, 400);
@@ -131,13 +141,14 @@ fn the_damped_oscillator_in_closed_form() {
     check(&ld, (0.0, 0.0), &found, 1.0);
     let exact = |k: usize| decay(k) * (first * (k as f64 * theta).cos() + other * (k as f64 * theta).sin());
     let off = max_abs_or_nan((0..=steps).map(|k| found.points[k][0] - exact(k)));
-    // theta comes from an arc cosine near 1: its rounding is eps / theta, times k; and the ends are 1/sin(n) from conjugate.
+    // theta comes from an arc cosine near 1: its rounding is eps / theta, times k; and the distance of the ends from
+    // conjugate ones is 1/sin(n).
     let bound = 8.0 * EPS * (steps as f64 / theta) / n.sin().abs() * largest_of(&found.points);
     assert!(off <= bound, "{off:e} of {bound:e}");
     assert!((found.log_factor - steps as f64 * sigma.ln()).abs() <= 4.0 * EPS * steps as f64);
 }
 
-/// Half of the step, a quarter of the error, against the motion by collocation of order 12.
+/// Half of the step gives a quarter of the error, against the motion by collocation of order 12.
 #[test]
 fn the_order_of_convergence() {
     let system = DoublePendulum::default();
@@ -154,12 +165,13 @@ fn the_order_of_convergence() {
     let errors = [4, 8, 16, 32].map(error);
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();
-        // The band of the project for measured orders.
+        // The band for measured orders.
         assert!((order - 2.0).abs() <= 0.15, "{order} of {errors:?}");
     }
 }
 
-/// The index of the undamped oscillator between points that are not conjugate is the number of half periods of the rule within.
+/// The index of the undamped oscillator between points that are not conjugate is the number of half periods of the rule
+/// within.
 #[test]
 fn the_index_counts_conjugate_points() {
     for (h, steps) in [(0.02, 50), (0.02, 150), (0.02, 170), (0.1, 40), (0.1, 70), (0.1, 200), (0.25, 4000)] {
@@ -172,8 +184,9 @@ fn the_index_counts_conjugate_points() {
     }
 }
 
-/// A conjugate point at a point of the path makes a leading block of the equations singular, to the last digit where the rule's angle is
-/// `pi/2` or `pi/3`; the path is regular all the same. (Without rows exchanged between points these are not solved.)
+/// A conjugate point at a point of the path makes a leading block of the equations singular, to the last digit where
+/// the angle of the rule is `pi/2` or `pi/3`; the path itself is regular. (Solving these equations requires an exchange
+/// of rows between points.)
 #[test]
 fn conjugate_points_inside_do_no_harm() {
     for (m, steps) in [(2usize, 3usize), (2, 5), (2, 101), (3, 5), (3, 7), (3, 100), (10, 17), (100, 250)] {
@@ -186,7 +199,7 @@ fn conjugate_points_inside_do_no_harm() {
         assert!(found.residual <= 32.0 * EPS * size(&ld, 0.0, &found), "{:e}", found.residual);
         assert_eq!(problem.index(&found).unwrap(), Some((steps - 1) / m), "m = {m}, {steps} steps");
     }
-    // Two uncoupled ones in a plane, conjugate at different points.
+    // Two uncoupled oscillators in a plane, with conjugate points at different times.
     let ld = Midpoint::new(Plane { stiffness: [1.0, 3.0] }, 2.0).unwrap();
     let problem = BoundaryPath::new(&ld, 7, [at([0.3, 0.1]), at([1.0, -0.4])]).unwrap();
     let found = problem.search();
@@ -195,7 +208,7 @@ fn conjugate_points_inside_do_no_harm() {
     assert_eq!(problem.index(&found).unwrap(), Some(3 + 4));
 }
 
-/// Two oscillators.
+/// Two uncoupled oscillators.
 struct Plane {
     stiffness: [f64; 2],
 }
@@ -207,7 +220,7 @@ impl Lagrangian<2> for Plane {
     }
 }
 
-/// Ends that are conjugate: a status, with the path and its residual.
+/// Conjugate ends are reported as a status, with the path and its residual.
 #[test]
 fn conjugate_ends_are_a_status() {
     for (m, steps) in [(2usize, 4usize), (3, 6), (10, 30)] {
@@ -217,53 +230,36 @@ fn conjugate_ends_are_a_status() {
         assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
         assert!(found.points.len() == steps + 1 && found.residual > 0.01 && found.residual.is_finite());
     }
-    // Nothing tells where a free particle with two free ends is.
+    // The position of a free particle with two free ends is not determined.
     let ld = Midpoint::new(FreeParticle::default(), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [End::Free, End::Free]).unwrap().search();
     assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
 }
 
-/// Bratu's problem `q'' = -lambda e^q`, `q(0) = q(1) = 0`: two solutions below `lambda = 3.5138`, none above.
-struct Bratu {
-    lambda: f64,
-}
-
-impl Lagrangian<1> for Bratu {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        v[0] * v[0] * 0.5 - q[0].exp() * self.lambda
-    }
-}
-
-/// Both solutions by deflation, a minimum of the action and one of index 1, against `q = -2 ln(cosh(a (t - 1/2)) / cosh(a / 2))` with
-/// `2 a^2 = lambda cosh^2(a / 2)`.
+/// Both solutions by deflation, a minimum of the action and one of index 1, against `q = -2 ln(cosh(a (t - 1/2)) /
+/// cosh(a / 2))` with `2 a^2 = lambda cosh^2(a / 2)`.
 #[test]
 fn bratu_has_two_paths_or_none() {
     let (lambda, steps) = (2.0, 400);
-    let ld = Midpoint::new(Bratu { lambda }, 1.0 / steps as f64).unwrap();
+    let ld = Midpoint::new(Bratu::undamped(lambda), 1.0 / steps as f64).unwrap();
     let problem = BoundaryPath::new(&ld, steps, [at([0.0]), at([0.0])]).unwrap();
     let lower = problem.search();
     let upper = problem.clone().avoiding(&[&lower], 1.0).unwrap().search();
-    for (found, index, bracket) in [(&lower, 0, (0.5, 2.4)), (&upper, 1, (2.4, 8.0))] {
+    for (found, index, bracket) in [(&lower, 0, [0.5, 2.4]), (&upper, 1, [2.4, 8.0])] {
         check(&ld, (0.0, 0.0), found, 1.0);
         assert_eq!(problem.index(found).unwrap(), Some(index));
-        let off = |a: f64| 2.0 * a * a - lambda * (0.5 * a).cosh().powi(2);
-        let (mut low, mut high): (f64, f64) = bracket;
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if (off(middle) > 0.0) == (off(low) > 0.0) { low = middle } else { high = middle }
-        }
-        let top = 2.0 * (0.5 * low).cosh().ln();
-        // Of order 2, with constants of the fourth derivative of the upper solution, about a^4.
-        let bound = low.powi(4) / (steps * steps) as f64;
-        assert!((found.points[steps / 2][0] - top).abs() <= bound, "{} {top}", found.points[steps / 2][0]);
+        let (maximum, a) = Bratu::maximum(lambda, bracket);
+        // The error has order 2, with a constant that is the fourth derivative of the upper solution, about a^4.
+        let bound = a.powi(4) / (steps * steps) as f64;
+        assert!((found.points[steps / 2][0] - maximum).abs() <= bound, "{} {maximum}", found.points[steps / 2][0]);
     }
-    let ld = Midpoint::new(Bratu { lambda: 4.0 }, 1.0 / steps as f64).unwrap();
+    let ld = Midpoint::new(Bratu::undamped(4.0), 1.0 / steps as f64).unwrap();
     let none = BoundaryPath::new(&ld, steps, [at([0.0]), at([0.0])]).unwrap().search();
     assert!(matches!(none.status, PathStatus::Stalled | PathStatus::NotConverged), "{}", none.status);
     assert!(none.points.len() == steps + 1 && none.residual > 1e-4 && none.residual < 0.1, "{:e}", none.residual);
 }
 
-/// A pendulum has more than one way between two positions in a given time.
+/// A pendulum has several motions between two positions in a given time.
 #[test]
 fn several_paths_of_a_pendulum_by_deflation() {
     let (h, steps) = (0.05, 200);
@@ -288,7 +284,7 @@ fn several_paths_of_a_pendulum_by_deflation() {
         }
     }
     let indices: Vec<_> = found.iter().map(|path| problem.index(path).unwrap().unwrap()).collect();
-    // The inertia of the whole Hessian by finite differences of dA_d, as an oracle.
+    // The inertia of the whole Hessian by finite differences of dA_d, as an independent reference.
     for (path, &index) in found.iter().zip(&indices) {
         assert_eq!(index, negative_directions(&ld, path), "{indices:?}");
     }
@@ -296,7 +292,8 @@ fn several_paths_of_a_pendulum_by_deflation() {
     assert!(indices.iter().max() > indices.iter().min(), "{indices:?}");
 }
 
-/// The negative eigenvalues of the Hessian of `A_d` in the interior points, by central differences of the paper's formula for `dA_d`.
+/// The negative eigenvalues of the Hessian of `A_d` in the interior points, by central differences of the paper's
+/// formula for `dA_d`.
 fn negative_directions<D: DiscreteLagrangian<1>>(ld: &D, path: &CriticalPath<1>) -> usize {
     let steps = path.points.len() - 1;
     let mut hessian = contact_geom::nalgebra::DMatrix::zeros(steps - 1, steps - 1);
@@ -316,7 +313,8 @@ fn negative_directions<D: DiscreteLagrangian<1>>(ld: &D, path: &CriticalPath<1>)
     symmetric.symmetric_eigenvalues().iter().filter(|value| **value < 0.0).count()
 }
 
-/// Momenta at one end, at both, and free ends: those of the discrete Legendre transforms; and a free end is critical.
+/// Momenta at one end, at both, and free ends: the momenta are those of the discrete Legendre transforms, and a free
+/// end is critical.
 #[test]
 fn momenta_and_free_ends() {
     let (h, steps, z0) = (0.01, 60, 0.4);
@@ -336,7 +334,7 @@ fn momenta_and_free_ends() {
         let point = |k: usize| DiscretePoint { q0: found.points[k], q1: found.points[k + 1], z0: found.actions[k] };
         let p0 = legendre_minus(&ld, 0.0, &point(0)).unwrap().p[0];
         let p1 = legendre_plus(&ld, 0.0, &point(steps - 1)).unwrap().p[0];
-        // The rounding of a position is that of a momentum times W/h.
+        // The rounding of a position changes a momentum by W/h times the rounding.
         let bound = 16.0 * EPS * largest_of(&found.points) / h;
         for (end, p, q) in [(ends[0], p0, found.points[0]), (ends[1], p1, found.points[steps])] {
             match end {
@@ -345,14 +343,15 @@ fn momenta_and_free_ends() {
                 End::Free => assert!(p.abs() <= bound, "{p}"),
             }
         }
-        // On a short path the action is least, but for a shift of all points, where no position is given: that raises the potential
-        // `q^2/2`, and lowers the action.
+        // On a short path the action is minimal, except in the direction of a shift of all points where no position is
+        // given: the shift raises the potential `q^2/2`, and lowers the action.
         let shifts = ends.iter().all(|end| !matches!(end, End::Position(_)));
         assert_eq!(problem.index(&found).unwrap(), Some(usize::from(shifts)));
     }
 }
 
-/// Forced and damped motions that close: also by the flow, around and around, into which damping draws others.
+/// Periodic motions of forced and damped systems: also by the flow over many periods, under which other motions
+/// converge to them by damping.
 #[test]
 fn periodic_paths_of_forced_systems() {
     let system = Duffing { alpha: 1.0, beta: 0.05, force: 0.3, omega: 1.2, gamma: -0.25 };
@@ -363,7 +362,8 @@ fn periodic_paths_of_forced_systems() {
     assert_eq!(found.points[0], found.points[steps]);
     assert_eq!(problem.index(&found).unwrap(), None);
     closes(&ld, 0.0, &found, [0.0]);
-    // From another state, after forty periods of e^(-0.125 * 5.2) each: 1e-11 of the way is left.
+    // From another state, after forty periods with a factor e^(-0.125 * 5.2) each, the distance is 1e-11 of the initial
+    // one.
     let (mut x, h) = (DiscretePoint { q0: [0.5].into(), q1: [0.5].into(), z0: 0.0 }, ld.step_size());
     for k in 0..40 * steps {
         x = discrete_flow(&ld, k as f64 * h, &x).unwrap();
@@ -374,7 +374,7 @@ fn periodic_paths_of_forced_systems() {
     let ld = Midpoint::new(Driven, 0.05).unwrap();
     let found = BoundaryPath::periodic(&ld, 60, [0.0, 0.0].into()).unwrap().starting_at(0.0, 0.2).unwrap().search();
     closes(&ld, 0.2, &found, [0.0, 0.0]);
-    // Forces that depend on the action, and another position at the end.
+    // Forces that depend on the action, and different positions at the ends.
     let ld = Midpoint::new(QuadraticInZ::default(), 0.1).unwrap();
     let found = BoundaryPath::periodic(&ld, 30, [1.0].into()).unwrap().starting_at(0.0, 0.3).unwrap().search();
     closes(&ld, 0.3, &found, [1.0]);
@@ -388,7 +388,7 @@ fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: &Cri
     let end = legendre_plus(ld, ld.step_size() * (steps - 1) as f64, &point(steps - 1)).unwrap();
     let q = largest_of(&found.points);
     assert!((found.points[steps] - found.points[0] - SVector::from(shift)).amax() <= 4.0 * EPS * q);
-    // The rounding of a position is that of a momentum times W/h.
+    // The rounding of a position changes a momentum by W/h times the rounding.
     assert!((start.p - end.p).amax() <= 32.0 * EPS * q / ld.step_size(), "{} {}", start.p, end.p);
 }
 
@@ -403,16 +403,16 @@ impl Lagrangian<2> for Driven {
     }
 }
 
-/// In a parameter and in the number of steps, to a path that the straight line does not lead to.
+/// Continuation in a parameter and in the number of steps, to a path that is not found from the straight line.
 #[test]
 fn continuation_follows_a_path() {
-    // The ends move apart to several turns.
+    // The distance of the ends grows to several turns.
     let ld = Midpoint::new(Pendulum { gamma: -0.05 }, 0.05).unwrap();
     let problem = |k: u32| BoundaryPath::new(&ld, 100, [at([0.0]), at([0.2 * f64::from(k)])]).unwrap();
     let paths = continuation((0..=40).map(problem)).unwrap();
     assert!(paths.len() == 41 && paths.iter().all(CriticalPath::is_found));
     check(&ld, (0.0, 0.0), &paths[40], 8.0);
-    // Refined: of each the start is that before, and two corrections suffice for the last.
+    // With refined steps each path is the start of the next, and two corrections suffice for the last.
     let refined = |n: usize| {
         let ld = Midpoint::new(DoublePendulum::default(), 1.0 / n as f64).unwrap();
         BoundaryPath::new(ld, n, [at([0.0, 0.1]), at([0.9, 0.4])]).unwrap()
@@ -420,17 +420,18 @@ fn continuation_follows_a_path() {
     let paths = continuation([7, 50, 400, 401].map(refined)).unwrap();
     assert!(paths.iter().all(CriticalPath::is_found));
     assert_eq!(paths.iter().map(|path| path.points.len()).collect::<Vec<_>>(), [8, 51, 401, 402]);
-    // Where there is no path it ends, and keeps what it found.
-    let bratu =
-        |lambda: f64| BoundaryPath::new(Midpoint::new(Bratu { lambda }, 0.01).unwrap(), 100, [at([0.0]), at([0.0])]);
+    // Where no path exists continuation ends, and keeps the paths found before.
+    let bratu = |lambda: f64| {
+        BoundaryPath::new(Midpoint::new(Bratu::undamped(lambda), 0.01).unwrap(), 100, [at([0.0]), at([0.0])])
+    };
     let paths = continuation([3.0, 3.4, 3.6, 3.8].map(|lambda| bratu(lambda).unwrap())).unwrap();
     assert_eq!(paths.iter().map(CriticalPath::is_found).collect::<Vec<_>>(), [true, true, false]);
 }
 
-/// Outside of the domain, and with a conformal factor that is not positive: statuses.
+/// Positions outside of the domain, and a conformal factor that is not positive, are reported as a status.
 #[test]
-fn what_is_not_defined_is_a_status() {
-    // Faster than light.
+fn undefined_paths_are_a_status() {
+    // A velocity above the speed of light.
     let ld = Midpoint::new(Relativistic::default(), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [at([0.0]), at([5.0])]).unwrap().search();
     let StepError::NonFinite = (match found.status {
@@ -473,14 +474,14 @@ fn bad_input_is_refused() {
     assert!(problem().avoiding(&[], 0.0).is_err());
 }
 
-/// A user's start whose ends are elsewhere is moved to the given ones, and decides which path is found.
+/// A user's initial path whose ends differ from the given ones is moved to them, and determines which path is found.
 #[test]
-fn the_path_that_the_user_starts_from() {
+fn the_initial_path_of_the_user() {
     let (h, steps) = (0.05, 160);
     let ld = Midpoint::new(Pendulum { gamma: -0.05 }, h).unwrap();
-    // A motion by the flow, disturbed by a thousandth.
+    // A motion by the flow, perturbed by a thousandth.
     let start = legendre(&Pendulum { gamma: -0.05 }, 0.0, &VelocityPoint::new([0.2], [1.7], 0.0));
-    let mut x = discrete_herglotz::legendre_minus_inverse(&ld, 0.0, &start, &[1.7].into()).unwrap();
+    let mut x = discrete_herglotz::theory::legendre_minus_inverse(&ld, 0.0, &start, &[1.7].into()).unwrap();
     let mut motion = vec![x.q0, x.q1];
     for k in 0..steps - 1 {
         x = discrete_flow(&ld, k as f64 * h, &x).unwrap();
@@ -491,14 +492,14 @@ fn the_path_that_the_user_starts_from() {
     let found = problem.from_path(DiscretePath::new(disturbed).unwrap()).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 1.0);
     let off = max_abs_or_nan((0..=steps).map(|k| (found.points[k] - motion[k]).amax()));
-    // The flow's own round-off, eps/h a step, over the span.
+    // The round-off of the flow, eps/h a step, over the span.
     assert!(off <= 64.0 * EPS / h * steps as f64, "{off:e}");
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Between random ends at short spans there is a path, and it is what it says.
+    /// Between random ends at short spans a path is found, and passes the checks.
     #[test]
     fn random_ends(u in prop::collection::vec(-0.8f64..0.8, 4), steps in 2usize..80, z0 in -1.0f64..1.0) {
         fn run<const N: usize, L: Lagrangian<N>>(system: L, u: &[f64], steps: usize, z0: f64) {
@@ -517,9 +518,9 @@ proptest! {
     }
 }
 
-/// An oscillator from 0 to 1 in half a period: there is no motion, and what is found has the amplitude that the error of the steps gives it, 155 to
-/// 2e7 here. The steps move it by about its own range, of order one however short they are, which no pivot shows. Away from the conjugate point
-/// the estimate is the error.
+/// An oscillator from 0 to 1 in half a period has no motion: the path that is found has the amplitude that results from
+/// the error of the steps, 155 to 2e7 here. Its error is about as large as its range, however short the steps are,
+/// which the pivots do not show. Away from the conjugate point the estimate is the error.
 #[test]
 fn conjugate_ends_are_flagged() {
     for method in Method::ALL {
@@ -546,12 +547,13 @@ fn conjugate_ends_are_flagged() {
                     }
                     let exact = |k: usize| (span * k as f64 / steps as f64).sin() / span.sin();
                     let off = max_abs_or_nan((0..=steps).map(|k| (found.points[k][0] - exact(k)).abs()));
-                    // The points reach the turning point to within the square of half a step.
+                    // The points reach the turning point up to the square of half a step.
                     let range =
                         if span > PI { 1.0 / span.sin().abs() + 1.0 } else { max_abs_or_nan((0..=steps).map(exact)) };
                     let estimate = found.error_estimate.unwrap();
-                    // To first order, with third differences at the ends of the path that are those of the points within: a fifth of it. Beyond 1e-9
-                    // of the range the rounding of 5000 positions in third differences of momenta is below that.
+                    // To first order, with third differences at the ends of the path equal to those of the points next
+                    // to them: an error of a fifth. Above 1e-9 of the range the rounding of 5000 positions in third
+                    // differences of momenta is smaller than that.
                     assert!(
                         (estimate * range / off - 1.0).abs() < 0.2 || estimate < 1e-9,
                         "{span}, {steps}: {estimate:e}, {off:e}"
@@ -562,8 +564,9 @@ fn conjugate_ends_are_flagged() {
     }
 }
 
-/// Kepler's problem from (1, 0) to (0, 1) in the time 8, by several paths: where the energy of the steps, which is conserved, jumps, the steps have
-/// passed the centre without resolving it, and the path is flagged; where it is steady the path is not.
+/// Kepler's problem from (1, 0) to (0, 1) in the time 8, by several paths: where the energy of the steps, which is
+/// conserved, jumps, the steps pass the centre without resolving it, and the path is flagged; where the energy is
+/// constant the path is not flagged.
 #[test]
 fn paths_that_jump_a_centre_are_flagged() {
     let ends = [at([1.0, 0.0]), at([0.0, 1.0])];

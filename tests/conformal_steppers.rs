@@ -1,18 +1,25 @@
-//! Steppers that are no discrete Lagrangians, the splittings and the compositions, are conformally contact too: each of their maps
-//! is, and so is a product of them. Here by the derivative of a whole step.
+//! The steppers that are no discrete Lagrangians, the splittings and the compositions, are conformally contact too:
+//! each of their maps is, and so is a product of such maps. Tested by the derivative of a whole step.
 
 use crate::common::{bounded, on_some, step_from};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
-    ChartVector, Darboux, Derivatives, MaxAbsOrNan, MaxOrNan, PhasePoint, conformality_with_jacobian, legendre,
+    ChartVector, Darboux, Derivatives, PhasePoint, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+    support::conformality_with_jacobian,
 };
-use discrete_herglotz::{Composition, InputError, Midpoint, Splitting, SplittingScheme, Stepper};
+use discrete_herglotz::{
+    InputError, SplittingScheme, Stepper,
+    rules::{Composition, Midpoint},
+    splitting::Splitting,
+};
 
 /// The random cases for each system and scheme.
 const CASES: u32 = 8;
 
-/// The bound on the conformal defect: the round-off of the differences, `eps / 0.004` times the size of a step's terms.
+/// The bound on the conformal defect: the round-off of the differences, `eps / 0.004` times the size of the terms of a
+/// step.
 const BOUND: f64 = 1e-9;
 
 /// A state and `sigma_d` after one step.
@@ -52,7 +59,7 @@ fn jacobian<const N: usize>(
     Ok(jacobian)
 }
 
-/// The conformal defect of a step, and how far its factor is from the `sigma_d` that the stepper states; that factor.
+/// The conformal defect of a step, the difference of its factor from the `sigma_d` of the stepper, and the factor.
 fn defect<const N: usize>(
     map: impl Fn(PhasePoint<N>) -> Result<(PhasePoint<N>, f64), String>,
     from: &PhasePoint<N>,
@@ -68,8 +75,8 @@ fn defect<const N: usize>(
     ))
 }
 
-/// Every scheme, on every separable system with a linear drag, contracts the contact form, by `e^(gamma h)` where the rate is
-/// constant.
+/// Every scheme, on every separable system with a linear drag, scales the contact form by `sigma_d`, which is `e^(gamma
+/// h)` where the rate is constant.
 #[test]
 fn splittings() {
     struct Visitor {
@@ -106,7 +113,8 @@ fn splittings() {
     assert_eq!(visitor.met, visitor.separable, "the separable systems with a linear drag");
 }
 
-/// Compositions of the symmetric midpoint rule, on every system, by the product of the substeps' `sigma_d`.
+/// Compositions of the symmetric midpoint rule, on every system, scale it by the product of the `sigma_d` of the
+/// substeps.
 #[test]
 fn compositions() {
     struct Visitor;

@@ -1,15 +1,19 @@
 //! Dense output of contact Gauss collocation, and events along it.
 
-use crate::gauss::{Claims, cut};
+use crate::common::lagrangians::WithStructure;
+use crate::gauss::cut;
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
-use contact_geom::{ChartVector, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, VelocityPoint, legendre};
+use contact_geom::{
+    ChartVector, Lagrangian, PhasePoint, VelocityPoint, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+};
 use discrete_herglotz::{
-    AnyIntegrator, Crossing, Event, Events, Gauss, GaussRoute, InputError, Outcome, Problem, Status, StepError,
-    Stepper, Steps, Until,
+    AnyIntegrator, Crossing, Event, Events, InputError, Outcome, Problem, Status, StepError, Stepper, Steps, Until,
+    gauss::{Gauss, GaussRoute},
 };
 
-/// By each route one curve, and of order s between the nodes: halving the step divides the largest error along two units of time
-/// by `2^(s+1)`, the local order of the polynomial of degree s.
+/// Each route has the same curve, of order s between the nodes: half of the step divides the largest error along two
+/// units of time by `2^(s+1)`, the local order of the polynomial of degree s.
 #[test]
 fn curves_have_the_order_of_the_stages() {
     let oscillator = HarmonicOscillator { gamma: -0.5 };
@@ -21,7 +25,7 @@ fn curves_have_the_order_of_the_stages() {
         for route in [GaussRoute::Linear, GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
             let errors = [20, 40].map(|steps| {
                 let h = 2.0 / f64::from(steps);
-                let claims = Claims(system, cut(&system, route));
+                let claims = WithStructure(system, cut(&system, route));
                 let gauss = Gauss::new(&claims, s, h);
                 let stepper = gauss.as_ref().map(|g| g.stepper(0.0, legendre(&system, 0.0, &x), x.v));
                 let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
@@ -52,7 +56,7 @@ fn curves_have_the_order_of_the_stages() {
     }
 }
 
-/// A run with events, by Gauss steps of some stages up to a time, with what it has found.
+/// A run with events, by Gauss steps of a number of stages up to a time, with the events that it finds.
 fn events<'f, const N: usize, L: Lagrangian<N>>(
     system: &L,
     x: VelocityPoint<N>,
@@ -66,8 +70,8 @@ fn events<'f, const N: usize, L: Lagrangian<N>>(
     (outcome, events.crossings)
 }
 
-/// The zeros of a damped oscillation are where the closed form has them, by direction, and the states are those there; to
-/// 1e-13, since 16 stages leave less.
+/// The zeros of a damped oscillation agree with the closed form, by direction, and so do the states there; to 1e-13,
+/// since the error of 16 stages is smaller.
 #[test]
 fn crossings_are_those_of_the_closed_form() {
     let oscillator = HarmonicOscillator { gamma: -0.1 };
@@ -87,11 +91,12 @@ fn crossings_are_those_of_the_closed_form() {
         let there = legendre(&system, c.t, &oscillator.solution(c.t, &x));
         let off = ChartVector::from(c.state).minus(there.into()).max_abs_or_nan();
         assert!(off <= 1e-13, "{k}: {off:e}");
-        // Falling first.
+        // The first zero is a falling one.
         assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);
     }
     assert!(crossings.is_sorted_by(|a, b| a.t <= b.t));
-    // The way back from q > 0 leads through the zeros before t = 0, in their order, and what rises there is what the run meets so.
+    // Backward from q > 0 the run passes the zeros before t = 0 in their order; a rising zero is one that rises along
+    // the run.
     let (outcome, crossings) = events(&system, x, (16, 15, -10.5), [zero(), zero().rising(), zero().falling()]);
     assert_eq!((outcome.status, outcome.t), (Status::Completed, -10.5));
     let of = |event: usize| crossings.iter().filter(|c| c.event == event).collect::<Vec<_>>();
@@ -104,14 +109,14 @@ fn crossings_are_those_of_the_closed_form() {
     assert!(crossings.is_sorted_by(|a, b| a.t >= b.t));
 }
 
-/// Two changes of sign within one step are both seen; a terminal event ends the run at its state; later ones are not recorded;
-/// and what vanishes at the start is no change of sign.
+/// Two changes of sign within one step are both found; a terminal event ends the run at its state; later events are not
+/// recorded; and a zero at the start is no change of sign.
 #[test]
 fn events_within_one_step() {
     let oscillator = HarmonicOscillator { gamma: -0.1 };
     let system = OneCoordinate::from(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
-    // q > -0.8 but for a short time around the first turning point, within one step.
+    // q < -0.8 only for a short time around the first turning point, within one step.
     let dip = || Event::new(|_, x: &PhasePoint<1>| x.q[0] + 0.8);
     let (_, crossings) = events(&system, x, (16, 1, 5.0), [dip()]);
     assert_eq!(crossings.len(), 2, "{crossings:?}");
@@ -124,7 +129,7 @@ fn events_within_one_step() {
     assert_eq!(crossings.last().map(|c| (c.t, c.state)), Some((outcome.t, outcome.state())));
 }
 
-/// A function that vanishes exactly at the end of a step, or part, changes its sign there and once.
+/// A function that vanishes exactly at the end of a step, or of a part of it, changes its sign there once.
 #[test]
 fn a_zero_at_a_node_is_one_crossing() {
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
@@ -132,7 +137,7 @@ fn a_zero_at_a_node_is_one_crossing() {
     let (_, crossings) =
         events(&OneCoordinate::from(Pendulum::default()), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
     assert_eq!(crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
-    // It touches and does not cross.
+    // It touches zero without a change of sign.
     let (_, crossings) = events(
         &OneCoordinate::from(Pendulum::default()),
         x,
@@ -142,9 +147,9 @@ fn a_zero_at_a_node_is_one_crossing() {
     assert_eq!(crossings, []);
 }
 
-/// A function that is not finite ends the run with its time; what was found before is kept.
+/// A function that is not finite ends the run with its time; events found before are kept.
 #[test]
-fn bad_luck_is_a_status() {
+fn a_function_that_is_not_finite_is_a_status() {
     let x = VelocityPoint::new([1.0], [0.0], 1.0);
     let passes = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     let undefined = Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 });
@@ -153,17 +158,17 @@ fn bad_luck_is_a_status() {
     let Status::Failed { step, t: ended, cause: StepError::Event { t } } = outcome.status else {
         panic!("{outcome:?}")
     };
-    // The step from 1.8 to 2.1, at whose end it is noticed.
+    // It is noticed at the end of the step from 1.8 to 2.1.
     assert!(t > 2.0 && t <= 2.1 && ended <= 2.1, "{t}, {ended}");
     assert_eq!((outcome.steps, outcome.t, crossings.len()), (step, ended, 1));
-    // No step is no run.
+    // A run without steps is refused.
     let (pendulum, mut none) = (OneCoordinate::from(Pendulum::default()), Events::new([]));
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let refused = problem.steps(Steps::Count(0)).observe(&mut none).run(Until::Time(1.0));
     assert!(matches!(refused, Err(InputError::Count { found: 0, .. })), "{refused:?}");
 }
 
-/// Where the action is not requested, z stays what it was, and the rest of the curve is the same.
+/// Where the action is not requested, z keeps its value, and the rest of the curve is the same.
 #[test]
 fn without_action() {
     let system = OneCoordinate::from(Pendulum { gamma: -0.1 });

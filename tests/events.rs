@@ -1,11 +1,11 @@
-//! Events of runs that join: each change of sign is counted once, in exactly one of the runs.
+//! Events of consecutive runs: each change of sign is counted once, in exactly one of the runs.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Crossing, Event, Events, Method, Problem, ResumeState, Rows, Start, Status, StepView,
-    Steps, Stop, Until,
+    AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, StepView, Steps,
+    Stop, Until, rules::Method,
 };
 use proptest::prelude::*;
 use std::f64::consts::PI;
@@ -21,7 +21,7 @@ impl Lagrangian<1> for About {
     }
 }
 
-/// A damped oscillation under a force that depends on the time.
+/// A damped oscillation under a force that depends on time.
 struct Driven {
     force: f64,
     frequency: f64,
@@ -33,7 +33,7 @@ impl Lagrangian<1> for Driven {
     }
 }
 
-/// A run from a start to a time, with the crossings of events and where it ends.
+/// A run from a start to a time, with its end and the crossings of events.
 fn run_to<'f, L: Lagrangian<1>>(
     system: &L,
     (t0, start): (f64, impl Into<Start<1>>),
@@ -47,10 +47,10 @@ fn run_to<'f, L: Lagrangian<1>>(
     (outcome, events.crossings)
 }
 
-/// A loop that goes on from the first crossing comes to the next one, wherever the surface, by the time that goes on or begins anew,
-/// forward and back; with a function that jumps as with a smooth one.
+/// A loop that continues from each crossing finds the next one, for any place of the surface, with the time continued
+/// or reset, forward and backward, and for a function that jumps as well as for a smooth one.
 #[test]
-fn a_run_from_a_crossing_goes_on_to_the_next() {
+fn a_run_from_a_crossing_finds_the_next() {
     let integrators = [
         AnyIntegrator::Gauss { stages: 4 },
         AnyIntegrator::Gauss { stages: 16 },
@@ -63,7 +63,7 @@ fn a_run_from_a_crossing_goes_on_to_the_next() {
             for (anew, jump, terminal) in
                 [(false, false, false), (true, false, true), (false, true, false), (true, true, true)]
             {
-                // At a place with a size a jump is not told from the rounding of its argument.
+                // Away from q = 0 a jump cannot be distinguished from the rounding of its argument.
                 if jump && place != 0.0 {
                     continue;
                 }
@@ -78,7 +78,8 @@ fn a_run_from_a_crossing_goes_on_to_the_next() {
                     let (_, found) = run_to(&system, (t, start), (by, Steps::Size(h)), t + 4.0 * way, [event]);
                     let name = format!("{by} about {place} by {h}, anew {anew}, jump {jump}: the {k}th from {t}");
                     assert_eq!(found.len(), 1, "{name}: {found:?}");
-                    // Half a period, a quarter at first: to the error of midpoint steps of a tenth, 1e-3 of it, and the rounding of 1e6.
+                    // Half a period, a quarter at first, up to the error of midpoint steps of a tenth, 1e-3 of it, and
+                    // the rounding of 1e6.
                     let passed = (found[0].t - t).abs();
                     let expected = if k == 0 { 0.5 * PI } else { PI };
                     assert!((passed - expected).abs() <= 5e-3, "{name}: after {passed}");
@@ -89,9 +90,10 @@ fn a_run_from_a_crossing_goes_on_to_the_next() {
     }
 }
 
-/// A throw from below the floor by a rounding: it falls through it at twice the speed over the acceleration, in long steps and short ones.
+/// A throw from a place below the floor by a rounding: it returns to the floor after twice the speed over the
+/// acceleration, in long and short steps.
 #[test]
-fn a_start_within_rounding_goes_by_its_rate() {
+fn a_start_within_rounding_crosses_by_its_rate() {
     let ball = UniformField { field: [-9.81], gamma: 0.0 };
     for below in [-2e-16, 0.0, 2e-16, -1e-17] {
         for (count, h) in [(1, 20.0), (20, 1.0), (2000, 0.01)] {
@@ -102,23 +104,24 @@ fn a_start_within_rounding_goes_by_its_rate() {
                 let (ended, found) = run_to(&ball, (0.0, start), way, 20.0, [event]);
                 let name = format!("{below} by {h}: {ended:?}");
                 assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }) && found.len() == 1, "{name}");
-                // The quotient has two roundings, and the step is one of 20.
+                // The quotient has two roundings, and the step has length 20.
                 assert!((ended.t - 7.0 / 9.81).abs() <= 8.0 * f64::EPSILON * 20.0, "{name}");
             }
         }
     }
-    // From rest on the floor it falls, and does not come through it.
+    // From rest on the floor it falls, and does not cross the floor.
     let rest = VelocityPoint::new([0.0], [0.0], 0.0);
     let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(20));
     let (ended, found) = run_to(&ball, (0.0, rest), way, 2.0, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
     assert_eq!((ended.status, found), (Status::Completed, vec![]));
-    // What is off the surface by more than rounding comes through it.
+    // A start off the surface by more than rounding crosses it.
     let off = VelocityPoint::new([-1e-12], [3.5], 0.0);
     let (_, found) = run_to(&ball, (0.0, off), way, 0.5, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
     assert_eq!(found.len(), 1);
 }
 
-/// An event exactly where one run ends and the next begins is the first one's; also where an observer ends it and it is resumed.
+/// An event exactly where one run ends and the next begins belongs to the first one; also where an observer ends the
+/// run and it is resumed.
 #[test]
 fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     let system = HarmonicOscillator { gamma: 0.0 };
@@ -128,7 +131,7 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     let (ended, found) = run_to(&system, (0.0, start), way, 1.0, [at_one(), at_one().rising(), at_one().falling()]);
     assert_eq!(found.iter().map(|c| (c.event, c.t)).collect::<Vec<_>>(), [(0, 1.0), (1, 1.0)]);
     assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [at_one()]).1, []);
-    // It touches its surface at the seam.
+    // The function touches zero where the runs meet.
     let touches = || Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2));
     assert_eq!(run_to(&system, (0.0, start), way, 1.0, [touches()]).1, []);
     assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [touches()]).1, []);
@@ -148,9 +151,10 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     assert_eq!((first.crossings.len(), second.crossings.len()), (1, 0));
 }
 
-/// Events of one instant are told in the order of their index, those after the terminal one too; what lies behind is not told.
+/// Events at the same time are reported in the order of their index, including those after the terminal one; later
+/// events are not reported.
 #[test]
-fn all_events_of_an_instant_are_told() {
+fn all_events_of_an_instant_are_reported() {
     let system = HarmonicOscillator { gamma: 0.0 };
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     for (stages, steps) in [(4, 7), (8, 3), (16, 1)] {
@@ -167,13 +171,13 @@ fn all_events_of_an_instant_are_told() {
         let (ended, found) = run_to(&system, (0.0, start), way, 3.0, all());
         assert_eq!(found.iter().map(|c| c.event).collect::<Vec<_>>(), [0, 1, 2, 4], "{stages}");
         assert_eq!(ended.t, found[1].t);
-        // The next run has the rest alone, and then those of the next instant.
+        // The next run reports the remaining events, and then those at the next time.
         let (_, found) = run_to(&system, (ended.t, &ended), way, ended.t + 3.5, all());
         assert_eq!(found.iter().map(|c| c.event).collect::<Vec<_>>(), [3, 3, 0, 1, 2, 4], "{stages}: {found:?}");
     }
 }
 
-/// A fall towards the place where the potential ends: `v^2/2 - x^(5/2)` for x >= 0.
+/// A fall towards the end of the potential: `v^2/2 - x^(5/2)` for x >= 0.
 struct EndsAtZero;
 
 impl Lagrangian<1> for EndsAtZero {
@@ -182,7 +186,7 @@ impl Lagrangian<1> for EndsAtZero {
     }
 }
 
-/// `v^2/2 - log(x)`-like: nothing of the motion is defined beyond the centre.
+/// `v^2/2 + 1/x`: an attractive centre, beyond which the motion is not defined.
 struct Well;
 
 impl Lagrangian<1> for Well {
@@ -191,8 +195,8 @@ impl Lagrangian<1> for Well {
     }
 }
 
-/// A terminal event before the place where the motion, or L, has its end: by accuracy it is found with the energy of the start, however far
-/// the run was to go, and whatever the integrator.
+/// A terminal event before the motion, or L, ceases to be defined: with an accuracy it is found with the energy of the
+/// start, for any span and integrator.
 #[test]
 fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
     let floor = |at: f64| Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at).terminal();
@@ -207,14 +211,14 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
                     run.observe(&mut events).run(Until::Time(to)).unwrap_or_else(|error| panic!("{name}: {error}"));
                 assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }), "{name}: {ended:?}");
                 assert_eq!((events.crossings.len(), ended.unresolved), (1, None), "{name}: {ended:?}");
-                // Of the position to the rounding of a step of size one, of the momentum to the accuracy.
+                // The position is accurate to the rounding of a step of size one, the momentum to the accuracy.
                 let expected = -(v * v + 2.0 - 2.0 * at.powf(2.5)).sqrt();
                 assert!((ended.q[0] - at).abs() <= 8.0 * f64::EPSILON, "{name}: {ended:?}");
                 assert!((ended.p[0] - expected).abs() <= 1e-9 * expected.abs(), "{name}: {ended:?}, {expected}");
             }
         }
     }
-    // With a dissipation, towards a pole: against a finer run to the same place.
+    // With dissipation, towards a pole: against a finer run to the same place.
     let problem = Problem::new(&Well, 0.0, VelocityPoint::new([1.0], [0.1], 0.0)).unwrap();
     let [coarse, fine] = [1e-6, 1e-10].map(|wanted| {
         let mut events = Events::new([floor(0.01)]);
@@ -222,9 +226,9 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
     });
     assert!(matches!(coarse.status, Status::Stopped { by: "an event", .. }), "{coarse:?}");
     assert!((coarse.p[0] - fine.p[0]).abs() <= 1e-6 * fine.p[0].abs(), "{coarse:?}, {fine:?}");
-    // Without the event the motion has no end that is reached.
+    // Without the event the motion does not reach the end of the span.
     assert!(problem.accuracy(1e-6).run(Until::Time(50.0)).is_err());
-    // An event that is not met refuses nothing, and changes nothing.
+    // An event that does not occur changes nothing.
     let oscillator = HarmonicOscillator { gamma: 0.0 };
     let problem = Problem::new(&oscillator, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let mut events = Events::new([floor(2.0)]);
@@ -232,7 +236,8 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
     assert_eq!((with.q, with.status), (problem.accuracy(1e-9).run(Until::Time(30.0)).unwrap().q, Status::Completed));
 }
 
-/// Given steps too: the step that cannot be taken as a whole is taken as far as the event. What observers see is as of any other step.
+/// With given steps too: a step that cannot be completed is taken up to the event. Observers see it like any other
+/// step.
 #[test]
 fn a_step_that_cannot_be_taken_may_end_in_an_event() {
     let problem = Problem::new(&EndsAtZero, 0.0, VelocityPoint::new([1.0], [-1.0], 0.0)).unwrap();
@@ -249,7 +254,8 @@ fn a_step_that_cannot_be_taken_may_end_in_an_event() {
     }
 }
 
-/// A function that is not defined beyond its surface: the change of sign before counts, whether it ends the run or not.
+/// A function that is not defined beyond its surface: the change of sign before is found, whether it ends the run or
+/// not.
 #[test]
 fn a_crossing_before_the_function_ends_is_found() {
     let ball = UniformField { field: [-9.81], gamma: 0.0 };
@@ -261,7 +267,7 @@ fn a_crossing_before_the_function_ends_is_found() {
         for (event, status) in [(root().terminal(), "an event"), (root().falling(), "")] {
             let (ended, found) = run_to(&ball, (0.0, start), way, 5.0, [event]);
             assert_eq!(found.len(), 1, "{count}: {ended:?}");
-            // Of a time of size one some roundings, and of a step of 5.
+            // Some roundings of a time of size one, and of a step of length 5.
             assert!((found[0].t - expected).abs() <= 4.0 * 5.0 * f64::EPSILON, "{count}: {found:?}, {expected}");
             match ended.status {
                 Status::Stopped { by, .. } => assert_eq!(by, status),
@@ -278,9 +284,9 @@ fn a_crossing_before_the_function_ends_is_found() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// A run that is chopped anywhere, and at its crossings, has the crossings of the whole one.
+    /// A run that is divided anywhere, and at its crossings, has the crossings of the whole run.
     #[test]
-    fn chopped_runs_have_the_crossings_of_the_whole(
+    fn divided_runs_have_the_crossings_of_the_whole(
         (force, frequency) in (0.0..2.0, 0.1..3.0),
         (x, v) in (-2.0..2.0, -2.0..2.0),
         (begin, span) in (prop_oneof![Just(0.0), -100.0..100.0], 5.0..20.0),
@@ -304,7 +310,7 @@ proptest! {
         let start = VelocityPoint::new([x], [v], 0.0);
         let end: f64 = if back { begin - span } else { begin + span };
         let (_, whole) = run_to(&system, (begin, start), way, end, all());
-        // What nearly touches its surface has no time to round-off.
+        // Where a function nearly touches zero, the time is determined by round-off.
         prop_assume!(whole.iter().all(|c| rate(c).abs() > 0.05));
         for cut in &mut cuts {
             *cut = begin + *cut * (end - begin);
@@ -315,7 +321,7 @@ proptest! {
         cuts.dedup();
         let (mut t, mut from, mut chopped) = (begin, Start::from(start), Vec::new());
         for cut in cuts {
-            // What is shorter than the rounding of ten steps is none.
+            // Parts shorter than the rounding of ten steps are left out.
             if (cut - t).abs() < 1e-10 {
                 continue;
             }
@@ -326,15 +332,16 @@ proptest! {
         let names = |found: &[Crossing<1>]| found.iter().map(|c| c.event).collect::<Vec<_>>();
         prop_assert_eq!(names(&whole), names(&chopped), "{:?} and {:?}", whole, chopped);
         for (a, b) in whole.iter().zip(&chopped) {
-            // 400 steps of a motion of size 5, over the rate, and the rounding of the time.
+            // The rounding of 400 steps of a motion of size 5, over the rate, and the rounding of the time.
             let bound = f64::EPSILON * (400.0 * 5.0 / rate(a).abs() + 16.0 * a.t.abs());
             prop_assert!((a.t - b.t).abs() <= bound, "{} and {}, not {}", a.t, b.t, bound);
         }
     }
 }
 
-/// What is told of a crossing is the motion: a row at its time has the same state, to the rounding of the time and of a step, however the crossing was found; and
-/// where no function depends on the action, it is the same without.
+/// The state of a crossing is a state of the motion: a row at its time has the same state, up to the rounding of the
+/// time and of a step, however the crossing was found; and where no function depends on the action, it is the same
+/// without the action.
 #[test]
 fn a_crossing_is_a_state_of_the_motion() {
     let pendulum = contact_geom::systems::Pendulum { gamma: -0.02 };

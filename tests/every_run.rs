@@ -1,7 +1,7 @@
-//! What a run gives, by integrators that are in no table of names: the exact flow, and a discrete Lagrangian of a user's own.
+//! All features of a run, by integrators without a name in the table: the exact flow, and a user's discrete Lagrangian.
 
 use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
-use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan};
+use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{
     Checkpoint, CustomMethod, DiscreteLagrangian, Event, Events, Integrator, Outcome, Problem, ResumeState, Rows, Run,
     Status, StepError, StepView, Steps, Stop, Until,
@@ -9,7 +9,7 @@ use discrete_herglotz::{
 use exact_lagrangian::ExactFlow;
 use std::ops::ControlFlow;
 
-/// The midpoint of the positions and of the actions, as its user would write it: `z1` by three passes.
+/// The midpoint of the positions and of the actions, as a user would write it: `z1` by twelve fixed-point iterations.
 struct Own<L> {
     lagrangian: L,
     h: f64,
@@ -29,7 +29,7 @@ impl<L: Lagrangian<1>> DiscreteLagrangian<1> for Own<L> {
     }
 }
 
-/// The cells of the table, for one integrator on one system: none is empty.
+/// Every feature of a run, for one integrator on one system.
 fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, L, 1> + Clone, order: i32) {
     let name = integrator.info().name;
     let problem = Problem::new(system, 0.25, system.initial()).unwrap();
@@ -44,7 +44,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     let back = of(&Problem::new(system, whole.t, &whole).unwrap(), 0.25);
     assert!((back.q[0] - system.initial().q[0]).abs() <= 1e-12, "{name}: back at {}", back.q[0]);
 
-    // Rows at times; between steps as exact as at their ends: the energy decays as the factor.
+    // Rows at times; between steps they are as accurate as at the ends: the energy decays as the conformal factor.
     let mut rows = Rows::at([0.25, 0.3, 1.111, 2.0, 3.25]).unwrap().with_energy().with_conformal_factor();
     let observed = problem.by(integrator.clone()).steps(Steps::Size(0.05)).observe(&mut rows).with_conformal_factor();
     assert_eq!(observed.run(Until::Time(3.25)).unwrap().state(), whole.state(), "{name}");
@@ -52,7 +52,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     let off = max_abs_or_nan(rows.rows.iter().map(|row| kept(row) / kept(&rows.rows[0]) - 1.0));
     assert!(rows.rows.len() == 5 && off <= error(order), "{name}: {off:e}");
 
-    // Events, and the end of a run by one of them.
+    // Events, and a run that ends in one of them.
     let top = system.initial().q[0];
     let mut passes = Events::new([Event::new(|_, x| x.q[0] - 0.5 * top).terminal()]);
     let stopped =
@@ -60,7 +60,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     assert!(matches!(stopped.status, Status::Stopped { by: "an event", .. }), "{name}: {:?}", stopped.status);
     assert!((stopped.q[0] - 0.5 * top).abs() <= 8.0 * f64::EPSILON, "{name}");
 
-    // A stop by a user's observer, and on to the last bit from a checkpoint before.
+    // A run that an observer stops, and its continuation from an earlier checkpoint, which is the same to the last bit.
     let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", system.name()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
     let mut seen = 0;
@@ -83,7 +83,7 @@ fn by_the_exact_flow() {
 }
 
 #[test]
-fn by_a_discrete_lagrangian_of_ones_own() {
+fn by_a_users_discrete_lagrangian() {
     fn of<L: System<1> + Copy + 'static>(system: &L) {
         let lagrangian = *system;
         everything(system, CustomMethod::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
@@ -92,7 +92,7 @@ fn by_a_discrete_lagrangian_of_ones_own() {
     of(&OneCoordinate::from(QuadraticInZ::default()));
 }
 
-/// The start of a run may be the momentum, two points, or the end of another; each gives the velocity back.
+/// A run may start from a velocity or a momentum; the velocity of the outcome is that of its momentum.
 #[test]
 fn starts() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });

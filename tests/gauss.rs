@@ -1,31 +1,25 @@
-//! Contact Gauss collocation through its fast stepper: orders, agreement with Newton's steps and of the routes with each other,
-//! the conformal factor, round-off in long runs, and what happens where the iteration does not contract.
+//! Contact Gauss collocation through its fast stepper: orders, agreement with Newton's steps and of the routes with
+//! each other, the conformal factor, round-off in long runs, and steps for which the iteration does not contract.
 
 #![allow(clippy::unwrap_used)]
 
+use crate::common::lagrangians::WithStructure;
+use crate::common::{relative_distance, slope};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
     Relativistic, System, TwoCoordinates,
 };
 use contact_geom::{
-    ChartVector, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
+    ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
 };
-use discrete_herglotz::{DiscreteLagrangian, Gauss, GaussRoute, InputError, StepError, StepFailure, Stepper};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError, StepError, StepFailure, Stepper,
+    gauss::{Gauss, GaussRoute},
+};
 
-/// A Lagrangian that claims less than it could.
-pub struct Claims<L>(pub L, pub Structure);
-
-impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Claims<L> {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        self.0.value(t, q, v, z)
-    }
-    fn structure(&self) -> Structure {
-        self.1
-    }
-}
-
-/// The claims of a Lagrangian cut down so that its steps take another route.
+/// The structure of a Lagrangian, reduced so that its steps take another route.
 pub fn cut<const N: usize>(system: &impl Lagrangian<N>, route: GaussRoute) -> Structure {
     let all = system.structure();
     match route {
@@ -55,16 +49,8 @@ fn run<const N: usize, S: Lagrangian<N>>(
     outcome.unwrap_or((start, 0, GaussRoute::General))
 }
 
-/// The least-squares slope of log error against log step.
-fn slope(points: &[(f64, f64)]) -> f64 {
-    let logs: Vec<_> = points.iter().map(|(h, e)| (h.ln(), e.ln())).collect();
-    let n = logs.len() as f64;
-    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-    let covariance: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
-    covariance / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
-}
-
-/// A relativistic particle of mass and speed of light 1 in a field that grows with time: its momentum is a polynomial, which its velocity is not.
+/// A relativistic particle of mass and speed of light 1 in a field that grows with time: its momentum is a polynomial,
+/// and its velocity is not.
 struct InField {
     growth: f64,
 }
@@ -75,7 +61,7 @@ impl Lagrangian<1> for InField {
     }
 }
 
-/// Where the momenta of the last step's polynomial are those of the next to the last bit, its velocities are still solved for.
+/// Where the extrapolated momenta of the last step are exact to the last bit, the velocities are still solved for.
 #[test]
 fn momenta_that_are_polynomials_leave_the_order() {
     let start = VelocityPoint::new([0.0], [-0.8], 0.0);
@@ -88,7 +74,7 @@ fn momenta_that_are_polynomials_leave_the_order() {
             let p = -4.0 / 3.0;
             assert!((truth.q[0] - (energy(p + 4.0) - energy(p))).abs() <= 64.0 * f64::EPSILON, "{truth:?}");
         }
-        // Above round-off, where the higher order has an error that is.
+        // Steps for which the error is above round-off.
         let steps = if s == 2 { [32, 48, 64, 96] } else { [24, 32, 40, 48] };
         let points: Vec<_> = steps
             .iter()
@@ -103,12 +89,14 @@ fn momenta_that_are_polynomials_leave_the_order() {
     }
 }
 
-/// Order 2s on the problems of the other methods' orders, against 16 stages with short steps.
+/// Order 2s on the problems on which the orders of the other methods are measured, against 16 stages with short steps.
 ///
-/// Up to three stages in q, p and z apart. Then the error meets round-off so early that one component may be near a change of
-/// its sign wherever it is asymptotic: with four stages it is that of all components at three times, over the five finest steps
-/// above round-off. From five stages on a slope in double precision is one of the approach to the asymptotic regime, and
-/// bounded from below only; from seven on there is none, and each stage gains in a step of 1. That the order is 2s there too is what the order conditions say, tested with the coefficients.
+/// Up to three stages in q, p and z separately. With four stages the error reaches round-off so early that one
+/// component may be near a change of its sign in the whole asymptotic range: the slope is that of all components at
+/// three times, over the five finest steps above round-off. From five stages on a slope in double precision measures
+/// the approach to the asymptotic regime, and is bounded from below only; from seven on no slope can be measured, and
+/// each additional stage reduces the error of a step of 1. There the order 2s follows from the order conditions, which
+/// are tested with the coefficients.
 #[test]
 fn orders_are_twice_the_stages() {
     fn of<const N: usize, S: System<N>>(system: &S) {
@@ -169,15 +157,10 @@ fn orders_are_twice_the_stages() {
     of(&TwoCoordinates::from(DoublePendulum { gamma: -1.0, ..DoublePendulum::default() }));
 }
 
-/// The difference of two states relative to the larger.
-pub fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
-    ChartVector::from(a).minus(b.into()).max_abs_or_nan()
-        / ChartVector::from(a).max_abs_or_nan().max_or_nan(ChartVector::from(b).max_abs_or_nan())
-}
-
-/// A decayed oscillation keeps its relative accuracy, after t = 1000 in units of the amplitude `e^(gamma t/2) = 1e-11`. By the
-/// linear route, whose products are exact, to 4 eps: those of the closed form. By the iterated one to 400: the positions of
-/// the stages are sums with rounded coefficients, a fraction of an eps in every step and in the same direction.
+/// A decayed oscillation keeps its relative accuracy, after t = 1000 in units of the amplitude `e^(gamma t/2) = 1e-11`.
+/// By the linear route, whose products are exact, the error is at most 4 eps, that of the closed form. By the iterated
+/// route it is at most 400 eps: the positions of the stages are sums with rounded coefficients, with an error of a
+/// fraction of an eps in every step and in the same direction.
 #[test]
 fn decayed_states_keep_their_accuracy() {
     let oscillator = HarmonicOscillator { gamma: -0.05 };
@@ -191,10 +174,10 @@ fn decayed_states_keep_their_accuracy() {
     let (s, c, w) = (s1 * c2 + c1 * s2, c1 * c2 - s1 * s2, 1.0 + w_less_one);
     let amplitude = (a * t).exp() * (1.0 + a.mul_add(t, -(a * t)));
     let (q, v) = (amplitude * (c - a / w * s), -amplitude * s / w);
-    // Steps that are exact, so that the time is.
+    // Steps that are exact in binary, so that the time is exact.
     for (stages, h) in [(8, 0.5), (8, 0.625), (16, 2.5), (16, 5.0)] {
         for (route, bound) in [(GaussRoute::Linear, 4.0), (GaussRoute::Condensed, 400.0)] {
-            let claims = Claims(system, cut(&system, route));
+            let claims = WithStructure(system, cut(&system, route));
             let (end, _, taken) = run(&claims, (0.0, x), stages, h, (t / h) as usize);
             let error = (end.q[0] - q).abs().max_or_nan((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
             assert_eq!(taken, route);
@@ -203,8 +186,8 @@ fn decayed_states_keep_their_accuracy() {
     }
 }
 
-/// Angular momentum decays as `e^(gamma t)` on an orbit of eccentricity 1/2: to 1e-13 in 1e5 steps, while the orbit shrinks by
-/// `e^(2 gamma t)` to 0.29 of its size, and to 5e-13 in 1e6 of a slower decay.
+/// Angular momentum decays as `e^(gamma t)` on an orbit of eccentricity 1/2: to 1e-13 in 1e5 steps, while the orbit
+/// shrinks by `e^(2 gamma t)` to 0.29 of its size, and to 5e-13 in 1e6 of a slower decay.
 #[test]
 fn angular_momentum_decays_exactly() {
     let x = VelocityPoint::new([0.5, 0.0], [0.0, 3f64.sqrt()], 0.0);
@@ -218,22 +201,22 @@ fn angular_momentum_decays_exactly() {
     }
 }
 
-/// One system by each route whose claims it meets: equal to round-off after 100 steps, in which the rounding of
-/// each adds up to 10 eps at random and no more than 30.
+/// One system by each route that its structure allows: equal to round-off after 100 steps, in which the rounding of
+/// each adds up at random to 10 eps, and to at most 30.
 #[test]
 fn routes_agree() {
     fn of<const N: usize, S: System<N>>(system: &S, s: usize, h: f64, routes: &[GaussRoute]) {
         let ends: Vec<_> = routes
             .iter()
             .map(|route| {
-                let claims = Claims(system, cut(system, *route));
+                let claims = WithStructure(system, cut(system, *route));
                 let (end, _, taken) = run(&claims, (0.0, system.initial()), s, h, 100);
                 assert_eq!(taken, *route, "{}", system.name());
                 end
             })
             .collect();
         for (end, route) in ends.iter().zip(routes) {
-            let off = distance(*end, ends[0]) / f64::EPSILON;
+            let off = relative_distance(*end, ends[0]) / f64::EPSILON;
             assert!(off <= 30.0, "{} s = {s} {route:?}: {off} eps", system.name());
         }
     }
@@ -245,16 +228,16 @@ fn routes_agree() {
     }
 }
 
-/// Sweeps a step, which is what the extrapolated start and the slope of the force are there for: 4.40 on the condensed route
-/// and 5.93 on the general ones were measured, and a tenth more is allowed.
+/// The number of fixed-point iterations of a step, which the extrapolated start and the slope of the force reduce: 4.40
+/// on the condensed route and 5.93 on the general ones were measured, and a tenth more is allowed.
 #[test]
-fn few_sweeps() {
+fn few_iterations() {
     let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     let x = VelocityPoint::new([1.0], [1.0], 0.0);
     for (route, most) in [(GaussRoute::Condensed, 4.85), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
-        let (_, evaluations, _) = run(&Claims(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
-        let sweeps = evaluations as f64 / 8e3;
-        assert!(sweeps <= most, "{route:?}: {sweeps} sweeps");
+        let (_, evaluations, _) = run(&WithStructure(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
+        let iterations = evaluations as f64 / 8e3;
+        assert!(iterations <= most, "{route:?}: {iterations} iterations");
     }
 }
 
@@ -276,8 +259,8 @@ fn repeated_runs_are_the_same() {
     of(&TwoCoordinates::from(DoublePendulum::default()));
 }
 
-/// Steps so long that the iteration does not contract are Newton's, and those of the discrete Lagrangian; without Newton they
-/// are refused, and the state is that before.
+/// Steps so long that the iteration does not contract are solved by Newton's method and agree with those of the
+/// discrete Lagrangian; without Newton's method they are refused, and the state does not change.
 #[test]
 fn newton_takes_over() {
     fn of<const N: usize, S: Lagrangian<N>>(system: &S, x: VelocityPoint<N>, s: usize, h: f64, bound: f64) {
@@ -298,27 +281,29 @@ fn newton_takes_over() {
         let gauss = gauss.as_ref().unwrap();
         let step = gauss.forward(0.0, &start, &x.v, &mut Default::default());
         let step = step.unwrap();
-        let off = distance(stepper.state(), step.end);
+        let off = relative_distance(stepper.state(), step.end);
         assert!(
             off <= bound && (stepper.sigma() / step.sigma - 1.0).abs() <= bound,
             "{off:e}, {} {}",
             stepper.sigma(),
             step.sigma
         );
-        // It goes on, and the curve of the step meets both states.
+        // The stepper continues, and the curve of the step meets both states.
         let curve = stepper.dense();
         assert!(
-            curve.is_some_and(|c| distance(c.at(h), stepper.state()) <= bound && distance(c.at(0.0), start) <= bound)
+            curve.is_some_and(|c| relative_distance(c.at(h), stepper.state()) <= bound
+                && relative_distance(c.at(0.0), start) <= bound)
         );
         assert_eq!(stepper.advance(2), Ok(()));
     }
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let x = VelocityPoint::new([2.0], [1.0], 0.0);
     for route in [GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
-        of(&Claims(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
+        of(&WithStructure(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
     }
-    // Damping by e^20 in one step: factors of stages are negative where there is a solution, and Newton's method does not hide it.
-    let damped = Claims(OneCoordinate::from(HarmonicOscillator { gamma: -20.0 }), Structure::default());
+    // Damping by e^20 in one step: the factors of stages are negative at the solution, which is refused also by
+    // Newton's method.
+    let damped = WithStructure(OneCoordinate::from(HarmonicOscillator { gamma: -20.0 }), Structure::default());
     let gauss = Gauss::new(&damped, 8, 1.0).unwrap();
     let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), [1.0].into()).unwrap();
     let halt = stepper.advance(1);
@@ -330,7 +315,7 @@ fn newton_takes_over() {
     assert!(refused, "{halt:?}");
 }
 
-/// Bad input: a number of stages that there is not, and a step whose conformal factor is not positive.
+/// Invalid input: a number of stages that does not exist, and a step whose conformal factor is not positive.
 #[test]
 fn bad_input_is_refused() {
     let system = OneCoordinate::from(Pendulum::default());
@@ -343,15 +328,15 @@ fn bad_input_is_refused() {
     for gamma in [-30.0, 30.0] {
         let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma }), 1, 0.1);
         let error = gauss.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).err());
-        // A stage's factor, 1 / (1 + gamma h/2), is negative with the damping, the end's with the growth.
+        // With damping the factor of the stage, 1 / (1 + gamma h/2), is negative, with growth that of the end.
         let refused = match error {
             Ok(Some(InputError::FirstStep(StepError::StageFactor { rho }))) => gamma < 0.0 && rho < 0.0,
             Ok(Some(InputError::Sigma { sigma })) => gamma > 0.0 && sigma < 0.0,
             _ => false,
         };
         assert!(refused, "{error:?}");
-        // The general route finds it in the step.
-        let general = Gauss::new(Claims(OneCoordinate::from(Pendulum { gamma }), Structure::default()), 1, 0.1);
+        // The general route finds it during the step.
+        let general = Gauss::new(WithStructure(OneCoordinate::from(Pendulum { gamma }), Structure::default()), 1, 0.1);
         let halt = general.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).map(|mut s| s.advance(1)));
         let same = match halt {
             Ok(Ok(Err(StepFailure { taken: 0, cause: StepError::StageFactor { rho } }))) => gamma < 0.0 && rho < 0.0,
@@ -364,10 +349,11 @@ fn bad_input_is_refused() {
     }
 }
 
-/// What leaves the finite numbers is refused, with the last finite state kept, in one coordinate of two as in all.
+/// A step to a state that is not finite is refused, with the last finite state kept, whether one coordinate is affected
+/// or all.
 #[test]
 fn what_is_not_finite_is_refused() {
-    /// A well that ends at q0 = 2 in one coordinate; the other knows nothing of it.
+    /// A well that ends at q0 = 2 in one coordinate, uncoupled from the other.
     struct Ends;
     impl Lagrangian<2> for Ends {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
@@ -385,7 +371,7 @@ fn what_is_not_finite_is_refused() {
         }
     }
     for claims in [Ends.structure(), Structure::default()] {
-        let gauss = Gauss::new(Claims(Ends, claims), 4, 0.02);
+        let gauss = Gauss::new(WithStructure(Ends, claims), 4, 0.02);
         let start = PhasePoint::new([0.0, 1.0], [2.5, 0.0], 0.0);
         let stepper = gauss.as_ref().map(|g| g.stepper(0.0, start, [2.5, 0.0].into()));
         let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
@@ -397,7 +383,7 @@ fn what_is_not_finite_is_refused() {
     let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
     let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
     let halt = stepper.advance(10_000);
-    // The action grows as e^t, and is infinite from e^709 on.
+    // The action grows as e^t, and overflows from e^709 on.
     assert!(matches!(halt, Err(StepFailure { taken: 1380..1440, cause: StepError::NonFinite })), "{halt:?}");
     assert!(ChartVector::from(stepper.state()).is_finite());
 }

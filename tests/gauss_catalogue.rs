@@ -1,16 +1,20 @@
 //! Contact Gauss collocation on every system of the catalogue: its fast steps are those of Newton's method, its flow is
 //! conformally contact, and its curves meet the states.
 
-use crate::common::{TOLERANCE, around, bounded, on_some, step_from, visit_kinds};
-use crate::gauss::distance;
+use crate::common::{TOLERANCE, around, bounded, on_some, relative_distance, step_from, visit_kinds};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
-    ChartVector, Derivatives, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, Statement, VelocityPoint, legendre,
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Statement, VelocityPoint, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
 };
-use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, derived_jet, statements};
+use discrete_herglotz::{
+    DiscreteLagrangian, Stepper,
+    gauss::Gauss,
+    theory::{derived_jet, statements},
+};
 
-/// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, round-off times
-/// the growth of it in five steps of these motions.
+/// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, which
+/// is round-off times its growth in five steps of these motions.
 #[test]
 fn the_stepper_takes_the_steps_of_newton() {
     struct Visitor;
@@ -41,7 +45,8 @@ fn the_stepper_takes_the_steps_of_newton() {
             let step = gauss.forward(at, &state, &guess, &mut Default::default()).map_err(|e| e.to_string())?;
             (state, guess) = (step.end, step.velocity);
             stepper.advance(1).map_err(|halt| format!("{halt:?}"))?;
-            let (off, of_sigma) = (distance(stepper.state(), state), (stepper.sigma() / step.sigma - 1.0).abs());
+            let (off, of_sigma) =
+                (relative_distance(stepper.state(), state), (stepper.sigma() / step.sigma - 1.0).abs());
             if !(off <= 1e-12 && of_sigma <= 1e-13) {
                 return Err(format!("step {k}, h = {h}: off by {off:e}, sigma by {of_sigma:e}"));
             }
@@ -51,8 +56,8 @@ fn the_stepper_takes_the_steps_of_newton() {
     visit_catalogue(&mut Visitor);
 }
 
-/// Statement 24, `Phi* eta = sigma_d eta`, on every system: the differential of the action, through the stages, is
-/// `p1 dq1 - sigma_d p0 dq0 + (sigma_d - 1) dz0`, with what the step itself says of `p0`, `p1` and `sigma_d`; to 1e-12.
+/// Statement 24, `Phi* eta = sigma_d eta`, on every system: the differential of the action, through the stages, is `p1
+/// dq1 - sigma_d p0 dq0 + (sigma_d - 1) dz0`, with the `p0`, `p1` and `sigma_d` of the step; to 1e-12.
 #[test]
 fn the_flow_is_conformal_on_every_system() {
     struct Visitor;
@@ -86,8 +91,8 @@ fn the_flow_is_conformal_on_every_system() {
     visit_catalogue(&mut Visitor);
 }
 
-/// Statement 21, that first and second derivatives are those of the value, 23 on Q x Q x R and 24, with two and three stages, on one
-/// system of each kind.
+/// Statement 21, for which the first and second derivatives are compared with those of the value, statement 23 on Q x Q
+/// x R and statement 24, with two and three stages, on one system of each kind.
 #[test]
 fn the_forms_are_conformal() {
     struct Visitor;
@@ -117,8 +122,8 @@ fn the_forms_are_conformal() {
     visit_kinds(&mut Visitor);
 }
 
-/// The curve of each step meets the states at its ends, on every system: to 100 eps, the sums of sixteen terms. Its velocity
-/// belongs to its momentum at the stages; in the middle, which is one for odd s, to round-off.
+/// The curve of each step meets the states at its ends, on every system: to 100 eps, the rounding of sums of sixteen
+/// terms. Its velocity belongs to its momentum at the stages; in the middle, which is a stage for odd s, to round-off.
 #[test]
 fn curves_meet_the_states() {
     struct Visitor;

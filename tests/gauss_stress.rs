@@ -1,24 +1,15 @@
-//! Steps of contact Gauss collocation where they are hard to take: stiff forces, ill-conditioned W, steps that do not resolve
-//! what they cross; each is right, or refused, or marked.
+//! Difficult steps of contact Gauss collocation: stiff forces, ill-conditioned W, steps that do not resolve the motion;
+//! each is accurate, refused, or flagged as unresolved.
 
 #![allow(clippy::unwrap_used)]
 
+use crate::common::lagrangians::WithStructure;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
-use contact_geom::{GeometryError, Lagrangian, MaxAbsOrNan, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{Gauss, InputError, StepError, Stepper};
-
-/// A Lagrangian with other claims.
-struct Claims<L>(L, Structure);
-
-impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Claims<L> {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        self.0.value(t, q, v, z)
-    }
-    fn structure(&self) -> Structure {
-        self.1
-    }
-}
+use contact_geom::{
+    GeometryError, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan,
+};
+use discrete_herglotz::{InputError, StepError, Stepper, gauss::Gauss};
 
 /// Four particles in a line, every second bond stiff and all of them nonlinear.
 #[derive(Clone, Copy)]
@@ -40,21 +31,22 @@ impl Lagrangian<4> for StiffChain {
     }
 }
 
-/// A stiff chain by its two routes: solved by corrected sweeps and not by Newton's method on all equations, which 20 sweeps a step
-/// tell, and the same to the round-off of the stiff forces, `k eps` times the steps.
+/// A stiff chain by its two routes: solved by accelerated fixed-point iterations and not by Newton's method for all
+/// equations, as 20 iterations a step show, and equal up to the round-off of the stiff forces, `k eps` times the number
+/// of steps.
 #[test]
-fn stiff_chains_are_solved_by_sweeps() {
+fn stiff_chains_are_solved_by_fixed_point_iterations() {
     let start = PhasePoint::new([0.3, 0.3001, -0.2, -0.2001], [0.1, 0.1, -0.2, -0.2], 0.0);
     for (s, h) in [(2, 0.3), (8, 0.5), (16, 1.0)] {
         for k in [1e3, 1e5] {
             let chain = StiffChain { k };
             let ends = [chain.structure(), Structure::default()].map(|claims| {
-                let gauss = Gauss::new(Claims(chain, claims), s, h).unwrap();
+                let gauss = Gauss::new(WithStructure(chain, claims), s, h).unwrap();
                 let mut stepper = gauss.stepper(0.0, start, start.p).unwrap();
                 stepper.advance(50).unwrap();
-                let sweeps = stepper.evaluations() as f64 / (50 * s) as f64;
+                let iterations = stepper.evaluations() as f64 / (50 * s) as f64;
                 assert!(stepper.newton_steps() > 40, "s = {s}, k = {k}");
-                assert!((3.0..20.0).contains(&sweeps), "s = {s}, k = {k}: {sweeps} sweeps");
+                assert!((3.0..20.0).contains(&iterations), "s = {s}, k = {k}: {iterations} iterations");
                 stepper.state()
             });
             let off = (ends[0].q - ends[1].q).max_abs_or_nan();
@@ -63,7 +55,8 @@ fn stiff_chains_are_solved_by_sweeps() {
     }
 }
 
-/// Two particles of which one direction is heavy and has a force, and the other is light by a factor of up to 1e14 and free.
+/// Two particles, where one direction is heavy and has a force, and the other is lighter by a factor of up to 1e14 and
+/// free.
 struct IllConditioned(f64);
 
 impl IllConditioned {
@@ -81,8 +74,8 @@ impl Lagrangian<2> for IllConditioned {
     }
 }
 
-/// W of a condition from 1e2 to 1e14: the momentum is as accurate as ever, the velocity as its condition allows. The heavy
-/// direction is a damped oscillator, `4 Q'' = -4 Q + ..` for the half sum Q.
+/// W with a condition from 1e2 to 1e14: the momentum is accurate to round-off, the velocity to what the condition
+/// allows. The heavy direction is a damped oscillator, `4 Q'' = -4 Q + ..` for the half sum Q.
 #[test]
 fn ill_conditioned_w_is_accepted() {
     for exponent in [2, 4, 6, 8, 10, 12, 14] {
@@ -99,11 +92,12 @@ fn ill_conditioned_w_is_accepted() {
         let (q0, v0) = (1.5, 0.75);
         let q = (-a * t).exp() * (q0 * (w * t).cos() + (v0 + a * q0) / w * (w * t).sin());
         let off = (stepper.state().q.sum() - q).abs();
-        // The error of order 8, and the velocities' cancellation in their sum: each is off by condition times round-off.
+        // The error of order 8, and the cancellation of the velocities in their sum: each has an error of the condition
+        // times round-off.
         let bound = 1e-9 + 100.0 * condition * f64::EPSILON;
         assert!(off <= bound, "condition 1e{exponent}: {off:e}");
     }
-    // Singular to round-off, and exactly.
+    // Singular to round-off, and exactly singular.
     for light in [1e-17, 0.0] {
         let gauss = Gauss::new(IllConditioned(light), 4, 0.1).unwrap();
         let refused = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [1.0, 1.0], 0.0), [0.0; 2].into()).err();
@@ -111,7 +105,7 @@ fn ill_conditioned_w_is_accepted() {
     }
 }
 
-/// Masses of 1 and 1e-14 side by side are no ill-conditioned W.
+/// Masses of 1 and 1e-14 side by side do not make W ill-conditioned.
 #[test]
 fn light_particles_are_no_singularity() {
     struct Masses;
@@ -147,7 +141,8 @@ fn times_that_are_not_finite_are_refused() {
     }
 }
 
-/// Damping that the step does not resolve: refused by the route of a constant rate and by the general one for the same reason.
+/// Damping that the step does not resolve is refused by the route of a constant rate and by the general one for the
+/// same reason.
 #[test]
 fn strong_damping_is_refused_by_all_routes() {
     for (s, gamma) in [(1, -30.0), (2, -1000.0), (3, -1000.0)] {
@@ -157,7 +152,7 @@ fn strong_damping_is_refused_by_all_routes() {
         let claimed = Gauss::new(system, s, 0.1).unwrap();
         let refused = claimed.stepper(0.0, start, x.v).err().unwrap();
         assert!(refused.to_string().contains("integrating factor of a stage"), "{refused}");
-        let gauss = Gauss::new(Claims(system, Structure::default()), s, 0.1).unwrap();
+        let gauss = Gauss::new(WithStructure(system, Structure::default()), s, 0.1).unwrap();
         let mut general = gauss.stepper(0.0, start, x.v).unwrap();
         let halt = general.advance(1).unwrap_err();
         assert!(matches!(halt.cause, StepError::StageFactor { rho } if rho < 0.0), "s = {s}: {halt:?}");
@@ -175,10 +170,10 @@ fn strong_damping_is_refused_by_all_routes() {
     }
 }
 
-/// The mark of what is not resolved, and none on motions that are.
+/// Unresolved steps are flagged, and resolved ones are not.
 #[test]
-fn what_is_not_resolved_is_marked() {
-    let marked = |h: f64, s: usize| {
+fn unresolved_steps_are_flagged() {
+    let flagged = |h: f64, s: usize| {
         let system = Kepler::<2>::default();
         // A fall from rest that misses the centre by a hundredth.
         let x = VelocityPoint::new([1.0, 0.0], [0.0, 0.1], 0.0);
@@ -188,12 +183,12 @@ fn what_is_not_resolved_is_marked() {
         (outcome.is_err(), stepper.unresolved())
     };
     for s in [4, 8, 16] {
-        let (refused, unresolved) = marked(0.25, s);
+        let (refused, unresolved) = flagged(0.25, s);
         assert!(refused || unresolved.is_some(), "s = {s}");
-        let (refused, unresolved) = marked(1e-4, s);
+        let (refused, unresolved) = flagged(1e-4, s);
         assert!(!refused && unresolved.is_none(), "s = {s}: {unresolved:?}");
     }
-    let unmarked = |mut stepper: Box<dyn Stepper<1> + '_>, steps: usize| {
+    let unflagged = |mut stepper: Box<dyn Stepper<1> + '_>, steps: usize| {
         stepper.advance(steps).unwrap();
         assert_eq!(stepper.unresolved(), None);
     };
@@ -201,9 +196,9 @@ fn what_is_not_resolved_is_marked() {
         for h in [0.1, 0.5] {
             let x = VelocityPoint::new([1.0], [1.0], 0.0);
             let pendulum = Gauss::new(OneCoordinate::from(Pendulum::default()), s, h).unwrap();
-            unmarked(Box::new(pendulum.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), x.v).unwrap()), 1000);
+            unflagged(Box::new(pendulum.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), x.v).unwrap()), 1000);
             let square = Gauss::new(OneCoordinate::from(QuadraticInZ { c: 0.1 }), s, h).unwrap();
-            unmarked(Box::new(square.stepper(0.0, PhasePoint::new([1.0], [0.0], 1.0), [0.0].into()).unwrap()), 1000);
+            unflagged(Box::new(square.stepper(0.0, PhasePoint::new([1.0], [0.0], 1.0), [0.0].into()).unwrap()), 1000);
         }
     }
 }

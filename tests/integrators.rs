@@ -1,12 +1,12 @@
-//! The integrators: steppers, runs, dense output and events, over the catalogue of systems.
+//! Integrators: steppers, runs, dense output and events, over the catalogue of systems.
 
 #![allow(missing_docs)]
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
-// What a test cannot go on without is a failure of it.
+// In a test a missing value is a failure.
 #![allow(clippy::panic, clippy::unwrap_used, clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord)]
 
-// The theorems use the rest of it.
+// Other targets use the rest of it.
 #[allow(dead_code, unused_imports)]
 mod common;
 

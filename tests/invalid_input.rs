@@ -1,84 +1,90 @@
-//! Input that no one means: not numbers, infinite, subnormal, huge, empty, wrong; at every public entry, and by every variant
-//! of every error.
+//! Invalid input: not numbers, infinite, subnormal, huge, empty, wrong; at every public entry point, and by every
+//! variant of every error.
 
 #![allow(missing_docs)]
-// What a test cannot go on without is a failure of it.
+// In a test a missing value is a failure.
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)]
-// `!(x <= bound)` is true of a NaN, which is what is asked.
+// `!(x <= bound)` holds for a NaN, as the checks intend.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
-#[path = "hostile/discrete.rs"]
+// Other targets use the rest of it.
+#[allow(dead_code)]
+mod common;
+
+#[path = "invalid_input/discrete.rs"]
 mod discrete;
-#[path = "hostile/entries.rs"]
+#[path = "invalid_input/entries.rs"]
 mod entries;
-#[path = "hostile/geometry.rs"]
+#[path = "invalid_input/geometry.rs"]
 mod geometry;
-#[path = "hostile/known_issues.rs"]
+#[path = "invalid_input/known_issues.rs"]
 mod known_issues;
-#[path = "hostile/numbers.rs"]
+#[path = "invalid_input/numbers.rs"]
 mod numbers;
-#[path = "hostile/sentences.rs"]
+#[path = "invalid_input/refusals.rs"]
+mod refusals;
+#[path = "invalid_input/sentences.rs"]
 mod sentences;
 
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// An attack, and the entries that it is one on.
-pub struct Attack {
-    pub on: &'static [&'static str],
+/// Checks of invalid input, and the entry points that they call.
+pub struct InputTest {
+    pub entries: &'static [&'static str],
     pub run: fn(&mut numbers::Report),
 }
 
-/// Entries that are left alone, with the reason. A name may end in `*`.
+/// Entry points that need no checks, with the reason. A name may end in `*`.
 type Exceptions = &'static [(&'static str, &'static str)];
 
-/// That attacks and exceptions are all entries of a crate, and no others.
-fn complete(name: &str, attacks: &[&[Attack]], exceptions: Exceptions) {
+/// Asserts that checks and exceptions together are exactly the entry points of a crate.
+fn complete(name: &str, tests: &[&[InputTest]], exceptions: Exceptions) {
     let entries = entries::of_crate(name);
     assert!(entries.len() > 50, "only {} entries of {name} found: {entries:?}", entries.len());
-    let attacked: BTreeSet<&str> = attacks.iter().copied().flatten().flat_map(|a| a.on).copied().collect();
+    let tested: BTreeSet<&str> = tests.iter().copied().flatten().flat_map(|t| t.entries).copied().collect();
     let excepted = |entry: &str| {
         exceptions
             .iter()
             .any(|(name, _)| name.strip_suffix('*').map_or(*name == entry, |start| entry.starts_with(start)))
     };
-    let missing: Vec<_> = entries.iter().filter(|e| !attacked.contains(e.as_str()) && !excepted(e)).collect();
-    assert!(missing.is_empty(), "public entries of {name} that no attack is on: {missing:#?}");
-    let gone: Vec<_> = attacked.iter().filter(|e| !entries.contains(**e)).collect();
-    assert!(gone.is_empty(), "attacks on what {name} does not have: {gone:#?}");
+    let missing: Vec<_> = entries.iter().filter(|e| !tested.contains(e.as_str()) && !excepted(e)).collect();
+    assert!(missing.is_empty(), "public entry points of {name} without a test: {missing:#?}");
+    let gone: Vec<_> = tested.iter().filter(|e| !entries.contains(**e)).collect();
+    assert!(gone.is_empty(), "tests of entry points that {name} does not have: {gone:#?}");
     for (exception, _) in exceptions {
         let used = entries.iter().any(|e| exception.strip_suffix('*').map_or(e == exception, |s| e.starts_with(s)));
-        assert!(used, "an exception for what {name} does not have: {exception}");
+        assert!(used, "an exception for an entry point that {name} does not have: {exception}");
     }
 }
 
-/// Runs all attacks; a panic is a finding as others.
-fn attack(attacks: &[&[Attack]]) {
+/// Runs all checks; a panic counts as a failed check.
+fn run(tests: &[&[InputTest]]) {
     let mut report = numbers::Report::default();
-    for attack in attacks.iter().copied().flatten() {
-        report.on = attack.on.join(", ");
-        let ran = catch_unwind(AssertUnwindSafe(|| (attack.run)(&mut report)));
+    for test in tests.iter().copied().flatten() {
+        report.entries = test.entries.join(", ");
+        let ran = catch_unwind(AssertUnwindSafe(|| (test.run)(&mut report)));
         report.check(ran.is_ok(), || "panics".into());
     }
     report.end();
 }
 
 #[test]
-fn every_entry_of_the_geometry_is_attacked() {
-    complete("contact-geom", geometry::ATTACKS, geometry::EXCEPTIONS);
+fn every_entry_point_of_contact_geom_is_tested() {
+    complete("contact-geom", geometry::TESTS, geometry::EXCEPTIONS);
 }
 
 #[test]
-fn every_entry_of_the_discretisations_is_attacked() {
-    complete("discrete-herglotz", discrete::ATTACKS, discrete::EXCEPTIONS);
+fn every_entry_point_of_discrete_herglotz_is_tested() {
+    complete("discrete-herglotz", discrete::TESTS, discrete::EXCEPTIONS);
 }
 
 #[test]
-fn the_geometry_loses_no_nan() {
-    attack(geometry::ATTACKS);
+fn contact_geom_loses_no_nan() {
+    run(geometry::TESTS);
 }
 
 #[test]
-fn the_discretisations_refuse_or_answer() {
-    attack(discrete::ATTACKS);
+fn discrete_herglotz_refuses_or_answers() {
+    run(discrete::TESTS);
 }

@@ -1,15 +1,21 @@
-//! Motions as their user sees them: rows, events and progress, steps that are too long, many coordinates, round-off.
+//! Motions from the user's point of view: rows, events and progress, steps that are too long, many coordinates,
+//! round-off.
 
 #![allow(missing_docs)]
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
-// What a test cannot go on without is a failure of it.
+// In a test a missing value is a failure.
 #![allow(clippy::panic, clippy::unwrap_used)]
+
+// Other targets use the rest of it.
+#[allow(dead_code)]
+mod common;
 
 mod motions {
     mod accuracy;
     mod claims;
     mod coarse;
+    mod draws;
     mod many_coordinates;
     mod observed;
     mod resolution;

@@ -1,23 +1,25 @@
-//! A step of a small system allocates nothing, with any method, however the derivatives are found; nor do those of contact Gauss
-//! collocation, nor does the exact discrete
-//! Lagrangian with its derivatives, a correction of a path, and a step of an ensemble.
+//! A step of a small system allocates no memory, with any method, with closed and with derived derivatives; nor do the
+//! steps of contact Gauss collocation, the exact discrete Lagrangian with its derivatives, a correction of a path, and
+//! a step of an ensemble.
 
-// What a test cannot go on without is a failure of it.
+// In a test a missing value is a failure.
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
 use discrete_herglotz::{
-    BoundaryPath, DiscreteLagrangian, End, Ensemble, Flow, Gauss, GaussCollocation, GaussRoute, LeftMidpoint, Method,
-    SplittingScheme, Stepper, Steps, Until,
+    DiscreteLagrangian, Ensemble, GaussCollocation, SplittingScheme, Stepper, Steps, Until,
+    boundary::{BoundaryPath, End},
+    gauss::{Gauss, GaussRoute},
+    rules::{Flow, LeftMidpoint, Method},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 
 thread_local! {
-    /// The allocations of this thread: the test runner's own threads do not count.
+    /// The allocations of this thread, without those of the test runner's threads.
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
@@ -49,7 +51,7 @@ fn an_allocation_is_seen() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))) >= 1);
 }
 
-/// A thousand steps, without one.
+/// A thousand steps without an allocation.
 #[test]
 fn steps() {
     fn run<const N: usize, S: System<N>>(system: &S) {
@@ -70,10 +72,10 @@ fn steps() {
     run(&Kepler::<3>::default());
 }
 
-/// Steps so long that Newton's method takes over: its workspace is made in the first one.
+/// Steps so long that Newton's method is used: its workspace is allocated in the first one.
 #[test]
 fn collocation_by_newton() {
-    /// A pendulum that claims nothing.
+    /// A pendulum that declares no structure.
     struct Unclaimed;
     impl Lagrangian<1> for Unclaimed {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -94,8 +96,7 @@ fn collocation_by_newton() {
     run(&Unclaimed, GaussRoute::General);
 }
 
-/// The steps of contact Gauss collocation by each of its routes, with the extrapolated starts and the new slopes of a thousand
-/// steps.
+/// A thousand steps of contact Gauss collocation by each of its routes, with extrapolated starts and updated slopes.
 #[test]
 fn collocation() {
     fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: GaussRoute) {
@@ -126,7 +127,7 @@ fn exact() {
         let mut solver = Default::default();
         let mut all = (None, None, None, None);
         let mut count = 0;
-        // The first round makes the tables of coefficients.
+        // The first round computes the tables of coefficients.
         for _ in 0..2 {
             count = allocations(|| {
                 let state = legendre(system, 0.0, &x);
@@ -148,7 +149,7 @@ fn exact() {
     run(&HarmonicOscillator::default(), 3.0, RetractionRoute::Newton);
 }
 
-/// A search that makes several corrections allocates what one does that starts at its solution: its workspace.
+/// A search with several corrections allocates as much as one that starts at its solution: its workspace.
 #[test]
 fn corrections_of_paths() {
     let ld = LeftMidpoint::new(Pendulum { gamma: -0.1 }, 0.02).unwrap();
@@ -168,7 +169,7 @@ fn corrections_of_paths() {
     assert_eq!(many, few);
 }
 
-/// In lanes an ensemble of many steps allocates what one of few steps does, by splittings and by collocation.
+/// In lanes an ensemble allocates as much for many steps as for few, by splittings and by collocation.
 #[test]
 fn steps_of_ensembles() {
     let pendulum = Pendulum { gamma: -0.01 };
@@ -185,7 +186,7 @@ fn steps_of_ensembles() {
         let splitting = || Ensemble::new(&pendulum, 0.0, 100, start).by(SplittingScheme::BLANES_MOAN_4);
         assert_eq!(of(splitting(), steps), of(splitting(), 100));
         let collocation = || Ensemble::new(&pendulum, 0.0, 100, start).by(GaussCollocation { stages: 4 });
-        // Runs of one step share its table, which the first makes.
+        // Runs with one step size share its table, which the first one computes.
         of(collocation(), 10);
         assert_eq!(of(collocation(), steps), of(collocation(), 100));
     }

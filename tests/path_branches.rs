@@ -1,14 +1,27 @@
-//! Several critical paths between the same ends: folds of branches, deflation beside a fold, where no path is; and paths too long for
-//! the memory.
+//! Several critical paths between the same ends: folds of branches, deflation next to a fold and where no path exists;
+//! and paths that do not fit in memory.
 
-// What a test cannot go on without is a failure of it.
-#![allow(clippy::unwrap_used)]
+// In a test a missing value is a failure.
+#![allow(missing_docs, clippy::unwrap_used)]
 
+// Other targets use the rest of it.
+#[allow(dead_code)]
+mod common;
+
+use common::lagrangians::Bratu;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, PhasePoint, Scalar};
-use discrete_herglotz::{BoundaryPath, CriticalPath, DiscreteLagrangian, DiscretePath, End, InputError};
-use discrete_herglotz::{Midpoint, PathStatus, Solver, branch};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError,
+    boundary::{BoundaryPath, CriticalPath, End},
+    theory::DiscretePath,
+};
+use discrete_herglotz::{
+    boundary::{PathStatus, branch},
+    rules::Midpoint,
+    solve::Solver,
+};
 
 const EPS: f64 = f64::EPSILON;
 
@@ -16,35 +29,13 @@ fn at<const N: usize>(q: [f64; N]) -> End<N> {
     End::Position(q.into())
 }
 
-/// Bratu's problem `q'' = -lambda e^q`, `q(0) = q(1) = 0`: two solutions below `lambda = 3.513830719`, none above.
-#[derive(Clone)]
-struct Bratu {
-    lambda: f64,
-}
-
-impl Lagrangian<1> for Bratu {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        v[0] * v[0] * 0.5 - q[0].exp() * self.lambda
-    }
-}
-
 const STEPS: usize = 400;
 
 fn bratu(lambda: f64) -> Result<BoundaryPath<Midpoint<Bratu>, 1>, InputError> {
-    BoundaryPath::new(Midpoint::new(Bratu { lambda }, 1.0 / STEPS as f64)?, STEPS, [at([0.0]), at([0.0])])
+    BoundaryPath::new(Midpoint::new(Bratu::undamped(lambda), 1.0 / STEPS as f64)?, STEPS, [at([0.0]), at([0.0])])
 }
 
-/// The top `2 ln cosh(a / 2)` of the solution whose `a` lies in a bracket, `2 a^2 = lambda cosh^2(a / 2)`; and `a`.
-fn top(lambda: f64, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
-    let off = |a: f64| 2.0 * a * a - lambda * (0.5 * a).cosh().powi(2);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if (off(middle) > 0.0) == (off(low) > 0.0) { low = middle } else { high = middle }
-    }
-    (2.0 * (0.5 * low).cosh().ln(), low)
-}
-
-/// Close to the fold, where the two solutions are closest, by deflation and around the fold.
+/// Close to the fold, where the two solutions are closest, by deflation and by continuation around the fold.
 #[test]
 fn both_paths_beside_a_fold() {
     for lambda in [1.0, 2.0, 3.0, 3.4, 3.5] {
@@ -54,25 +45,26 @@ fn both_paths_beside_a_fold() {
         for (found, index, bracket) in [(&lower, 0, [0.3, 2.399]), (&upper, 1, [2.4, 9.0])] {
             assert_eq!(found.status, PathStatus::Found, "lambda = {lambda}: {}", found.status);
             assert_eq!(problem.index(found).unwrap(), Some(index));
-            let (exact, a) = top(lambda, bracket);
-            // The rule has order 2 with constants of the fourth derivative, about a^4; near the fold, where the top moves with lambda as
-            // `1 / sqrt(3.5138 - lambda)`, that much more.
+            let (exact, a) = Bratu::maximum(lambda, bracket);
+            // The rule has order 2 with a constant that is the fourth derivative, about a^4; near the fold the maximum
+            // depends on lambda like `1 / sqrt(3.5138 - lambda)`, which magnifies the error.
             let bound = a.powi(4) / (STEPS * STEPS) as f64 * (1.0 + 1.0 / (3.5138f64 - lambda).sqrt());
             let off = (found.points[STEPS / 2][0] - exact).abs();
             assert!(off <= bound, "lambda = {lambda}: {off:e} of {bound:e}");
         }
-        // The branch from the one leads around the fold to the other.
+        // The branch from one solution leads around the fold to the other.
         let paths = branch(bratu, [lambda, 4.0], 0.2, 200).unwrap();
         let (first, last) = (&paths[0], paths.last().unwrap());
         assert!(first.0 == lambda && last.0 == lambda && paths.iter().all(|(_, path)| path.is_found()));
         let apart = |a: &CriticalPath<1>, b: &CriticalPath<1>| {
             a.points.iter().zip(&b.points).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
         };
-        // Two ends of Newton's method: positions are known to eps q/h in each equation, which the inverse of the equations makes larger by a
-        // quarter of the span for each step, and by the nearness of the fold.
+        // Two results of Newton's method: the error of a position in each equation is eps q/h, which the inverse of the
+        // equations magnifies by a quarter of the span for each step, and by the nearness of the fold.
         let bound = 4.0 * EPS * 8.0 * (STEPS * STEPS) as f64 / (3.5138f64 - lambda).sqrt();
         assert!(apart(&first.1, &lower) <= bound && apart(&last.1, &upper) <= bound, "{:e}", apart(&last.1, &upper));
-        // Along it lambda rises to the fold of the rule, h^2 beside that of the problem, and falls.
+        // Along the branch lambda rises to the fold of the rule, at a distance of h^2 from that of the problem, and
+        // falls.
         let highest = paths.iter().map(|(lambda, _)| *lambda).fold(0.0, f64::max);
         assert!(highest > lambda && highest < 3.513830719 + 10.0 / (STEPS * STEPS) as f64, "{highest}");
         let turns = paths.windows(3).filter(|w| (w[1].0 - w[0].0) * (w[2].0 - w[1].0) < 0.0).count();
@@ -90,8 +82,8 @@ fn mixed(span: f64) -> Result<BoundaryPath<Midpoint<QuadraticInZ>, 1>, InputErro
     BoundaryPath::new(ld, MIXED, [End::Momentum([P0].into()), at([1.0])])?.starting_at(0.0, Z0)
 }
 
-/// By how much the flow from `(q0, P0, Z0)` misses the position at the end: nothing of a boundary-value problem in it. `None` where
-/// the motion is not defined so long.
+/// The distance of the flow from `(q0, P0, Z0)` from the position at the end, without a boundary-value problem. `None`
+/// where the motion is not defined up to the end.
 fn missed(span: f64, q0: f64) -> Option<f64> {
     let h = span / MIXED as f64;
     let ld = Midpoint::new(QuadraticInZ { c: 0.7 }, h).ok()?;
@@ -112,14 +104,16 @@ fn shots(span: f64, low: f64, high: f64) -> Vec<f64> {
     misses.windows(2).filter(meets).map(|w| w[0].0).collect()
 }
 
-/// With the momentum given at the start, paths end in a fold at a span between 1.1 and 1.2: above it shooting finds none from starts
-/// up to 6 in size either, and the search ends with a status. Below it there are two, and the branch in the step size leads from one to the other.
+/// With the momentum given at the start, paths end in a fold at a span between 1.1 and 1.2: above it shooting finds
+/// none from starts of size up to 6, and the search ends with a status. Below it there are two, and the branch in the
+/// step size leads from one to the other.
 #[test]
 fn mixed_ends_have_a_fold() {
     for span in [1.2, 1.3] {
         assert_eq!(shots(span, -4.0, 6.0), []);
         let none = mixed(span).unwrap().search();
-        // It stalls with what is left of the equations; leaps may lead it to a path far away, which shooting in this range does not see.
+        // The search stalls with a residual; large corrections may lead it to a distant path, outside of the range of
+        // the shooting.
         if none.is_found() {
             assert!(!(-4.0..6.0).contains(&none.points[0][0]), "{}", none.points[0]);
         } else {
@@ -140,15 +134,16 @@ fn mixed_ends_have_a_fold() {
         for ((_, path), start) in [first, last].into_iter().zip(&starts) {
             let q0 = path.points[0][0];
             assert!(q0 >= *start && q0 <= start + 1e-3, "{q0} beside {start}");
-            // The flow from there meets the end: an error of q0, about eps q / h for each equation, grows by about `e^span` on this path.
+            // The flow from there meets the end: an error of q0, about eps q / h for each equation, grows by about
+            // `e^span` on this path.
             let off = missed(span, q0).unwrap();
             assert!(off.abs() <= 64.0 * EPS * q0 * (MIXED * MIXED) as f64 / span, "{off:e}");
         }
         let highest = paths.iter().map(|(span, _)| *span).fold(0.0, f64::max);
-        // Where shooting finds two starts and where it finds none.
+        // The fold is between the spans for which shooting finds two starts and none.
         assert!((1.1..1.2).contains(&highest), "{highest}");
     }
-    // From a short span the branch goes around this fold, back, and around another one to the path far away.
+    // From a short span the branch goes around this fold, back, and around another one to the distant path.
     let paths = branch(mixed, [0.6, 1.5], 0.05, 200).unwrap();
     let last = paths.last().unwrap();
     let far = shots(1.5, 8.0, 8.5);
@@ -157,8 +152,8 @@ fn mixed_ends_have_a_fold() {
     assert_eq!(turns, 2);
 }
 
-/// The corrections are Newton's, whatever depends on the action: of a disturbance of 1e-3 they leave 1e-6, 1e-12, nothing, and one more
-/// sees that.
+/// The corrections are those of Newton's method, also where forces depend on the action: of a perturbation of 1e-3 they
+/// leave 1e-6, 1e-12 and zero, and one more confirms it.
 #[test]
 fn corrections_converge_quadratically() {
     fn run<const N: usize>(system: impl Lagrangian<N>, from: [f64; N], to: [f64; N], z0: f64) {
@@ -192,19 +187,19 @@ fn a_mass_without_a_diagonal() {
     let ld = Midpoint::new(Crossed, h).unwrap();
     let found = BoundaryPath::new(&ld, steps, [at([0.3, -0.2]), at([1.0, 0.4])]).unwrap().search();
     assert_eq!(found.status, PathStatus::Found, "{}", found.status);
-    // Both coordinates are oscillators, by the rule of angle `2 atan(h/2)`: like one oscillator each.
+    // Both coordinates are oscillators, with the angle `2 atan(h/2)` of the rule: each agrees with a single oscillator.
     let one = Midpoint::new(HarmonicOscillator { gamma: 0.0 }, h).unwrap();
     for i in 0..2 {
         let ends = [at([[0.3, -0.2][i]]), at([[1.0, 0.4][i]])];
         let alone = BoundaryPath::new(&one, steps, ends).unwrap().search();
         for (a, b) in alone.points.iter().zip(&found.points) {
-            // eps q/h in each equation, through an inverse of about a quarter of the span for each step.
+            // An error of eps q/h in each equation, through an inverse of about a quarter of the span for each step.
             assert!((a[0] - b[i]).abs() <= 4.0 * EPS * (steps * steps) as f64 / 4.0, "{:e}", a[0] - b[i]);
         }
     }
 }
 
-/// What cannot be kept is refused before it is tried, and parameters of branches are looked at.
+/// A path that does not fit in memory is refused before it is computed, and the parameters of branches are checked.
 #[test]
 fn bad_input_is_refused() {
     let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
@@ -226,7 +221,7 @@ fn bad_input_is_refused() {
     // The number of steps may not change along a branch.
     let changing = |n: f64| BoundaryPath::new(&ld, n as usize, ends);
     assert!(matches!(branch(changing, [10.0, 20.0], 1.0, 10), Err(InputError::PathLength { expected: 10, .. })));
-    // Where there is no first path it is alone, with its status.
+    // Where the first path does not exist, the branch consists of it alone, with its status.
     let paths = branch(bratu, [4.0, 3.0], 0.1, 10).unwrap();
     assert!(paths.len() == 1 && !paths[0].1.is_found());
 }

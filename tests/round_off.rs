@@ -3,12 +3,13 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{Gauss, Stepper};
+use discrete_herglotz::{Stepper, gauss::Gauss};
 
-/// A Lagrangian under other claims.
-struct Claims<L>(L, Structure);
+/// A Lagrangian with another structure than it declares itself, and with its closed gradient, whose rounding is part of
+/// the test.
+struct WithStructure<L>(L, Structure);
 
-impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for Claims<L> {
+impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for WithStructure<L> {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         self.0.value(t, q, v, z)
@@ -22,16 +23,17 @@ impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for Claims<L> {
     }
 }
 
-/// The starts, which differ in their last digits, and the steps of each.
+/// The number of starts, which differ in their last digits, and of steps from each.
 const STARTS: usize = 16;
 const STEPS: usize = 8192;
 
-/// The bound on a bias, in units of its uncertainty: of a normal distribution, one value in 3e6 is beyond 5; Student's t with 15
-/// degrees of freedom has one in 6000 beyond. With eight cases one false alarm in 800 changes of the rounding.
+/// The bound on a bias, in units of its standard error: of a normal distribution, one value in 3e6 is beyond 5; of
+/// Student's t with 15 degrees of freedom, one in 6000. With eight cases there is one false alarm in 800 changes of the
+/// rounding.
 const SIGMAS: f64 = 5.0;
 
-/// The energy's error after [`STEPS`] steps has no bias over the starts, and is the size of a random walk: below `eps` times
-/// the root of the steps. The quantity is measured in units of its start, of size 1.
+/// The error of the energy after [`STEPS`] steps has no bias over the starts, and the size of a random walk: less than
+/// `eps` times the square root of the number of steps. The energy is in units of its initial value, of size 1.
 fn check<const N: usize>(
     name: &str,
     start: VelocityPoint<N>,
@@ -63,8 +65,8 @@ fn runner<const N: usize>(mut stepper: impl Stepper<N> + 'static) -> Box<dyn FnM
     })
 }
 
-/// Steps so short that the method's own error is below round-off: with coefficients rounded to doubles, or an iteration that
-/// ends at the first change below round-off, the energy drifts by 1e-18 to 5e-17 a step.
+/// Steps so short that the error of the method is below round-off. With coefficients rounded to doubles, or an
+/// iteration that ends at the first change below round-off, the energy would drift by 1e-18 to 5e-17 a step.
 #[test]
 fn the_energy_does_not_drift() {
     let constant = Structure { autonomous: true, z_affine: true, constant_mass: true, ..Structure::default() };
@@ -72,7 +74,7 @@ fn the_energy_does_not_drift() {
         let pendulum = OneCoordinate::from(Pendulum { gamma });
         let energy = move |x: &PhasePoint<1>| 0.5 * x.p[0] * x.p[0] + 2.0 * (0.5 * x.q[0]).sin().powi(2);
         for (structure, s, h) in [(pendulum.structure(), 12, 1.2), (constant, 12, 1.2)] {
-            let lagrangian = Claims(pendulum, structure);
+            let lagrangian = WithStructure(pendulum, structure);
             let gauss: &'static _ = Box::leak(Box::new(Gauss::new(lagrangian, s, h).unwrap()));
             let start = VelocityPoint::new([1.0], [1.0], 0.0);
             let make = |x: VelocityPoint<1>| gauss.stepper(0.0, legendre(&pendulum, 0.0, &x), x.v).unwrap();
@@ -92,10 +94,10 @@ fn the_energy_does_not_drift() {
             let gauss: &'static _ = Box::leak(Box::new(Gauss::new(kepler, 16, 0.3).unwrap()));
             let make = |x: VelocityPoint<2>| gauss.stepper(0.0, legendre(&kepler, 0.0, &x), x.v).unwrap();
             check("kepler", start, |x| runner(make(x)), energy);
-            let clocked = |x: VelocityPoint<2>| {
+            let transformed = |x: VelocityPoint<2>| {
                 gauss.transformed_stepper(kepler.time_transformation(), 0.0, legendre(&kepler, 0.0, &x), x.v).unwrap()
             };
-            check("kepler with a time transformation", start, |x| runner(clocked(x)), energy);
+            check("kepler with a time transformation", start, |x| runner(transformed(x)), energy);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Runs: plans that say what they do, outcomes that do not depend on the route, bad input, and the way back.
+//! Runs: plans that describe the work, outcomes that do not depend on the outputs, invalid input, and runs backward.
 
 use crate::common::lagrangians::WithStructure;
 use crate::common::oracle::motion;
@@ -8,12 +8,14 @@ use contact_geom::systems::{
     TwoCoordinates,
 };
 use contact_geom::{
-    ChartVector, DiscretePoint, Lagrangian, MaxAbsOrNan, MaxOrNan, OneParameterGroup, PhasePoint, Scalar, Structure,
-    Symmetry, VelocityPoint, legendre,
+    ChartVector, DiscretePoint, Lagrangian, OneParameterGroup, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
+    legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, Event, Events, Flow, InputError, Method, Midpoint, MomentumDecay, Outcome, Plan, Problem, Rows, Run,
-    SelectionFailure, SplittingScheme, Status, Steps, Until,
+    AnyIntegrator, Event, Events, InputError, MomentumDecay, Outcome, Plan, Problem, Rows, Run, SelectionFailure,
+    SplittingScheme, Status, Steps, Until,
+    rules::{Flow, Method, Midpoint},
 };
 use exact_lagrangian::herglotz_flow;
 use std::f64::consts::PI;
@@ -42,12 +44,12 @@ fn ten_steps<'p, 'o, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The titles of what a plan computes, and of what it skips.
-fn said<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: bool) -> Vec<&'static str> {
+fn titles<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: bool) -> Vec<&'static str> {
     plan.entries().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
 }
 
-/// Every integrator that applies to a system of each kind leads to the motion that an independent code finds: to the error that its order
-/// allows, with steps of 1/32, times a constant that the systems' fastest scales explain.
+/// Every integrator that applies to a system of each kind agrees with the motion by an independent integrator: up to
+/// the error of its order with steps of 1/32, times a constant that the fastest time scales of the systems explain.
 #[test]
 fn every_integrator() {
     struct Visitor(usize);
@@ -60,12 +62,12 @@ fn every_integrator() {
                 if integrator.check(system).is_err() {
                     continue;
                 }
-                // In Kepler's problem from this start 1/32 of the transformed time is less than that of time.
+                // In Kepler's problem from this start 1/32 of the transformed time is less than 1/32 of the time.
                 let in_transformed_time = matches!(integrator, AnyIntegrator::TransformedGauss { .. });
                 let steps = if in_transformed_time { Steps::Size(0.5 / 16.0) } else { Steps::Count(16) };
                 let outcome = problem.by(integrator).steps(steps).run(Until::Time(t0 + 0.5));
                 let Ok(Outcome { status: Status::Completed, q, p, z: Some(z), .. }) = outcome else {
-                    // A constant rate is claimed by none, and verified when the plan is made.
+                    // No system declares a constant rate; it is verified when the plan is made.
                     let refused = matches!(outcome, Err(InputError::Hypothesis { .. }));
                     assert!(refused, "{} by {integrator}: {outcome:?}", system.name());
                     continue;
@@ -82,20 +84,21 @@ fn every_integrator() {
             }
         }
     }
-    // Each system is compiled with every method: one of each kind of structure.
+    // One system of each kind of structure, since each is compiled with every method.
     let mut visitor = Visitor(0);
     visitor.visit(&OneCoordinate::from(HarmonicOscillator::default()));
     visitor.visit(&OneCoordinate::from(Duffing::forced()));
     visitor.visit(&OneCoordinate::from(QuadraticInZ::default()));
     visitor.visit(&Kepler::<2>::default());
     visitor.visit(&TwoCoordinates::from(DoublePendulum::default()));
-    // The rules, the Gauss methods and the compositions apply to all.
+    // The rules, the Gauss methods and the compositions apply to all systems.
     assert!(visitor.0 >= 5 * 25, "{}", visitor.0);
 }
 
-/// The same numbers to the last bit, whatever else is asked for: with rows, the action and the factor, or without.
+/// The numbers are the same to the last bit, whatever else is requested: with rows, the action and the factor, or
+/// without.
 #[test]
-fn what_is_left_out_changes_nothing() {
+fn outputs_do_not_change_the_motion() {
     let (pendulum, square, kepler) = (
         OneCoordinate::from(Pendulum { gamma: -0.1 }),
         OneCoordinate::from(QuadraticInZ { c: 0.3 }),
@@ -124,7 +127,7 @@ fn what_is_left_out_changes_nothing() {
         assert_eq!((rows.len(), rows.last().map(|row| (row.q, row.z))), (30, Some((all.q, all.z))));
         assert!(all.z.is_some() && all.log_factor.is_some());
         assert!(nothing.evaluations > 0 || by == gauss(16));
-        // Rows that do without the action do not ask for it.
+        // Rows without the action do not request it.
         let mut bare = Rows::every(7).unwrap().without_action();
         let observed = problem.by(by).steps(steps).without_action().observe(&mut bare).run(until).unwrap();
         assert_eq!(observed, nothing, "{by}");
@@ -144,7 +147,8 @@ fn what_is_left_out_changes_nothing() {
     }
 }
 
-/// The conformal factor of a whole motion is `e^(gamma t)` under linear drag, and contracts the momenta of symmetries.
+/// The conformal factor of a whole motion is `e^(gamma t)` under linear drag, and is the factor of the momenta of
+/// symmetries.
 #[test]
 fn the_conformal_factor() {
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
@@ -153,7 +157,7 @@ fn the_conformal_factor() {
     for by in [gauss(6), nystrom, AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8)] {
         let group = Symmetry::Rotation(0, 1);
         let mut rows = Rows::every(10).unwrap().column("J", |_, x| group.momentum(&x.q, &x.p));
-        // It asks for the factor.
+        // This observer requests the factor.
         let mut decay = MomentumDecay::new(Symmetry::Rotation(0, 1));
         let run = problem.by(by).steps(Steps::Size(0.05)).observe(&mut rows).observe(&mut decay);
         let outcome = run.run(Until::Time(4.0)).unwrap();
@@ -169,7 +173,7 @@ fn the_conformal_factor() {
     }
 }
 
-/// The factor of a long run is below all numbers, and its logarithm is not.
+/// The factor of a long run underflows, and its logarithm does not.
 #[test]
 fn the_factor_of_a_long_run_has_a_logarithm() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -1.0 });
@@ -182,7 +186,7 @@ fn the_factor_of_a_long_run_has_a_logarithm() {
     assert!((log_factor + 800.0).abs() <= 8000.0 * 16.0 * f64::EPSILON, "{log_factor}");
 }
 
-/// A plan says what it skips and why; what it says follows from structure and outputs.
+/// A plan describes what it computes and skips, as follows from the structure and the outputs.
 #[test]
 fn plans_in_words() {
     let (pendulum, oscillator) =
@@ -193,44 +197,44 @@ fn plans_in_words() {
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().plan(until).unwrap();
     for skipped in ["action z", "conformal factor", "mass matrix", "Jacobian", "Newton's method", "time at the stages"]
     {
-        assert!(said(&plan, false).contains(&skipped), "{skipped}: {plan}");
+        assert!(titles(&plan, false).contains(&skipped), "{skipped}: {plan}");
     }
-    assert_eq!(said(&plan, true), ["iteration", "probes of the structure"]);
+    assert_eq!(titles(&plan, true), ["iteration", "probes of the structure"]);
     let text = plan.to_string();
     assert!(text.starts_with("10 steps of 1 by gauss_8, t = 0 .. 10\ncomputed:\n  iteration: "), "{text}");
     assert!(text.contains("and is not requested\n") && text.contains("the product is not requested\n"), "{text}");
     let back = ten_steps(&of_pendulum, gauss(8)).plan(Until::Time(-10.0)).unwrap().to_string();
     assert!(back.starts_with("10 steps of -1 by gauss_8, t = 0 .. -10\n"), "{back}");
 
-    // The action is computed where it is requested, and where it drives the motion.
+    // The action is computed where it is requested, and where the motion depends on it.
     let plan = ten_steps(&of_pendulum, gauss(8)).plan(until).unwrap();
-    assert!(said(&plan, true).contains(&"action z"));
+    assert!(titles(&plan, true).contains(&"action z"));
     let plan = ten_steps(&of_square, gauss(8)).without_action().plan(until).unwrap();
-    assert!(said(&plan, true).contains(&"action z"));
-    // What an observer asks for is computed.
+    assert!(titles(&plan, true).contains(&"action z"));
+    // Quantities that an observer requests are computed.
     let mut rows = Rows::every(1).unwrap();
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().observe(&mut rows).plan(until).unwrap();
-    assert!(said(&plan, true).contains(&"action z"));
+    assert!(titles(&plan, true).contains(&"action z"));
     let mut decay = MomentumDecay::new(Symmetry::Translation([1.0].into()));
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().observe(&mut decay).plan(until).unwrap();
-    assert_eq!(said(&plan, true), ["iteration", "conformal factor", "probes of the structure"]);
-    // A linear motion needs no iteration, a mass matrix that varies is computed.
+    assert_eq!(titles(&plan, true), ["iteration", "conformal factor", "probes of the structure"]);
+    // A linear motion needs no iteration, and a mass matrix that varies is evaluated.
     let of_oscillator = from_start(&oscillator);
-    assert!(said(&ten_steps(&of_oscillator, gauss(8)).plan(until).unwrap(), false).contains(&"iteration"));
+    assert!(titles(&ten_steps(&of_oscillator, gauss(8)).plan(until).unwrap(), false).contains(&"iteration"));
     let of_double = Problem::new(&double, 0.0, double.initial()).unwrap();
-    assert!(said(&ten_steps(&of_double, gauss(8)).plan(until).unwrap(), true).contains(&"mass matrix"));
-    // Splittings are explicit, discrete flows are not.
+    assert!(titles(&ten_steps(&of_double, gauss(8)).plan(until).unwrap(), true).contains(&"mass matrix"));
+    // Splittings are explicit, and discrete flows are not.
     for (by, computed) in [
         (AnyIntegrator::Splitting(SplittingScheme::STRANG), false),
         (AnyIntegrator::Discrete(Method::Strang), false),
         (AnyIntegrator::Discrete(Method::Midpoint), true),
     ] {
         let plan = ten_steps(&of_pendulum, by).plan(until).unwrap();
-        assert!(said(&plan, computed).contains(&"Newton's method"), "{plan}");
+        assert!(titles(&plan, computed).contains(&"Newton's method"), "{plan}");
     }
 }
 
-/// The step chosen from a wanted error keeps it, without being far too fine.
+/// The step that is chosen for a requested accuracy keeps it, and is at most moderately finer than necessary.
 #[test]
 fn steps_from_an_error() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
@@ -261,7 +265,8 @@ fn steps_from_an_error() {
     assert!(reached < 1e-12, "{reached:e}");
 }
 
-/// A run to the time at which it starts has the start alone, by every kind of integrator and of steps, in every kind of rows.
+/// A run to the time of its start consists of the start alone, by every kind of integrator and of steps, in every kind
+/// of rows.
 #[test]
 fn a_run_to_its_start_is_the_start() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
@@ -288,13 +293,13 @@ fn a_run_to_its_start_is_the_start() {
             assert_eq!((every.rows[0].t, every.rows[0].q), (t0, start.q), "{k}");
         }
     }
-    // What is wrong besides is refused as ever.
+    // Other invalid input is still refused.
     let problem = from_start(&pendulum);
     assert!(problem.accuracy(-1.0).plan(Until::Time(0.0)).is_err());
     assert!(problem.steps(Steps::Size(0.0)).plan(Until::Time(0.0)).is_err());
 }
 
-/// `-cos(v) - x/10`: of a momentum sin(v) there are many velocities. From v = 4 it is that of pi/2 < v < 3 pi/2.
+/// `-cos(v) - x/10`: many velocities have the momentum sin(v). From v = 4 the motion has pi/2 < v < 3 pi/2.
 struct ManyVelocities;
 
 impl Lagrangian<1> for ManyVelocities {
@@ -303,8 +308,8 @@ impl Lagrangian<1> for ManyVelocities {
     }
 }
 
-/// Rows, energies, events and a run that goes on have the velocity of the motion, and not another one of its momentum: far from the start
-/// as well, between the steps, and by methods of each kind.
+/// Rows, energies, events and a continued run have the velocity of the motion, and not another one of the same
+/// momentum: also far from the start, between the steps, and by methods of each kind.
 #[test]
 fn the_velocity_is_that_of_the_motion() {
     // p = sin(4) - t/10 and v = pi - arcsin(p); the energy p v - L is conserved.
@@ -314,7 +319,7 @@ fn the_velocity_is_that_of_the_motion() {
     let integral = |p: f64| p * p.asin() + (1.0 - p * p).sqrt();
     let q = |t: f64| PI * t + 10.0 * (integral(p(t)) - integral(p(0.0)));
     let energy = 4.0 * 4f64.sin() + 4f64.cos();
-    // The error of order two with 400 steps, of a motion of size 60 near the end of the branch.
+    // The error of order two with 400 steps, for a motion of size 60 near the end of the branch.
     for (by, bound) in [(gauss(2), 1e-6), (gauss(8), 1e-11), (AnyIntegrator::Discrete(Method::Midpoint), 2e-3)] {
         let problem = Problem::new(&ManyVelocities, 0.0, VelocityPoint::new([0.0], [4.0], 0.0)).unwrap();
         let times: Vec<f64> = (0..=70).map(|k| -0.2377 * f64::from(k)).collect();
@@ -331,7 +336,7 @@ fn the_velocity_is_that_of_the_motion() {
         assert!((q(crossing.t) + 30.0).abs() <= bound, "{by}: {crossing:?}");
         let there = ended.v.unwrap();
         assert!((there[0] - v(-16.8)).abs() <= bound, "{by}: {there}");
-        // It goes on from its end, with its velocity.
+        // A run from the end continues with the velocity there.
         let state = PhasePoint { q: ended.q, p: ended.p, z: ended.z.unwrap() };
         let onward = Problem::new(&ManyVelocities, ended.t, discrete_herglotz::Start::Momentum(state, there)).unwrap();
         let onward = onward.by(by).steps(Steps::Count(20)).run(Until::Time(-17.0)).unwrap();
@@ -339,7 +344,7 @@ fn the_velocity_is_that_of_the_motion() {
     }
 }
 
-/// Bad input is refused before work starts, with an error that names it.
+/// Invalid input is refused before work begins, with an error that names it.
 #[test]
 fn bad_runs() {
     let (pendulum, square) = (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(QuadraticInZ::default()));
@@ -360,16 +365,16 @@ fn bad_runs() {
     for wanted in [-1.0, 0.0, f64::INFINITY] {
         assert_eq!(problem.accuracy(wanted).plan(until).err(), Some(InputError::Tolerance { wanted }));
     }
-    // A number of steps to end after: there is one at least, and their size is given.
+    // A run of a number of steps has at least one step, whose size is given.
     let until_steps = |steps: Steps, count: usize| problem.steps(steps).plan(Until::Steps(count)).err();
     assert!(matches!(until_steps(Steps::Size(0.1), 0), Some(InputError::Count { found: 0, .. })));
     assert!(matches!(until_steps(Steps::Count(10), 10), Some(InputError::Hypothesis { .. })));
     let accurate = problem.accuracy(1e-6).plan(Until::Steps(10)).err();
     assert!(matches!(accurate, Some(InputError::Hypothesis { .. })));
-    // A run has steps, and given steps an integrator.
+    // A run needs steps, and given steps need an integrator.
     assert_eq!(problem.by(gauss(4)).plan(until).err(), Some(InputError::NoSteps));
     assert_eq!(problem.accuracy(1e-6).steps(Steps::Count(4)).plan(until).err(), Some(InputError::NoIntegrator));
-    // More steps than times can be told apart, and more rows than can be kept.
+    // More steps than distinct times, and more rows than fit in memory.
     for many in [Steps::Size(1e-300), Steps::Size(1e-17), Steps::Count(usize::MAX), Steps::Count(1 << 61)] {
         assert!(matches!(steps(many), Some(InputError::TooMany { .. })), "{many:?}");
     }
@@ -379,7 +384,7 @@ fn bad_runs() {
     assert!(matches!(Rows::<1>::every(0).err(), Some(InputError::Count { found: 0, .. })));
     let nowhere = VelocityPoint::new([f64::NAN], [0.0], 0.0);
     assert!(matches!(Problem::new(&pendulum, 0.0, nowhere).err(), Some(InputError::Geometry(_))));
-    // Hypotheses are named.
+    // The error names the hypothesis.
     let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
     let unclaimed = WithStructure(pendulum, Structure::default());
     let refused = ten_steps(&from_start(&unclaimed), nystrom).plan(until).err();
@@ -390,13 +395,13 @@ fn bad_runs() {
     assert!(matches!(by(of_nystrom), Some(InputError::Hypothesis { .. })));
     let of_rectangle = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4);
     assert!(matches!(by(of_rectangle), Some(InputError::Hypothesis { .. })));
-    // A false claim is found by the probe.
+    // A false property is found when the structure is checked.
     let quadratic = WithStructure(pendulum, Structure { quadratic: true, ..pendulum.structure() });
     let refused = Problem::new(&quadratic, 0.0, start()).err();
     assert!(matches!(refused, Some(InputError::FalseClaim { claim: "quadratic", .. })));
 }
 
-/// A run to a time before its start goes back on the same motion.
+/// A run to a time before its start runs backward on the same motion.
 #[test]
 fn a_span_may_be_negative() {
     let pendulum = OneCoordinate::from(Pendulum::default());
@@ -408,7 +413,8 @@ fn a_span_may_be_negative() {
     assert!(back.v.is_some_and(|v| (v - truth.p).max_abs_or_nan() <= 1e-14), "{:?}", back.v);
 }
 
-/// A problem from two points starts as the flow of their discrete Lagrangian does, and of two that say too little there is none.
+/// A problem from two points starts as the flow of their discrete Lagrangian does; points that determine no start are
+/// refused.
 #[test]
 fn from_two_points() {
     let pendulum = OneCoordinate::from(Pendulum::default());
@@ -418,7 +424,7 @@ fn from_two_points() {
     let flow = Flow::from_points(&ld, 0.5, points).unwrap();
     assert_eq!(problem.state(), flow.state());
     assert_eq!((problem.start().q, problem.start().z), (points.q0, points.z0));
-    // Its first step by the same rule leads to the second point.
+    // Its first step by the same rule ends at the second point.
     let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let first = run.run(Until::Steps(1)).unwrap();
     assert!((first.q - points.q1).max_abs_or_nan() <= 4.0 * f64::EPSILON, "{}", first.q);
@@ -427,7 +433,7 @@ fn from_two_points() {
     assert!(matches!(refused, Some(InputError::Geometry(_))), "{refused:?}");
 }
 
-/// Names are read back; an unknown one lists those that are known.
+/// Names are parsed back; the error for an unknown name lists those that exist.
 #[test]
 fn names() {
     for integrator in AnyIntegrator::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]) {

@@ -4,10 +4,12 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
-use contact_geom::{Lagrangian, MaxOrNan, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre};
+use contact_geom::{
+    Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre, numbers::MaxOrNan,
+};
 use discrete_herglotz::{
-    AnyIntegrator, Gauss, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps,
-    TransformedStepper, Until,
+    AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, Until,
+    gauss::{Gauss, TransformedStepper},
 };
 
 type Planar = Kepler<2>;
@@ -17,14 +19,14 @@ fn pericentre(e: f64) -> VelocityPoint<2> {
     VelocityPoint::new([1.0 - e, 0.0], [0.0, ((1.0 + e) / (1.0 - e)).sqrt()], 0.0)
 }
 
-fn clocked<'a, C: TimeTransformation<2>>(
+fn transformed<'a, C: TimeTransformation<2>>(
     gauss: &'a Gauss<Planar>,
     kepler: &Planar,
-    clock: C,
+    transformation: C,
     e: f64,
 ) -> TransformedStepper<'a, Planar, C, 2> {
     let start = pericentre(e);
-    gauss.transformed_stepper(clock, 0.0, legendre(kepler, 0.0, &start), start.v).unwrap()
+    gauss.transformed_stepper(transformation, 0.0, legendre(kepler, 0.0, &start), start.v).unwrap()
 }
 
 fn distance(a: &PhasePoint<2>, b: &PhasePoint<2>) -> f64 {
@@ -39,17 +41,17 @@ fn energy(kepler: &Planar, x: &PhasePoint<2>) -> f64 {
     kepler.hamiltonian(0.0, x).unwrap()
 }
 
-/// the time transformation of a constant rate, and of any sign.
-struct Steady(f64);
+/// The time transformation of a constant rate of any sign.
+struct ConstantRate(f64);
 
-impl TimeTransformation<2> for Steady {
+impl TimeTransformation<2> for ConstantRate {
     fn rate<T: Scalar>(&self, _q: &SVector<T, 2>) -> T {
         T::from(self.0)
     }
 }
 
 #[test]
-fn a_steady_clock_is_the_physical_time() {
+fn a_constant_time_transformation_is_the_physical_time() {
     let kepler = Planar { gamma: -0.05, mu: 1.0 };
     let start = pericentre(0.5);
     let gauss = Gauss::new(kepler, 8, 0.1).unwrap();
@@ -57,7 +59,7 @@ fn a_steady_clock_is_the_physical_time() {
     plain.advance(100).unwrap();
     for rate in [1.0, 2.0] {
         let gauss = Gauss::new(kepler, 8, 0.1 / rate).unwrap();
-        let mut run = clocked(&gauss, &kepler, Steady(rate), 0.5);
+        let mut run = transformed(&gauss, &kepler, ConstantRate(rate), 0.5);
         run.advance(100).unwrap();
         assert!((run.time() - plain.time()).abs() < 1e-14);
         let off = distance(&run.state(), &plain.state());
@@ -71,13 +73,13 @@ fn order_two_s_at_a_physical_time() {
     let kepler = Planar { gamma: -0.05, mu: 1.0 };
     let at = |s: usize, h: f64, t: f64| {
         let gauss = Gauss::new(kepler, s, h).unwrap();
-        let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.5);
+        let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.5);
         run.advance_to(t).unwrap();
         assert!((run.time() - t).abs() <= 1e-15 * t, "{} for {t}", run.time());
         run.state()
     };
     let t = 7.0;
-    // From the plain method, so that a time transformation's error cannot hide in both.
+    // The reference is computed without the time transformation, so that its errors cannot cancel.
     let start = pericentre(0.5);
     let gauss = Gauss::new(kepler, 12, t / 100.0).unwrap();
     let mut reference = gauss.stepper(0.0, legendre(&kepler, 0.0, &start), start.v).unwrap();
@@ -94,13 +96,13 @@ fn order_two_s_at_a_physical_time() {
 fn momenta_contract_by_sigma() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
     let gauss = Gauss::new(kepler, 4, 0.2).unwrap();
-    let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.5);
+    let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.5);
     let (start, p_t) = (run.state(), run.time_momentum());
     let (mut contracted, mut defect) = (1.0, 0.0_f64);
     for _ in 0..1000 {
         run.advance(1).unwrap();
         contracted *= run.sigma();
-        // K / g, which is 0 for the motion.
+        // K / g, which vanishes on the motion.
         defect =
             defect.max_or_nan((energy(&kepler, &run.state()) + run.time_momentum()).abs() / run.time_momentum().abs());
     }
@@ -124,7 +126,7 @@ fn eccentric_orbits_cost_less() {
     let (reference, _) = plain(12, 8000);
     let (fixed, most) = plain(8, 800);
     let gauss = Gauss::new(kepler, 8, 0.5).unwrap();
-    let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.9);
+    let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.9);
     run.advance_to(t).unwrap();
     let (error, of_fixed) = (distance(&run.state(), &reference), distance(&fixed, &reference));
     println!("{error:e} with {}, {of_fixed:e} with {most}", run.evaluations());
@@ -139,7 +141,7 @@ fn bad_input_is_refused() {
     let state = legendre(&kepler, 0.0, &start);
     let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
     for bad in [0.0, -1.0, f64::INFINITY, f64::NAN] {
-        let refused = gauss.transformed_stepper(Steady(bad), 0.0, state, start.v).err();
+        let refused = gauss.transformed_stepper(ConstantRate(bad), 0.0, state, start.v).err();
         assert!(matches!(refused, Some(InputError::TimeTransformation { .. })), "{bad}: {refused:?}");
     }
     let driven = Gauss::new(PerturbedKepler::default(), 3, 0.1).unwrap();
@@ -151,7 +153,7 @@ fn bad_input_is_refused() {
 }
 
 #[test]
-fn a_clock_that_is_not_defined_ends_the_run() {
+fn a_time_transformation_that_is_not_defined_ends_the_run() {
     /// Not defined beyond `x = 0`.
     struct Ending;
     impl TimeTransformation<2> for Ending {
@@ -161,7 +163,7 @@ fn a_clock_that_is_not_defined_ends_the_run() {
     }
     let kepler = Planar::default();
     let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
-    let mut run = clocked(&gauss, &kepler, Ending, 0.5);
+    let mut run = transformed(&gauss, &kepler, Ending, 0.5);
     let halt = run.advance_to(10.0).unwrap_err();
     assert_eq!(halt.cause, StepError::NonFinite);
     assert!(run.state().q[0] > 0.0 && run.time() < 10.0 && halt.taken > 3);
@@ -189,7 +191,8 @@ fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
     SVector::from([cos - e, b * sin, -sin / r, b * cos / r])
 }
 
-/// The orbit for a span of three revolutions and a little, to an error, by an integrator or none; the true error.
+/// The orbit over a little more than three revolutions with an accuracy, by an integrator or the default; and the true
+/// error.
 fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, Outcome<2>, f64) {
     let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
     let problem = Problem::new(&kepler, 0.0, pericentre(e)).unwrap();
@@ -204,11 +207,11 @@ fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, O
     (plan.integrator().clone(), outcome, error)
 }
 
-/// Eccentric orbits are followed by the time transformation, to the accuracy that is wanted, and for a part of the evaluations of equal steps. Of
-/// these `(1 - e)^(-3/2)` are as long as those at distance one; their iterations take two or three sweeps, where long steps take up to
-/// eighteen, and half of the rest is left to the orbit's mean.
+/// Eccentric orbits are computed in transformed time, to the requested accuracy, and with a part of the evaluations of
+/// equal steps. Equal steps are shorter than those at distance one by `(1 - e)^(3/2)`; their iterations converge in two
+/// or three iterations, where long steps take up to eighteen, and a factor two is left for the mean over the orbit.
 #[test]
-fn eccentric_orbits_choose_the_clock() {
+fn eccentric_orbits_choose_the_time_transformation() {
     for e in [0.9, 0.99] {
         for wanted in [1e-6, 1e-8, 1e-10, 1e-11] {
             let (integrator, outcome, error) = to_accuracy(e, wanted, None);
@@ -229,12 +232,12 @@ fn eccentric_orbits_choose_the_clock() {
     }
 }
 
-/// From the apocentre too, where the motion shows nothing yet of what is to come.
+/// From the apocentre too, where the start does not show how close the pericentre is.
 #[test]
 fn starts_at_the_apocentre() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
     for e in [0.9, 0.99] {
-        // The pericentre of -e.
+        // The pericentre of -e is the apocentre of e.
         let problem = Problem::new(&kepler, 0.0, pericentre(-e)).unwrap();
         let plan = problem.accuracy(1e-8).plan(Until::Time(20.0)).unwrap();
         let Outcome { status, q, p, .. } = plan.run().unwrap();
@@ -245,7 +248,8 @@ fn starts_at_the_apocentre() {
     }
 }
 
-/// Where the time transformation would gain little it is left alone; named, it keeps the accuracy there too, with any number of stages.
+/// Where the time transformation gains little it is not chosen; named explicitly, it keeps the accuracy, with any
+/// number of stages.
 #[test]
 fn round_orbits_take_equal_steps() {
     for e in [0.0, 0.1] {
@@ -258,9 +262,10 @@ fn round_orbits_take_equal_steps() {
     }
 }
 
-/// The same numbers to the last bit, whatever is observed; rows end where the run does, and the factor is that of linear drag.
+/// The numbers are the same to the last bit with any observers; rows end where the run does, and the factor is that of
+/// linear drag.
 #[test]
-fn rows_of_a_clocked_run_change_nothing() {
+fn rows_of_a_transformed_run_change_nothing() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
     let problem = Problem::new(&kepler, 0.0, pericentre(0.9)).unwrap();
     for to_accuracy in [false, true] {
@@ -285,12 +290,12 @@ fn rows_of_a_clocked_run_change_nothing() {
 }
 
 /// A free particle with a time transformation of any rate, autonomous or not.
-struct Clocked {
+struct Transformed {
     rate: f64,
     autonomous: bool,
 }
 
-impl Lagrangian<1> for Clocked {
+impl Lagrangian<1> for Transformed {
     const HAS_TIME_TRANSFORMATION: bool = true;
 
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -305,7 +310,7 @@ impl Lagrangian<1> for Clocked {
 }
 
 #[test]
-fn clocks_that_cannot_be_followed_are_refused() {
+fn invalid_time_transformations_are_refused() {
     let by = AnyIntegrator::TransformedGauss { stages: 4 };
     assert_eq!(
         AnyIntegrator::TransformedGauss { stages: 17 }.check(&Planar::default()),
@@ -313,15 +318,15 @@ fn clocks_that_cannot_be_followed_are_refused() {
     );
     assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::Hypothesis { .. })));
     assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::Hypothesis { .. })));
-    let driven = Clocked { rate: 1.0, autonomous: false };
+    let driven = Transformed { rate: 1.0, autonomous: false };
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
-        let system = Clocked { rate, autonomous };
+        let system = Transformed { rate, autonomous };
         Problem::new(&system, 0.0, start).unwrap().by(by).steps(steps).plan(Until::Time(2.0)).err()
     };
     let inaccurate = |rate: f64| {
-        let system = Clocked { rate, autonomous: true };
+        let system = Transformed { rate, autonomous: true };
         Problem::new(&system, 0.0, start).unwrap().by(by).accuracy(1e-6).plan(Until::Time(2.0)).err()
     };
     assert_eq!(refused(1.0, false, Steps::Size(0.1)), Some(InputError::Unclaimed { claim: "autonomous" }));
@@ -333,35 +338,35 @@ fn clocks_that_cannot_be_followed_are_refused() {
     assert_eq!(refused(1.0, true, Steps::Size(-0.1)), Some(InputError::Step { h: -0.1 }));
     let sentence = refused(1.0, true, Steps::Count(10)).map(|error| error.to_string()).unwrap_or_default();
     assert!(sentence.contains("steps of a given size in its transformed time"), "{sentence}");
-    // A time transformation that gains nothing is not chosen, whatever its rate.
+    // A time transformation without a gain is not chosen, whatever its rate.
     for rate in [1.0, 1e-3, -1.0, f64::NAN] {
-        let system = Clocked { rate, autonomous: true };
+        let system = Transformed { rate, autonomous: true };
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let plan = problem.accuracy(1e-8).plan(Until::Time(2.0)).unwrap();
         assert!(!plan.integrator().in_transformed_time, "{rate}: {plan}");
     }
-    let system = Clocked { rate: 0.5, autonomous: true };
+    let system = Transformed { rate: 0.5, autonomous: true };
     let problem = Problem::new(&system, 0.0, start).unwrap();
     let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(2.0)).unwrap();
     let outcome = plan.run().unwrap();
     let tenths = problem.by(by).steps(Steps::Size(0.4)).run(Until::Time(2.0)).unwrap();
     assert_eq!((tenths.steps, tenths.t), (10, 2.0));
-    // Thirteen steps of 0.15, and one of a third of that; and the tenth of 0.2 ends the span, for all its rounding.
+    // Thirteen steps of 0.15, and one of a third of that; the span of 2 ends exactly in spite of rounding.
     assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
     assert!(
         plan.to_string().contains("14 steps of 0.3 of the transformed time by transformed_gauss_4, t = 0 .. 2"),
         "{plan}"
     );
-    // The same number of steps back, each as long.
+    // The same number of steps backward, each of the same length.
     let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(-2.0)).unwrap();
     let back = plan.run().unwrap();
     assert_eq!((back.steps, plan.count(), back.t, plan.step_size()), (14, 14, -2.0, -0.3));
-    // A time transformation has no number of steps to end after.
+    // In transformed time the number of steps is not known, so that a run cannot end after a number of steps.
     let counted = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Steps(14)).err();
     assert!(matches!(counted, Some(InputError::Hypothesis { .. })), "{counted:?}");
 }
 
-/// A fall into the centre comes to an end, whoever asks for it.
+/// A fall into the centre comes to an end, by any integrator.
 #[test]
 fn a_fall_into_the_centre_ends() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
@@ -374,6 +379,6 @@ fn a_fall_into_the_centre_ends() {
         .run(Until::Time(2.0))
         .unwrap();
     assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
-    // It takes pi / 8^(1/2) without another force.
+    // The fall takes pi / 8^(1/2) without another force.
     assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);
 }

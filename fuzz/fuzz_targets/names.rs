@@ -1,8 +1,9 @@
-//! Names of methods and integrators: what parses is printed back as it came, what does not is an error that says it.
+//! Names of methods and integrators: a name that parses is printed unchanged, and one that does not gives an error that
+//! contains it.
 
 #![no_main]
 
-use discrete_herglotz::{AnyIntegrator, Method};
+use discrete_herglotz::{AnyIntegrator, rules::Method};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {

@@ -1,4 +1,5 @@
-//! Runs of a pendulum by any integrator from any numbers, forward or back: an error, a status, or a finite outcome.
+//! Runs of a pendulum with any integrator from any numbers, forward or backward: an error, a status, or a finite
+//! outcome.
 
 #![no_main]
 
@@ -7,7 +8,7 @@ use contact_geom::systems::Pendulum;
 use discrete_herglotz::{InputError, AnyIntegrator, Outcome, Problem, Row, Rows, Steps, Until};
 use libfuzzer_sys::fuzz_target;
 
-/// The most steps of a run.
+/// The maximal number of steps of a run.
 const STEPS: u16 = 300;
 
 fuzz_target!(|input: ([f64; 6], u8, u16, Option<u16>, bool)| {

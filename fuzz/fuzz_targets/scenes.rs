@@ -1,4 +1,5 @@
-//! Scene files, and the formulas in them: what is wrong is told with its place, and what is read has a motion and its members.
+//! Scene files, and the formulas in them: errors have their position, and a scene that is read has a motion and its
+//! members.
 
 #![no_main]
 

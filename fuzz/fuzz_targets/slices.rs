@@ -1,12 +1,12 @@
-//! What takes raw numbers: points, paths, axes, splines, small linear systems. What is accepted is finite.
+//! Functions that take raw numbers: points, paths, axes, splines, small linear systems. Accepted input is finite.
 
 #![no_main]
 
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::systems::Pendulum;
-use contact_geom::{DiscretePoint, PhasePoint, Regularity, Symmetry, VelocityPoint, max_or_nan, max_abs_or_nan};
-use discrete_herglotz::{DiscretePath, Midpoint, Solver};
-use exact_lagrangian::{Curve, SplineCurve};
+use contact_geom::{DiscretePoint, PhasePoint, Regularity, Symmetry, VelocityPoint, numbers::{max_or_nan, max_abs_or_nan}};
+use discrete_herglotz::{rules::Midpoint, solve::Solver, theory::DiscretePath};
+use exact_lagrangian::principle::{Curve, SplineCurve};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

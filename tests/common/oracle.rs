@@ -1,17 +1,17 @@
-//! An independent integrator: dop853 of another library, on Herglotz' equations and their variational equation.
+//! An independent integrator: dop853 of another library, for Herglotz' equations and their variational equation.
 
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::System;
 use contact_geom::{
-    ChartVector, DarbouxField, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction,
-    VelocityPoint,
+    ChartVector, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, VelocityPoint,
+    hamiltonian::DarbouxField,
 };
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
 
 /// The Herglotz field, its variational equation and the exponent `int L_z`, as one first-order system.
 struct Variational<'a, L, const N: usize> {
     lagrangian: &'a L,
-    /// Whether the derivative of the flow and the exponent are wanted.
+    /// Whether the derivative of the flow and the exponent are requested.
     derivative: bool,
 }
 
@@ -38,7 +38,7 @@ impl<L: Lagrangian<N>, const N: usize> ODE<f64, Vec<f64>> for Variational<'_, L,
     }
 }
 
-/// The state of the motion after a time, with the derivative of the flow and the exponent `int L_z` if asked for.
+/// The state of the motion after a time, with the derivative of the flow and the exponent `int L_z` if requested.
 fn integrate<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t0: f64,
@@ -84,7 +84,7 @@ pub fn motion_with_derivative<const N: usize>(
     (ChartVector::from_fn(|i| y[i]).into(), derivative, y[m + m * m].exp())
 }
 
-/// A system's Hamiltonian as a function.
+/// The Hamiltonian of a system in closed form, as a function.
 struct Known<'a, S>(&'a S);
 
 impl<const N: usize, S: System<N>> SmoothFunction<N> for Known<'_, S> {
@@ -93,7 +93,7 @@ impl<const N: usize, S: System<N>> SmoothFunction<N> for Known<'_, S> {
     }
 }
 
-/// The contact Hamiltonian equations of a known H.
+/// The contact Hamiltonian equations of a Hamiltonian in closed form.
 struct HamiltonianOde<'a, S, const N: usize>(&'a S);
 
 impl<const N: usize, S: System<N>> ODE<f64, Vec<f64>> for HamiltonianOde<'_, S, N> {
@@ -106,7 +106,7 @@ impl<const N: usize, S: System<N>> ODE<f64, Vec<f64>> for HamiltonianOde<'_, S, 
     }
 }
 
-/// The state of the contact Hamiltonian flow after a time; none where H is not known.
+/// The state of the contact Hamiltonian flow after a time; none where H is not known in closed form.
 pub fn hamiltonian_motion<const N: usize>(
     system: &impl System<N>,
     t0: f64,

@@ -1,6 +1,6 @@
-//! Ensembles: their members are single runs, whatever the threads and the neighbours are.
+//! Ensembles: each member is the same as a single run, for any number of threads and any neighbours.
 
-// What a test cannot go on without is a failure of it.
+// In a test a missing value is a failure.
 #![allow(clippy::unwrap_used)]
 
 mod resolution;
@@ -11,13 +11,14 @@ use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
-    BatchKernel, CheckpointError, Ending, Ensemble, EnsembleError, Event, Events, GaussCollocation, InputError,
-    Integrator, Member, MethodInfo, Problem, QuadratureMethod, Row, Rows, SplittingScheme, Status, StepError, Stepper,
-    StepperOptions, Steps, Until,
+    CheckpointError, Ensemble, Event, Events, GaussCollocation, InputError, Integrator, MethodInfo, Problem, Row, Rows,
+    SplittingScheme, Status, StepError, Stepper, StepperOptions, Steps, Until,
+    ensemble::{BatchKernel, Ending, EnsembleError, Member},
+    rules::QuadratureMethod,
 };
 use proptest::prelude::*;
 
-/// The Hénon-Heiles potential with masses that are coupled, and linear drag.
+/// The Hénon-Heiles potential with a mass matrix that is not diagonal, and linear drag.
 struct HenonHeiles;
 
 impl Lagrangian<2> for HenonHeiles {
@@ -45,7 +46,7 @@ impl Lagrangian<1> for Bowl {
     }
 }
 
-/// An oscillator whose formula asks for one value of its position.
+/// An oscillator whose formula branches on the value of its position.
 struct Branching;
 
 impl Lagrangian<1> for Branching {
@@ -84,13 +85,14 @@ fn members<const N: usize>(ensemble: &Ensemble<'_, impl Lagrangian<N> + Sync, N>
     all
 }
 
-/// The numbers of a member's end.
+/// The numbers of the final state of a member.
 fn numbers<const N: usize>(member: &Member<N>) -> Vec<f64> {
     let state = member.ending.unwrap().state;
     state.q.iter().chain(state.p.iter()).copied().chain([state.z]).collect()
 }
 
-/// The largest distance of some members of an ensemble in lanes from single runs, in units of the larger of their size and one.
+/// The largest distance of some members of an ensemble in lanes from single runs, in units of the larger of their size
+/// and one.
 fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy + 'a, const N: usize>(
     lagrangian: &'a L,
     start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy + 'a,
@@ -113,7 +115,7 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
             assert_eq!((ending.status, ending.steps, ending.t), (Status::Completed, steps, own.time()), "{name}");
             let own = Member { index: 0, ending: Ok(Ending { state: own.state(), ..ending }), rows: Vec::new() };
             for (a, b) in numbers(member).iter().zip(numbers(&own)) {
-                // Not by `max`, which would lose a NaN.
+                // The largest distance is not taken by `max`, which would lose a NaN.
                 let apart = (a - b).abs() / b.abs().max(1.0);
                 farthest = if apart <= farthest { farthest } else { apart };
             }
@@ -127,12 +129,14 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
 fn by_splittings_members_are_single_runs_to_the_last_bit() {
     for scheme in SplittingScheme::ALL {
         let (by, name) = (scheme, scheme.name());
-        // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not diagonal.
+        // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not
+        // diagonal.
         assert_eq!(distance(&Kepler::<2>::default(), orbit_start, by, 50), 0.0, "{name}");
         assert_eq!(distance(&HenonHeiles, plane_start, by, 50), 0.0, "{name}");
         assert_eq!(distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 50), 0.0, "{name}");
-        // The sine is within 2 units in the last place, each of at most 35 in a step acts with a part of the step, and five units of time
-        // let a difference grow by e^5 at the most, beside the upper equilibrium; the motions here stay below it.
+        // The sine has an error of 2 units in the last place, at most 35 of which enter a step, each times a part of
+        // the step; in five units of time a difference grows at most by e^5, near the upper equilibrium, and the
+        // motions here stay below it.
         let apart = distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 50);
         assert!(apart <= 64.0 * f64::EPSILON, "{name}: {apart:e}");
     }
@@ -141,7 +145,7 @@ fn by_splittings_members_are_single_runs_to_the_last_bit() {
 #[test]
 fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
     let by = SplittingScheme::BLANES_MOAN_4;
-    // The sine of the forcing is that of a lane.
+    // The sine of the forcing is the one of the lanes.
     let apart = distance(&Duffing::forced(), pendulum_start, by, 50);
     assert!(apart <= 64.0 * f64::EPSILON, "{apart:e}");
 }
@@ -156,12 +160,13 @@ fn by_collocation_members_are_single_runs_but_for_rounding() {
             distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 40),
             distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 40),
         ];
-        // Both solve the stages to round-off; what is left of it in 40 steps is a few units, that an orbit multiplies by 3/2 of its phase.
+        // Both solve the stages to round-off, of which a few units remain after 40 steps, and an orbit multiplies them
+        // by 3/2 of its phase.
         assert!(systems.iter().all(|apart| *apart <= 64.0 * f64::EPSILON), "{stages} stages: {systems:?}");
     }
 }
 
-/// One of each kernel, and a rule, which has none.
+/// One integrator of each kernel, and a rule, which has no kernel.
 #[derive(Clone, Copy, Debug)]
 enum By {
     Splitting(SplittingScheme),
@@ -230,7 +235,8 @@ fn threads_do_not_change_a_bit() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
-    /// Members in another order, among others and in another number of them, are the same to the last bit: also beside ones that fail.
+    /// Members in another order, among others and in another number of them, are the same to the last bit: also next to
+    /// members that fail.
     #[test]
     fn neighbours_and_order_do_not_change_a_bit(
         starts in prop::collection::vec((-2.5f64..2.5, -1.5f64..1.5), 1..90),
@@ -246,7 +252,7 @@ proptest! {
             let count = starts.len();
             let plain = Ensemble::new(&pendulum, 0.0, count, start).by(by).steps(Steps::Count(5)).threads(1);
             let plain = members(&plain, Until::Time(2.0));
-            // Each twice, in another order, with one that is not a number and one beyond the range of a lane's sine.
+            // Each member twice, in another order, with an invalid one and one beyond the range of the sine in lanes.
             let moved = |i: usize| match bad {
                 Some(bad) if i == bad % (2 * count) => VelocityPoint::new([f64::NAN], [0.0], 0.0),
                 Some(bad) if i == (bad + 1) % (2 * count) => VelocityPoint::new([1e6], [0.0], 0.0),
@@ -265,9 +271,10 @@ proptest! {
     }
 }
 
-/// A step ends in each lane for itself: among neighbours whose steps take more sweeps and fewer, a member is what it is among members of its own start.
+/// The iteration ends in each lane separately: among neighbours whose steps take more iterations and fewer, a member is
+/// the same as among members with its own start.
 #[test]
-fn a_lane_that_has_ended_stays_while_others_go_on() {
+fn a_lane_that_has_converged_does_not_change_while_others_iterate() {
     let pendulum = Pendulum { gamma: -1e-3 };
     let start = |i: usize| VelocityPoint::new([[0.01, 2.9, 1.5, 0.3][i % 4]], [0.0], 0.0);
     for stages in [5, 8] {
@@ -283,8 +290,8 @@ fn a_lane_that_has_ended_stays_while_others_go_on() {
 }
 
 #[test]
-fn a_member_that_fails_says_why_and_the_others_go_on() {
-    // From q = 0.5 with v = 5 the edge is crossed; at 2 L is not defined.
+fn a_member_that_fails_has_its_error_and_the_others_continue() {
+    // From q = 0.5 with v = 5 the motion crosses the edge; at 2 L is not defined.
     let start = |i: usize| match i {
         3 => VelocityPoint::new([0.5], [5.0], 0.0),
         20 => VelocityPoint::new([2.0], [0.0], 0.0),
@@ -324,7 +331,7 @@ fn a_formula_that_branches_is_run_one_by_one() {
     assert_eq!(batch_kernel, 0);
     for (i, end) in ends.into_iter().enumerate() {
         let frequency = if i % 2 == 0 { 1.5f64.sqrt() } else { 1.0 };
-        // The closed form, to the error of order 8 with ten steps; no motion changes sides until t = 1.
+        // The closed form, up to the error of order 8 with ten steps; no motion changes its side before t = 1.
         assert!((end.abs() - frequency.cos()).abs() < 1e-9, "{i}: {end}");
     }
 }
@@ -362,7 +369,8 @@ fn orders_are_those_of_the_schemes() {
                 ends(by, steps).iter().zip(&exact).map(|(a, b)| (numbers(a)[0] - numbers(b)[0]).powi(2)).sum::<f64>();
             far.sqrt().log2()
         };
-        // Three halvings; the order is the mean slope, off by the next term of the error, which is below a tenth of the first.
+        // Three halvings; the order is the mean slope, with an error from the next term of the error, which is below a
+        // tenth of the first.
         let slope = (error(steps) - error(8 * steps)) / 3.0;
         assert!((slope - f64::from(Integrator::<Pendulum, 1>::info(&by).order)).abs() < 0.15, "{by:?}: {slope}");
     }
@@ -405,13 +413,13 @@ fn bad_input_is_refused_before_work_begins() {
     assert_eq!(refused(none.run(until, fold)), InputError::NoIntegrator);
     let none = Ensemble::new(&pendulum, 0.0, 9, pendulum_start).by(by);
     assert_eq!(refused(none.run(until, fold)), InputError::NoSteps);
-    // A start that is none, where all are.
+    // An invalid start in an ensemble in which all starts are invalid.
     let nowhere = Ensemble::new(&pendulum, 0.0, 9, |_| VelocityPoint::new([f64::NAN], [0.0], 0.0)).by(by);
     assert!(matches!(refused(nowhere.steps(Steps::Count(4)).run(until, fold)), InputError::Geometry(_)));
     assert!(Integrator::<Pendulum, 1>::batch_kernel(&by).is_some());
 }
 
-/// To the time at which they start all members are their starts, in lanes and by themselves.
+/// In an ensemble to its start all members are their starts, in lanes and one by one.
 #[test]
 fn an_ensemble_to_its_start_is_the_starts() {
     let pendulum = Pendulum { gamma: -0.1 };
@@ -430,7 +438,7 @@ fn an_ensemble_to_its_start_is_the_starts() {
 }
 
 #[test]
-fn a_checkpoint_goes_on_to_the_last_bit() {
+fn a_resumed_ensemble_is_the_same_to_the_last_bit() {
     let folder = std::env::temp_dir().join(format!("ensembles-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("shards");
@@ -453,7 +461,8 @@ fn a_checkpoint_goes_on_to_the_last_bit() {
     assert_eq!(plain.0.failed, 1);
     assert_eq!(bits(of(5).checkpoint(&path)), plain);
     let whole = std::fs::read(&path).unwrap();
-    // Killed at any byte: what was not written to its end is done again, and the file is whole at the end.
+    // Interrupted at any byte: shards that were not written completely are computed again, and the file is complete at
+    // the end.
     for length in [whole.len(), whole.len() - 1, whole.len() / 2, whole.len() / 3, 32] {
         std::fs::write(&path, &whole[..length]).unwrap();
         assert_eq!(bits(of(5).checkpoint(&path)), plain, "{length} bytes");
@@ -466,7 +475,7 @@ fn a_checkpoint_goes_on_to_the_last_bit() {
             other => unreachable!("{other:?}"),
         }
     };
-    // A bit of a shard, of the head; another kind of file, another version.
+    // A changed bit of a shard and of the header; another kind of file, another version.
     for at in [100, whole.len() / 2, 17] {
         let mut damaged = whole.clone();
         damaged[at] ^= 4;
@@ -488,13 +497,13 @@ fn a_checkpoint_goes_on_to_the_last_bit() {
 
 #[test]
 fn progress_ends_at_one() {
-    let told = std::cell::RefCell::new(Vec::new());
+    let reported = std::cell::RefCell::new(Vec::new());
     let pendulum = Pendulum { gamma: -0.1 };
     let ensemble =
         Ensemble::new(&pendulum, 0.0, 1000, pendulum_start).by(SplittingScheme::STRANG).steps(Steps::Count(2));
-    ensemble.progress(|part| told.borrow_mut().push(part)).run(Until::Time(1.0), |_| {}).unwrap();
-    let told = told.into_inner();
-    assert!(told.is_sorted() && told.len() > 1 && told.last() == Some(&1.0), "{told:?}");
+    ensemble.progress(|part| reported.borrow_mut().push(part)).run(Until::Time(1.0), |_| {}).unwrap();
+    let reported = reported.into_inner();
+    assert!(reported.is_sorted() && reported.len() > 1 && reported.last() == Some(&1.0), "{reported:?}");
 }
 
 #[test]
@@ -503,14 +512,15 @@ fn a_panic_of_the_start_is_one_of_the_run() {
     let start = |i: usize| if i == 777 { unreachable!("a start that panics") } else { pendulum_start(i) };
     let ensemble =
         Ensemble::new(&pendulum, 0.0, 100_000, start).by(SplittingScheme::STRANG).steps(Steps::Count(2)).threads(3);
-    // Not a deadlock.
+    // The panic does not cause a deadlock.
     let run = std::panic::AssertUnwindSafe(|| ensemble.run(Until::Time(1.0), |_| {}));
     assert!(std::panic::catch_unwind(run).is_err());
 }
 
 #[test]
 fn steps_that_do_not_converge_are_those_of_a_single_run() {
-    // A step that sweeps do not solve: a run of its own does, by Newton's method, or says why not.
+    // A step for which the fixed-point iteration fails: a single run solves it by Newton's method, or reports why it
+    // cannot.
     let stiff = HarmonicOscillator { gamma: -0.1 };
     let by = GaussCollocation { stages: 4 };
     let ensemble = Ensemble::new(&stiff, 0.0, 10, pendulum_start).by(by).steps(Steps::Size(30.0)).threads(1);

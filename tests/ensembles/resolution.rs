@@ -3,7 +3,7 @@
 use super::*;
 use discrete_herglotz::UnresolvedStep;
 
-/// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator as stiff as its parameter.
+/// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator whose stiffness is its parameter.
 struct Spring {
     k: f64,
 }
@@ -20,7 +20,7 @@ impl Lagrangian<1> for Spring {
 }
 
 #[test]
-fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
+fn members_that_the_steps_do_not_resolve_are_flagged_as_by_a_single_run() {
     // Frequencies from 0.1 to 11, with steps of 1: from a sixtieth of a period to nearly two of them.
     let springs: Vec<Spring> = (0..120).map(|i| Spring { k: (0.1 * 1.04f64.powi(i)).powi(2) }).collect();
     let start = |i: usize| VelocityPoint::new([0.5], [0.02 * i as f64], 0.0);
@@ -30,7 +30,7 @@ fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
         let of =
             || Ensemble::of(0.0, springs.len(), |i| (&springs[i], start(i))).by(by).steps(Steps::Count(30)).threads(1);
         let (watched, unwatched) = (members(&of(), until), members(&of().unwatched(), until));
-        let (mut marked, mut unmarked) = (0, 0);
+        let (mut flagged, mut unflagged) = (0, 0);
         for (i, member) in watched.iter().enumerate() {
             let problem = Problem::new(&springs[i], 0.0, start(i)).unwrap();
             let own = problem.by(by).steps(Steps::Count(30)).run(until).unwrap();
@@ -39,9 +39,10 @@ fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
             if bits(ending.unresolved) != bits(own.unresolved) {
                 missed.push((Integrator::<'_, Spring, 1>::info(&by).name, i, own.unresolved));
             }
-            marked += usize::from(ending.unresolved.is_some());
-            unmarked += usize::from(ending.unresolved.is_none());
-            // The marks change no bit. A run by itself takes other sweeps, and ends where numbers have grown beyond all bounds.
+            flagged += usize::from(ending.unresolved.is_some());
+            unflagged += usize::from(ending.unresolved.is_none());
+            // Detecting unresolved steps changes no bit. A single run takes other iterations, and its states may differ
+            // where numbers grow without bound.
             let plain = unwatched[i].ending.unwrap();
             if own.status == Status::Completed {
                 assert_eq!(
@@ -51,14 +52,14 @@ fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
                 );
             }
         }
-        assert!(marked >= 5 && unmarked >= 20, "{by:?}: {marked} marked, {unmarked} not");
+        assert!(flagged >= 5 && unflagged >= 20, "{by:?}: {flagged} flagged, {unflagged} not");
     }
     assert!(missed.is_empty(), "{} missed: {missed:?}", missed.len());
 }
 
 #[test]
 fn an_accuracy_holds_for_every_member() {
-    // One is stiffer than all that trial runs look at.
+    // One member is stiffer than all members of the trial runs.
     let (soft, stiff) = (Spring { k: 1.0 }, Spring { k: 30.0 });
     let spring = |i: usize| if i == 50 { &stiff } else { &soft };
     let start = |i: usize| VelocityPoint::new([0.5], [0.02 * i as f64], 0.0);
@@ -69,7 +70,8 @@ fn an_accuracy_holds_for_every_member() {
         let (x, y) = (a.ending.unwrap().state, exact[a.index].ending.unwrap().state);
         (x.q - y.q).norm().hypot((x.p - y.p).norm()) / (y.q.norm().hypot(y.p.norm()) * wanted)
     };
-    // The error is the distance of two runs, of which the finer has a quarter of the other's for order 2, and a 64th or less for the others.
+    // The error is the difference of two runs, of which the finer has a quarter of the other's error for order 2, and a
+    // 64th or less for the others.
     for (by, wanted, most) in [
         (None, 1e-9, 1.05),
         (None, 1e-12, 1.05),
@@ -89,16 +91,17 @@ fn an_accuracy_holds_for_every_member() {
             assert!(error <= most, "{by:?}, {}: {error}", member.index);
         }
         let steps = all[0].ending.unwrap().steps;
-        // It takes its own, as many as its trial runs find: at least half as many again, and how many more depends on the order.
+        // The stiff member has steps of its own from its trial runs: at least half as many again, and how many more
+        // depends on the order.
         let own = all[50].ending.unwrap().steps;
         assert!(2 * own > 3 * steps, "{by:?}: {own} beside {steps}");
-        // Otherwise they are those of so many steps.
+        // The other members are those of a run with that number of steps.
         let given = of().by(by.unwrap_or(gauss(if wanted < 1e-10 { 12 } else { 8 })));
         let given = members(&given.steps(Steps::Count(steps)).rows_every(1), until);
         for (a, b) in all.iter().zip(&given).filter(|(a, _)| a.index != 50) {
             assert_eq!((a.ending, &a.rows), (b.ending, &b.rows), "{by:?}");
         }
-        // And such steps would have been too long for that one.
+        // Those steps would have been too long for the stiff member.
         let error = beyond(&given[50], wanted);
         assert!(error > 2.0, "{by:?}: {error}");
     }

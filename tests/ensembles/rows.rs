@@ -1,4 +1,4 @@
-//! Rows of members, and their observers.
+//! Rows of members, and observers of members.
 
 use super::*;
 
@@ -6,7 +6,7 @@ use super::*;
 fn rows_are_those_of_single_runs() {
     for by in integrators() {
         for (steps, stride) in [(10, 3), (12, 4), (5, 9), (3, 1)] {
-            // To the last bit where no sine is taken; by collocation but for rounding, and on the pendulum.
+            // To the last bit where no sine is evaluated; up to rounding by collocation, and on the pendulum.
             let exact = matches!(by, By::Splitting(_) | By::Rule(_));
             let oscillator = HarmonicOscillator { gamma: -0.1 };
             for without in [false, true] {
@@ -28,7 +28,7 @@ fn rows_are_those_of_single_runs() {
                         }
                         assert_eq!((a.t, a.z.is_some()), (b.t, b.z.is_some()), "{by:?}, {steps} by {stride}");
                         for (x, y) in a.numbers().zip(b.numbers()) {
-                            // Both solve the stages to round-off, in twelve steps at the most, of numbers of size 2.
+                            // Both solve the stages to round-off, in at most twelve steps, for numbers of size 2.
                             assert!((x - y).abs() <= 16.0 * f64::EPSILON, "{by:?}: {a:?}, {b:?}");
                         }
                     }
@@ -64,7 +64,7 @@ fn rows_change_no_bit_and_none_depends_on_the_neighbours() {
 
 #[test]
 fn rows_of_a_member_that_fails_end_before_it_does() {
-    // The edge is crossed at t = 0.1 or so; the others go on.
+    // One member crosses the edge at about t = 0.1; the others continue.
     let start = |i: usize| VelocityPoint::new([if i == 5 { 0.5 } else { 0.01 }], [if i == 5 { 5.0 } else { 0.1 }], 0.0);
     let ensemble = Ensemble::new(&Bowl, 0.0, 20, start).by(SplittingScheme::STRANG).steps(Steps::Count(80));
     let all = members(&ensemble.rows_every(1), Until::Time(2.0));
@@ -84,19 +84,19 @@ fn rows_are_in_the_checkpoint() {
         let ensemble = Ensemble::new(&pendulum, 0.0, 900, start).by(SplittingScheme::STRANG).steps(Steps::Count(6));
         let ensemble = ensemble.rows_every(stride).threads(2);
         let ensemble = if let Some(path) = path { ensemble.checkpoint(path) } else { ensemble };
-        // As text: what is not a number equals nothing, itself not either.
+        // As text, since a NaN does not equal itself.
         let mut all = Vec::new();
         ensemble.run(Until::Time(1.0), |member| all.push(format!("{member:?}"))).map(|_| all)
     };
     let plain = run(2, None).unwrap();
     assert_eq!(run(2, Some(&path)).unwrap(), plain);
-    // Read, and half of it read.
+    // The whole checkpoint is read, and a half of it.
     assert_eq!(run(2, Some(&path)).unwrap(), plain);
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert_eq!(run(2, Some(&path)).unwrap(), plain);
     assert!(std::fs::read(&path).unwrap() == whole);
-    // Other rows are another ensemble.
+    // An ensemble with other rows is another ensemble.
     assert!(matches!(run(3, Some(&path)), Err(EnsembleError::AnotherEnsemble { .. })));
     std::fs::remove_file(path).unwrap();
 }
@@ -132,10 +132,14 @@ fn observers_of_members_see_what_those_of_single_runs_do() {
         let run = |threads: usize| {
             let ensemble = Ensemble::new(&pendulum, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(threads);
             let mut all = Vec::new();
-            let told = std::cell::Cell::new(0.0);
-            let ensemble = ensemble.progress(|part| told.set(part)).observe(observer, seen);
+            let reported = std::cell::Cell::new(0.0);
+            let ensemble = ensemble.progress(|part| reported.set(part)).observe(observer, seen);
             let tally = ensemble.run(Until::Time(6.0), |member, seen| all.push((member.clone(), seen))).unwrap();
-            assert_eq!((tally.members, tally.completed, tally.batch_kernel, told.get()), (40, 38, 0, 1.0), "{by:?}");
+            assert_eq!(
+                (tally.members, tally.completed, tally.batch_kernel, reported.get()),
+                (40, 38, 0, 1.0),
+                "{by:?}"
+            );
             all
         };
         let all = run(1);
@@ -155,7 +159,7 @@ fn observers_of_members_see_what_those_of_single_runs_do() {
             crossed += events.crossings.len();
             assert_eq!(seen, Some((rows.rows, events.crossings)), "{by:?}");
         }
-        // They hang down about once in half a period of six or so.
+        // They pass the lowest point about once in half a period of about six.
         assert!(crossed > 38, "{by:?}: {crossed}");
     }
     let ensemble = Ensemble::new(&pendulum, 0.0, 9, pendulum_start).by(SplittingScheme::STRANG).steps(Steps::Count(4));

@@ -1,5 +1,5 @@
-//! Attacks on discrete-herglotz. What starts a motion refuses what is not finite, and what it hands out is finite; formulas hand
-//! on what is not a number, or refuse it.
+//! Invalid input to discrete-herglotz. A start that is not finite is refused, and the states of a motion are finite;
+//! formulas return a number that is not finite for such input, or refuse it.
 
 #[path = "discrete/boundary.rs"]
 mod boundary;
@@ -17,7 +17,7 @@ mod runs;
 mod steppers;
 
 use crate::numbers::places;
-use crate::{Attack, Exceptions};
+use crate::{Exceptions, InputTest};
 use contact_geom::PhasePoint;
 
 pub const EXCEPTIONS: Exceptions = &[
@@ -25,7 +25,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Interrupt::when", "takes no number"),
     ("Problem::with_interrupt", "takes no number"),
     ("Ensemble::with_interrupt", "takes no number"),
-    ("jumps_between", "compares signs along a curve; every point of a run with switching functions is an attack on it"),
+    ("jumps_between", "compares signs along a curve; every run with switching functions calls it"),
     ("Method::order", "takes no number"),
     ("Method::symmetric", "takes no number"),
     ("Method::implicit_in_z", "takes no number"),
@@ -36,30 +36,30 @@ pub const EXCEPTIONS: Exceptions = &[
     ("RuleVisitor::*", "the implementor's"),
     ("SplittingScheme::*", "tables: take no number"),
     ("AnyIntegrator::all", "takes no number"),
-    ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
+    ("AnyIntegrator::order", "takes no number; the test of check calls it for any number of stages"),
     ("DiscreteLagrangian::is_explicit", "takes no number"),
     ("DiscreteLagrangian::constant_rate", "takes no number"),
     ("DiscreteLagrangian::order", "takes no number"),
     ("EnergyDrift::first", "takes no number"),
     ("Rule::is_symmetric", "takes no number"),
-    ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
-    ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
+    ("ActionFlow::*", "the implementor's; that of Riccati is tested with its callers"),
+    ("Observer::*", "the implementor's; observers with odd requests are in the test of Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] = &[
-    boundary::ATTACKS,
-    ensembles::ATTACKS,
-    integrators::ATTACKS,
-    lagrangians::ATTACKS,
-    observers::ATTACKS,
-    runs::ATTACKS,
-    steppers::ATTACKS,
+pub const TESTS: &[&[InputTest]] = &[
+    boundary::TESTS,
+    ensembles::TESTS,
+    integrators::TESTS,
+    lagrangians::TESTS,
+    observers::TESTS,
+    runs::TESTS,
+    steppers::TESTS,
 ];
 
-/// Times and states to start from, and whether they are finite.
+/// Times and states to start from, some of them not finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {
     places().into_iter().map(|(t, x)| (t, x.into())).collect()
 }
 
-/// Steps beside those that are refused.
+/// Steps that are accepted.
 const STEPS: [f64; 8] = [1e-300, 1e-12, 0.1, 1e3, 1e300, -1e-12, -0.1, -1e3];

@@ -1,12 +1,12 @@
-//! The public entries of a library, read off its sources.
+//! The public entry points of a library, read from its sources.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The functions that a user of a crate can call: free ones by their name (with the module where it is public), methods and
-/// constructors as `Type::function`, those of traits as `Trait::function`. Sources are taken as rustfmt leaves them: what
-/// starts a line is at the top level.
+/// The functions that a user of a crate can call: free functions by their name (with the module where it is public),
+/// methods and constructors as `Type::function`, functions of traits as `Trait::function`. The sources are formatted by
+/// rustfmt, so that what starts a line is at the top level.
 pub fn of_crate(name: &str) -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
     let lib = fs::read_to_string(root.join("lib.rs")).unwrap();
@@ -14,7 +14,7 @@ pub fn of_crate(name: &str) -> BTreeSet<String> {
     let mut entries = BTreeSet::new();
     for file in sources(&root) {
         let relative = file.strip_prefix(&root).unwrap().with_extension("");
-        // Tests stand at the end of a file, or in one of their own.
+        // Tests are at the end of a file, or in a file of their own.
         let text = fs::read_to_string(&file).unwrap();
         let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
         if relative.ends_with("tests") || relative.ends_with("order_conditions") {
@@ -23,10 +23,10 @@ pub fn of_crate(name: &str) -> BTreeSet<String> {
         let mut parts = relative.iter().filter_map(|part| part.to_str()).filter(|part| *part != "mod");
         let (folder, inner) = (parts.next().unwrap_or_default(), parts.next());
         let own = inner.map(|_| fs::read_to_string(root.join(folder).join("mod.rs")).unwrap());
-        // A public module, or one of a private folder that the crate hands on.
+        // A public module, or a module of a private folder that the crate re-exports.
         let handed_on = inner.zip(own.as_deref()).filter(|(m, own)| declares(own, m) && of_the_crate.contains(m));
         let module = handed_on.map(|(m, _)| m).or(Some(folder).filter(|m| declares(&lib, m)));
-        // All of a public module, but of a folder what its own file exports.
+        // All of a public module, but of a folder only what its `mod.rs` exports.
         let exported = match (module, own.as_deref()) {
             (Some(m), Some(own)) if m == folder => Some(exported(own)),
             (Some(_), _) => None,
@@ -42,7 +42,7 @@ fn declares(file: &str, module: &str) -> bool {
     file.lines().any(|line| line.strip_prefix("pub mod ").and_then(|m| m.strip_suffix(';')) == Some(module))
 }
 
-/// The names of `pub use`.
+/// The names after `pub use`.
 fn exported(lib: &str) -> BTreeSet<&str> {
     let uses = lib.split("\npub use ").skip(1).filter_map(|u| u.split(';').next());
     uses.flat_map(|u| u.split(|c: char| !c.is_alphanumeric() && c != '_')).filter(|name| !name.is_empty()).collect()
@@ -61,20 +61,20 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Where a line stands.
+/// The block that a line is in.
 enum Within {
     File,
     /// The inherent functions of a type.
     Type(String),
     Trait(String),
-    TangentVector(String),
-    /// The implementation of a trait, a private type: nothing of its own.
+    Module(String),
+    /// The implementation of a trait, or a private type: no entry points.
     Other,
 }
 
 fn read(text: &str, module: Option<&str>, exported: &dyn Fn(&str) -> bool, entries: &mut BTreeSet<String>) {
     let mut within = Within::File;
-    // What a macro makes stands deeper; its blocks are as good as others.
+    // The blocks inside a macro are indented, and count as well.
     for line in text.lines() {
         let code = line.trim_start();
         let deep = line.len() - code.len();
@@ -86,13 +86,13 @@ fn read(text: &str, module: Option<&str>, exported: &dyn Fn(&str) -> bool, entri
             let name = identifier(header);
             within = if is_public(&name) { Within::Trait(name) } else { Within::Other };
         } else if let Some(header) = line.strip_prefix("pub mod ").filter(|h| h.ends_with('{')) {
-            within = Within::TangentVector(identifier(header));
+            within = Within::Module(identifier(header));
         } else if line.starts_with('}') {
             within = Within::File;
         } else if let Some(function) = function(code, matches!(within, Within::Trait(_))) {
             let qualified = match (&within, module) {
                 (Within::Type(of) | Within::Trait(of), _) => format!("{of}::{function}"),
-                (Within::TangentVector(of), _) => format!("{of}::{function}"),
+                (Within::Module(of), _) => format!("{of}::{function}"),
                 (Within::File, _) if deep != 0 || !exported(&function) => continue,
                 (Within::File, Some(of)) => format!("{of}::{function}"),
                 (Within::File, None) => function,
@@ -103,14 +103,14 @@ fn read(text: &str, module: Option<&str>, exported: &dyn Fn(&str) -> bool, entri
     }
 }
 
-/// The name of a function that a line declares, a public one unless it is a trait's.
+/// The name of the function that a line declares: a public function, or any function of a trait.
 fn function(code: &str, of_trait: bool) -> Option<String> {
     let public = ["pub fn ", "pub const fn "].iter().find_map(|start| code.strip_prefix(start));
     let declared = if of_trait { code.strip_prefix("fn ") } else { public };
     declared.map(identifier)
 }
 
-/// The type of an `impl` block by what follows the word, and whether it is that of a trait.
+/// The type of an `impl` block from the text after `impl`, and whether the block implements a trait.
 fn implemented(header: &str) -> (String, bool) {
     let mut rest = header;
     if rest.starts_with('<') {

@@ -1,11 +1,12 @@
-//! The limits that `KNOWN_ISSUES.md` lists, each asserted as it is; one that no longer holds leaves both.
+//! The limits that `KNOWN_ISSUES.md` lists, each asserted; a limit that no longer holds is removed from both.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Composition, Event, Events, Flow, Gauss, Method, Midpoint, Problem, Rectangle, SplittingScheme,
-    Status, Stepper, Steps, Until,
+    AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, Stepper, Steps, Until,
+    gauss::Gauss,
+    rules::{Composition, Flow, Method, Midpoint, Rectangle},
 };
 use std::fs;
 use std::path::Path;
@@ -15,7 +16,7 @@ use std::path::Path;
 fn the_page_names_its_tests() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = fs::read_to_string(root.join("KNOWN_ISSUES.md")).unwrap();
-    let here = fs::read_to_string(root.join("tests/hostile/known_issues.rs")).unwrap();
+    let here = fs::read_to_string(root.join("tests/invalid_input/known_issues.rs")).unwrap();
     let tests: Vec<&str> = here.lines().filter_map(|l| l.strip_prefix("fn ")?.strip_suffix("() {")).collect();
     assert!(tests.len() > 5);
     for test in tests.iter().filter(|t| **t != "the_page_names_its_tests") {
@@ -56,7 +57,8 @@ fn fixed_steps_pass_over_what_is_narrower() {
     let pulse = Pulse { height: 300.0, width: 1e-3 };
     let quiet = Pulse { height: 0.0, ..pulse };
     for integrator in [AnyIntegrator::Gauss { stages: 4 }, AnyIntegrator::Splitting(SplittingScheme::STRANG)] {
-        // Four steps: none of their points within forty widths of the pulse. It turns the motion by half a unit.
+        // None of the points of four steps is within forty widths of the pulse, which changes the motion by half a
+        // unit.
         assert_eq!(position(&pulse, integrator, 4), position(&quiet, integrator, 4));
         let seen = position(&pulse, integrator, 20_000) - position(&quiet, integrator, 20_000);
         assert!(seen.abs() > 0.3, "{seen}");
@@ -86,7 +88,7 @@ fn dense_output_has_the_order_of_the_stages_between_the_ends() {
         stepper.advance(1).unwrap();
         (stepper.dense().unwrap().at(at * h).q[0] - (at * h).cos()).abs()
     };
-    // Order 6 at the ends, so 7 for one step; 3 between, so 4.
+    // The order is 6 at the ends, so that the error of one step has order 7; it is 3 between them, so 4.
     let order = |at: f64| (error(0.4, at) / error(0.2, at)).log2();
     assert!((order(1.0) - 8.0).abs() < 0.5 || (order(1.0) - 7.0).abs() < 0.5, "{}", order(1.0));
     assert!((order(0.3) - 4.0).abs() < 0.5, "{}", order(0.3));
@@ -94,7 +96,7 @@ fn dense_output_has_the_order_of_the_stages_between_the_ends() {
 
 #[test]
 fn a_composition_takes_its_rule_on_trust() {
-    // Order 1 and not symmetric: no composition raises it, and nothing says so.
+    // The rectangle rule has order 1 and is not symmetric: no composition raises its order, and there is no error.
     let oscillator = HarmonicOscillator { gamma: 0.0 };
     let error = |steps: usize| {
         let h = 1.0 / steps as f64;
@@ -132,14 +134,14 @@ fn quadrature_rules_have_a_rational_rate() {
     let exact = (-3.0f64).exp();
     let off = |integrator| (factor(integrator) / exact - 1.0).abs();
     assert!(off(AnyIntegrator::Splitting(SplittingScheme::STRANG)) < 1e-14);
-    // (1 + h gamma/2)/(1 - h gamma/2) ten times, and 1 + h gamma ten times.
+    // The factors of ten steps are (1 + h gamma/2)/(1 - h gamma/2), and 1 + h gamma.
     assert!((off(AnyIntegrator::Discrete(Method::Midpoint)) - 0.0229).abs() < 1e-3);
     assert!(off(AnyIntegrator::Discrete(Method::LeftMidpoint)) > 0.4);
 }
 
 #[test]
 fn chaos_outgrows_any_accuracy() {
-    // Not a limit of the library, but of every one: over the time of 40 e-foldings a unit in the last place is everything.
+    // A limit of every integrator: over 40 Lyapunov times a change in the last place grows to the size of the motion.
     let run = |q: f64| {
         let pendulum = DoublePendulum { gamma: 0.0, ..DoublePendulum::default() };
         let start = VelocityPoint::new([q, 2.0], [0.0, 0.0], 0.0);

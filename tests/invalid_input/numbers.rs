@@ -1,11 +1,11 @@
-//! Numbers that no one means, and what becomes of them.
+//! Invalid and extreme numbers, and the report on what functions return for them.
 
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{ChartVector, DiscretePoint, Dual, PhasePoint, Scalar, Structure, VelocityPoint};
 
-/// What stands in for a coordinate, a time, a step.
-pub const HOSTILE: [f64; 16] = [
+/// The values that replace a coordinate, a time or a step.
+pub const EXTREME: [f64; 16] = [
     f64::NAN,
     f64::INFINITY,
     f64::NEG_INFINITY,
@@ -24,27 +24,27 @@ pub const HOSTILE: [f64; 16] = [
     -f64::MAX,
 ];
 
-/// A tame value in the place of each coordinate.
+/// An ordinary value of each coordinate.
 pub const BASE: [f64; 3] = [0.3, 0.7, 0.2];
 
-/// Triples with one coordinate, or all, of a hostile value.
+/// Triples with an extreme value in one coordinate, or in all.
 pub fn triples() -> Vec<ChartVector<1>> {
     let of = |c: [f64; 3]| ChartVector { x: [c[0]].into(), y: [c[1]].into(), z: c[2] };
     let mut all = vec![of(BASE)];
-    for value in HOSTILE {
+    for value in EXTREME {
         all.extend((0..3).map(|i| of(std::array::from_fn(|j| if i == j { value } else { BASE[j] }))));
         all.push(of([value; 3]));
     }
     all
 }
 
-/// Times with triples: one of both tame.
+/// Times with triples, one of which is ordinary.
 pub fn places() -> Vec<(f64, ChartVector<1>)> {
     let tame = triples()[0];
-    HOSTILE.iter().map(|t| (*t, tame)).chain(triples().into_iter().map(|x| (0.4, x))).collect()
+    EXTREME.iter().map(|t| (*t, tame)).chain(triples().into_iter().map(|x| (0.4, x))).collect()
 }
 
-/// How bad numbers are.
+/// The size of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
     /// Finite, and far from overflow in any power that a formula takes.
@@ -66,10 +66,10 @@ pub fn grade(numbers: &impl Numbers) -> Grade {
     }
 }
 
-/// What was found, by the attack at work.
+/// The failed checks of each entry point.
 #[derive(Default)]
 pub struct Report {
-    pub on: String,
+    pub entries: String,
     found: Vec<String>,
     checks: usize,
 }
@@ -78,13 +78,13 @@ impl Report {
     pub fn check(&mut self, good: bool, what: impl FnOnce() -> String) {
         self.checks += 1;
         if !good {
-            let text = format!("{}: {}", self.on, what());
+            let text = format!("{}: {}", self.entries, what());
             self.found.push(text);
         }
     }
 
-    /// A formula: it hands on what is not a number, or refuses it, and is finite where its input is tame. Of an infinite one it
-    /// may be finite: `e^x` vanishes at minus infinity.
+    /// A formula: it returns a number that is not finite for a NaN, or refuses it, and is finite for ordinary input.
+    /// For infinite input it may be finite: `e^x` vanishes at minus infinity.
     pub fn formula<E: std::fmt::Display>(
         &mut self,
         input: &(impl Numbers + std::fmt::Debug),
@@ -92,7 +92,6 @@ impl Report {
     ) {
         let output = match output {
             Ok(output) => output.numbers(),
-            // It says something.
             Err(error) => return self.check(!error.to_string().is_empty(), || "an error without words".into()),
         };
         let finite = output.iter().all(|x| x.is_finite());
@@ -104,8 +103,8 @@ impl Report {
         self.check(good, || format!("{input:?} leads to {output:?}"));
     }
 
-    /// A door that refuses what is not finite, and answers with finite numbers or an error.
-    pub fn door<E: std::fmt::Display>(
+    /// An entry point that refuses input that is not finite, and returns finite numbers or an error.
+    pub fn entry_point<E: std::fmt::Display>(
         &mut self,
         input: &(impl Numbers + std::fmt::Debug),
         output: Result<impl Numbers, E>,
@@ -129,12 +128,12 @@ impl Report {
     }
 }
 
-/// A result that nothing can be wrong with.
+/// The result of a function that does not fail.
 pub fn fine<T>(value: T) -> Result<T, String> {
     Ok(value)
 }
 
-/// All the numbers in a thing.
+/// All numbers in a value.
 pub trait Numbers {
     fn numbers(&self) -> Vec<f64>;
 }
@@ -217,7 +216,7 @@ impl<A: Numbers, B: Numbers, C: Numbers> Numbers for (A, B, C) {
     }
 }
 
-/// A system in which everything depends on everything: `W`, the force and the rate on t, q, v and z.
+/// A system whose `W`, force and rate depend on t, q, v and z.
 #[derive(Clone, Copy, Debug)]
 pub struct Everything;
 
@@ -230,7 +229,7 @@ impl Lagrangian<1> for Everything {
     }
 }
 
-/// A pendulum that claims what it is.
+/// A pendulum that declares its structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Claiming;
 

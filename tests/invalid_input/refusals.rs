@@ -1,23 +1,26 @@
-//! Bad input is a typed error before the first step; what goes wrong later is a status that keeps what was computed. The sentences of
-//! all errors, and input that is not a number, are those of `tests/hostile.rs`.
+//! Invalid input is a typed error before the first step; a failure later is a status that keeps what was computed.
 
+use crate::common::lagrangians::{Bratu, Explosive, Massless};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Flow, InputError, Method, Midpoint, Outcome, Problem, Rectangle, Row, Rows,
-    Status, StepError, Steps, Until,
+    AnyIntegrator, DiscreteLagrangian, InputError, Outcome, Problem, Row, Rows, Status, StepError, Steps, Until,
+    rules::{Flow, Method, Midpoint, Rectangle},
 };
-use exact_lagrangian::{ContactExponential, Curve, ExactError, ExactLagrangian, SplineCurve, compose, error_orders};
+use exact_lagrangian::{
+    ContactExponential, ExactError, ExactLagrangian, compose, error_orders,
+    principle::{Curve, SplineCurve},
+};
 
-/// Equal points are bad input only where a discrete Lagrangian is singular on the diagonal.
+/// Equal points are invalid only where a discrete Lagrangian is singular on the diagonal.
 #[test]
 fn equal_points() {
     let ld = Rectangle::new(FreeParticle::default(), 0.1).unwrap();
     assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
 }
 
-/// A run of a rule by so many steps of a size from t = 0, with a row of each.
+/// A run of a rule by a number of steps of a size from t = 0, with a row of each.
 fn every_step(
     lagrangian: &impl Lagrangian<1>,
     start: PhasePoint<1>,
@@ -35,7 +38,7 @@ fn all_finite(rows: &[Row<1>]) -> bool {
     rows.iter().all(|row| [row.t, row.q[0], row.p[0], row.z.unwrap_or(f64::NAN)].iter().all(|x| x.is_finite()))
 }
 
-/// sigma_d crosses zero in mid-run: a status with the step, and every row before it.
+/// Where sigma_d crosses zero during a run, the status has the step, and every row before it is kept.
 #[test]
 fn sigma_crosses_zero() {
     struct GrowingDrag;
@@ -54,17 +57,11 @@ fn sigma_crosses_zero() {
     assert!(all_finite(&rows));
 }
 
-/// Motion that blows up ends with a status, not with a NaN: `z' = z^2` leaves the real line at t = 1.
+/// Motion that blows up ends with a status and not with a NaN: `z' = z^2` has a pole at t = 1.
 #[test]
 fn blow_up() {
-    struct Explosive;
-    impl Lagrangian<1> for Explosive {
-        fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 + z * z
-        }
-    }
     let start = PhasePoint::new([0.0], [0.1], 1.0);
-    // Explicit in z and implicit.
+    // A rule that is explicit in z, and one that is implicit.
     for method in [Method::LeftMidpoint, Method::Midpoint] {
         let (Outcome { status, .. }, rows) = every_step(&Explosive, start, method, (0.01, 400));
         let failed = matches!(status, Status::Failed { step, .. } if step + 1 == rows.len());
@@ -73,7 +70,7 @@ fn blow_up() {
     }
 }
 
-/// The exact side: steps, points, a singular W, equal points where no motion joins them.
+/// The exact flow and retraction: steps, points, a singular W, equal points.
 #[test]
 fn exact_input() {
     for h in [0.0, -0.5, f64::INFINITY] {
@@ -91,32 +88,21 @@ fn exact_input() {
     let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
     let bad = exp.retract(0.0, &DiscretePoint::new([0.1], [f64::NAN], 0.0));
     assert!(matches!(bad, Err(ExactError::Input(InputError::Geometry(GeometryError::NonFinite { what: "q1", .. })))));
-    struct Massless;
-    impl Lagrangian<1> for Massless {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * q[0] + z
-        }
-    }
     let exp = ContactExponential::new(Massless, 0.5).unwrap();
     let singular = exp.retract(0.0, &DiscretePoint::new([0.1], [0.2], 0.0));
     let ok = matches!(singular, Err(ExactError::Input(InputError::Geometry(GeometryError::Singular { .. }))));
     assert!(ok, "{singular:?}");
-    // Equal points as such are no bad input: the pendulum at rest joins them.
+    // Equal points are valid: the pendulum at rest joins them.
     let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
     assert!(exp.retract(0.0, &DiscretePoint::new([0.0], [0.0], 0.0)).is_ok_and(|r| r.start.v[0] == 0.0));
 }
 
-/// No motion joins the points: the last one tried is handed on, with its miss and a singular value, and it is finite.
+/// Where no motion joins the points, the error has the last motion tried, its residual and a singular value, which are
+/// finite.
 #[test]
 fn no_motion_between_points() {
-    // Bratu's problem q'' = -6 e^q: beyond h^2 = 3.5/6 no motion joins points near 0.
-    struct Bratu;
-    impl Lagrangian<1> for Bratu {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0].exp() * 6.0 - z * 0.01
-        }
-    }
-    let exp = ContactExponential::new(Bratu, 4.0).unwrap();
+    // Beyond h^2 = 3.5/6 no motion joins points near 0.
+    let exp = ContactExponential::new(Bratu { lambda: 6.0, drag: 0.01 }, 4.0).unwrap();
     let x = DiscretePoint::new([0.0], [0.1], 0.0);
     match exp.retract(0.0, &x) {
         Err(
@@ -133,7 +119,8 @@ fn no_motion_between_points() {
     }
 }
 
-/// Splines: too few nodes, unequal lists, times that do not increase, numbers that are not finite; and times outside.
+/// Splines: too few nodes, lists of unequal length, times that do not increase or are not finite; and times outside of
+/// the nodes.
 #[test]
 fn splines() {
     let points = [0.0, 1.0, 0.5].map(|q| SVector::from([q]));

@@ -1,25 +1,31 @@
-//! Every variant of every error, triggered through the public API: its sentence has the value and the remedy.
+//! Every variant of every error, triggered through the public interface: its message has the value and the remedy.
 
+use crate::common::lagrangians::{Bratu, Explosive, Massless};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{
     DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, TimeTransformation,
-    VelocityPoint, herglotz_field, linear,
+    VelocityPoint, herglotz_field, support::linear,
 };
 use discrete_herglotz::{
-    AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, DividedGauss, End, Event,
-    Events, Flow, Gauss, InputError, Integrator, Interrupt, LeftMidpoint, Method, MethodInfo, Midpoint, Problem,
-    Rectangle, ResumeState, Rows, SelectionFailure, Solver, SplittingScheme, Status, StepError, StepFailure, StepView,
-    Stepper, StepperOptions, Steps, Stop, Strang, UnknownIntegrator, UnknownMethod, UnresolvedStep, Until,
+    AnyIntegrator, Checkpoint, DiscreteLagrangian, DividedGauss, Event, Events, InputError, Integrator, Interrupt,
+    MethodInfo, Problem, ResumeState, Rows, SelectionFailure, SplittingScheme, Status, StepError, StepFailure,
+    StepView, Stepper, StepperOptions, Steps, Stop, UnknownIntegrator, UnresolvedStep, Until,
+    boundary::{BoundaryPath, End},
+    gauss::Gauss,
+    rules::{Composition, Flow, LeftMidpoint, Method, Midpoint, Rectangle, UnknownMethod},
+    solve::Solver,
+    splitting::Strang,
+    theory::DiscretePath,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
 
-/// The variants of an error, each with what triggers it and words of its sentence. A variant that is not here does not
-/// compile.
+/// The variants of an error, each with an expression that triggers it and words of its message. A missing variant does
+/// not compile.
 macro_rules! every {
     ($Error:ty { $($variant:pat => $trigger:expr, $words:expr;)* }) => {
-        // No wildcard: that is the check of completeness.
+        // Without a wildcard the match is complete.
         let _: fn(&$Error) = |error| match error { $($variant => (),)* };
         $(
             let error: $Error = $trigger;
@@ -36,21 +42,13 @@ fn pendulum_at(p: f64) -> PhasePoint<1> {
     PhasePoint::new([0.3], [p], 0.1)
 }
 
-/// A drag that turns the factor of a step of 0.1 negative.
+/// A drag that makes the conformal factor of a step of 0.1 negative.
 fn strong() -> LeftMidpoint<FreeParticle> {
     LeftMidpoint::new(FreeParticle { gamma: -20.0 }, 0.1).unwrap()
 }
 
-/// `z' = z^2` leaves the real line at t = 1.
-struct Explosive;
-
-impl Lagrangian<1> for Explosive {
-    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + z * z
-    }
-}
-
-/// A Lagrangian that jumps where its velocity passes 1/2, and one whose switching function has another sign whenever it is asked for.
+/// A Lagrangian that jumps where its velocity passes 1/2, and one whose switching function changes its sign at every
+/// evaluation.
 enum Switching {
     Fast,
     Restless(std::cell::Cell<bool>),
@@ -83,7 +81,7 @@ impl Switching {
     }
 }
 
-/// Switching functions that are not stated.
+/// Switching functions that are not declared.
 struct Unstated;
 
 impl Lagrangian<1> for Unstated {
@@ -95,16 +93,7 @@ impl Lagrangian<1> for Unstated {
     }
 }
 
-/// No W.
-struct Massless;
-
-impl Lagrangian<1> for Massless {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * q[0] + z
-    }
-}
-
-/// A spring that is harder on one side, by a look at a number.
+/// A spring whose stiffness depends on the sign of q - 0.3, by a comparison of numbers.
 struct Branching;
 
 impl Lagrangian<1> for Branching {
@@ -114,10 +103,10 @@ impl Lagrangian<1> for Branching {
     }
 }
 
-/// Claims to be quadratic, and is not.
-struct Liar;
+/// Declares to be quadratic, and is not.
+struct FalselyQuadratic;
 
-impl Lagrangian<1> for Liar {
+impl Lagrangian<1> for FalselyQuadratic {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 + q[0].powi(3) - z * 0.1
     }
@@ -126,10 +115,10 @@ impl Lagrangian<1> for Liar {
     }
 }
 
-/// Claims to be quadratic, which it is to its last digit where its motion starts.
-struct Later;
+/// Declares to be quadratic, which holds to the last digit where the motion starts.
+struct QuadraticAtFirst;
 
-impl Lagrangian<1> for Later {
+impl Lagrangian<1> for QuadraticAtFirst {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - (q[0] - 2.0).max(T::from(0.0)).powi(3) - z * 0.1
     }
@@ -167,12 +156,12 @@ impl DiscreteLagrangian<1> for Length {
     }
 }
 
-/// An integrator with no more than what it must have.
-struct Forgetful;
+/// An integrator with the required functions alone.
+struct Minimal;
 
 struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
 
-impl<'a> Integrator<'a, Pendulum, 1> for Forgetful {
+impl<'a> Integrator<'a, Pendulum, 1> for Minimal {
     fn info(&self) -> MethodInfo {
         MethodInfo::of_discrete::<1>("forgetful", 2)
     }
@@ -241,7 +230,7 @@ fn input_errors() {
         }, ["not the one that was interrupted", "same problem"];
         InputError::Unsaved => {
             let mut saved = Checkpoint::every(1, std::env::temp_dir().join("never_written")).unwrap();
-            problem.by(Forgetful).steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap_err()
+            problem.by(Minimal).steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap_err()
         }, ["cannot be saved", "leave the checkpoint out", "`restore`"];
         InputError::Times { .. } => {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
@@ -270,7 +259,7 @@ fn input_errors() {
         InputError::Unclaimed { .. } => {
             Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
         }, ["separable", "claim it", "another method"];
-        InputError::FalseClaim { .. } => Problem::new(&Liar, 0.0, start).err().unwrap(), ["quadratic", "is not", "size"];
+        InputError::FalseClaim { .. } => Problem::new(&FalselyQuadratic, 0.0, start).err().unwrap(), ["quadratic", "is not", "size"];
         InputError::SwitchingUnstated => {
             let problem = Problem::new(&Unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
             problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
@@ -286,20 +275,20 @@ fn input_errors() {
     });
 }
 
-/// Systems on which accuracies are not reached; of one type, since each is compiled with every integrator.
+/// Systems for which an accuracy is not reached; one type, since each type is compiled with every integrator.
 enum Odd {
     /// A force that jumps at q = 0.
     Jumping,
-    /// A drive faster than any step that can be tried.
+    /// A drive faster than all steps that are tried.
     Kicked,
     /// `z' = z^2`.
     Explosive,
-    /// Duffing's, driven into chaos.
+    /// Duffing's oscillator, driven into chaos.
     Chaotic,
     /// A potential with a step at q = 3.
     Stepped,
     /// A force that begins at t = 1.
-    ConsistentStart,
+    DelayedForce,
 }
 
 impl Lagrangian<1> for Odd {
@@ -311,12 +300,12 @@ impl Lagrangian<1> for Odd {
             Odd::Kicked => kinetic - square * square + (t * 1e12).sin() * q[0] * 1e12,
             Odd::Explosive => kinetic + z * z,
             Odd::Stepped => kinetic + q[0] - ((q[0] - 3.0) * 1e10).tanh() * 0.0015,
-            Odd::ConsistentStart => kinetic + T::from(1.0).if_less(t, q[0] * (t - 1.0) * 100.0, T::from(0.0)),
+            Odd::DelayedForce => kinetic + T::from(1.0).if_less(t, q[0] * (t - 1.0) * 100.0, T::from(0.0)),
             Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
         }
     }
     fn structure(&self) -> Structure {
-        let Odd::ConsistentStart = self else { return Structure::default() };
+        let Odd::DelayedForce = self else { return Structure::default() };
         Structure {
             z_free: true,
             z_affine: true,
@@ -328,11 +317,11 @@ impl Lagrangian<1> for Odd {
     }
 }
 
-/// What stands in the way of an accuracy, and the sentence that says so.
+/// The reasons for which an accuracy is not reached, and their messages.
 #[test]
-fn obstacles() {
+fn selection_failures() {
     let start = VelocityPoint::new([1.0], [0.0], 1.0);
-    let obstacle = |system: &Odd, by: &str, span: f64, wanted: f64| {
+    let failure = |system: &Odd, by: &str, span: f64, wanted: f64| {
         let problem = Problem::new(system, 0.0, start).unwrap();
         let run = problem.by(by.parse::<AnyIntegrator>().unwrap()).accuracy(wanted);
         match run.plan(Until::Time(span)).err() {
@@ -341,14 +330,14 @@ fn obstacles() {
         }
     };
     every!(SelectionFailure {
-        SelectionFailure::RoundOff => obstacle(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
-        SelectionFailure::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
-        SelectionFailure::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
-        SelectionFailure::Misfit { .. } => obstacle(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        SelectionFailure::Hidden { .. } => obstacle(&Odd::ConsistentStart, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
-        SelectionFailure::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
-        SelectionFailure::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
-        SelectionFailure::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
+        SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
+        SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
+        SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
+        SelectionFailure::Misfit { .. } => failure(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
+        SelectionFailure::Hidden { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
+        SelectionFailure::Halted { .. } => failure(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
+        SelectionFailure::Unresolved { .. } => failure(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
+        SelectionFailure::Budget => failure(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
     });
 }
 
@@ -437,8 +426,9 @@ fn statuses() {
             run().observe(&mut fourth).run(Until::Steps(10)).unwrap().status
         }, ["stopped by a weary observer", "at t = 0.4", "in step 4"];
         Status::FalseClaim { .. } => {
-            // A cubic force that is nothing before q = 2, where the motion comes to after the steps that are tried before a run.
-            let problem = Problem::new(&Later, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
+            // A cubic force that vanishes for q < 2, which the motion reaches after the steps that are tried before a
+            // run.
+            let problem = Problem::new(&QuadraticAtFirst, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
             problem.steps(Steps::Count(1000)).run(Until::Time(10.0)).unwrap().status
         }, ["unreliable: after step ", "not quadratic", "correct its structure"];
         Status::Failed { .. } => {
@@ -446,7 +436,7 @@ fn statuses() {
             run.run(Until::Steps(4000)).unwrap().status
         }, ["failed in step", "at t = ", "without bound"];
     });
-    // The ways in which a run with events ends; what was found before is kept.
+    // The ways in which a run with events ends; events that were found before are kept.
     let run = |event: Event<'_, 1>, steps| {
         let mut events = Events::new([event]);
         let run = blows_up.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(0.1)).observe(&mut events);
@@ -476,10 +466,10 @@ fn geometry_errors() {
         GeometryError::Undefined { .. } => {
             let ld = Rectangle::new(Explosive, 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
-            discrete_herglotz::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
+            discrete_herglotz::theory::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];
     });
-    // The remedy is named, not left to the reader.
+    // The message names the remedy.
     let sentence = Symmetry::<2>::rotation(0, 2).unwrap_err().to_string();
     assert!(sentence.contains("plane of rotation") && sentence.contains("dimension 2"), "{sentence}");
     let mut singular = (DMatrix::<f64>::zeros(2, 2), contact_geom::nalgebra::DVector::zeros(2));
@@ -491,12 +481,6 @@ fn geometry_errors() {
 
 #[test]
 fn exact_errors() {
-    struct Bratu;
-    impl Lagrangian<1> for Bratu {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0].exp() * 6.0 - z * 0.01
-        }
-    }
     let oscillator = HarmonicOscillator { gamma: 0.0 };
     every!(ExactError<1> {
         ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite number", "positive"];
@@ -507,7 +491,7 @@ fn exact_errors() {
             herglotz_flow(&oscillator, 0.0, &VelocityPoint::new([1.0], [0.0], 0.0), 1e9).unwrap_err()
         }, ["t = ", "go on from there"];
         ExactError::NotConverged { .. } => {
-            let exp = ContactExponential::new(Bratu, 0.8).unwrap();
+            let exp = ContactExponential::new(Bratu { lambda: 6.0, drag: 0.01 }, 0.8).unwrap();
             exp.retract(0.0, &DiscretePoint::new([0.0], [0.1], 0.0)).unwrap_err()
         }, ["no motion", "misses", "pass a guess"];
         ExactError::ConjugatePoint { .. } => {

@@ -1,11 +1,11 @@
-//! The choice of steps for a wanted accuracy: what is refused, and what comes to rest.
+//! The choice of steps for a requested accuracy: motions that are refused, and motions that come to rest.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, SelectionFailure, Status, Until};
 use std::time::Instant;
 
-/// A whole run from t = 0 by an integrator and steps for an accuracy.
+/// A whole run from t = 0 by an integrator with steps for an accuracy.
 fn run_to<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     start: VelocityPoint<N>,
@@ -23,13 +23,13 @@ struct Line {
 }
 
 enum Potential {
-    /// A jump, so narrow that no gradient sees it.
+    /// A jump so narrow that no gradient is evaluated in it.
     Jump { at: f64, height: f64 },
-    /// `|q|`, a kink, where no rule of quadrature has its order.
+    /// `|q|`, with a kink at which no quadrature rule has its order.
     Kink,
-    /// A well beside the origin, where damped motions come to rest.
+    /// A well away from the origin, in which damped motions come to rest.
     Well,
-    /// `-q^4`: motions leave all numbers in a finite time.
+    /// `-q^4`: motions blow up in a finite time.
     Pole,
 }
 
@@ -61,11 +61,12 @@ fn at(q: f64, v: f64) -> VelocityPoint<1> {
     VelocityPoint::new([q], [v], 0.0)
 }
 
-/// Runs on both sides of a jump agree to the last digit; the values of L tell, in a step and between two.
+/// Runs on both sides of a jump agree to the last digit; the jump shows in the values of L, within a step and between
+/// two.
 #[test]
 fn jumps_of_the_potential_are_refused() {
     for i in 0..64 {
-        // Some of them where steps end.
+        // Some of the jumps are at the ends of steps.
         let place = if i % 4 == 0 { 10.0 * (i + 1) as f64 / 64.0 } else { 0.5 + 0.137 * i as f64 };
         let height = [-0.8, -0.02, 0.003, 0.3][i / 4 % 4];
         let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } };
@@ -74,23 +75,23 @@ fn jumps_of_the_potential_are_refused() {
             Err(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{place}, {height}: {:?}", other.map(|plan| plan.count())),
         };
-        let told = matches!(
+        let reported = matches!(
             cause,
             SelectionFailure::Order { .. } | SelectionFailure::Misfit { .. } | SelectionFailure::Unresolved { .. }
         );
-        assert!(told, "{place}, {height}: {cause:?}");
+        assert!(reported, "{place}, {height}: {cause:?}");
     }
 }
 
-/// Steps that end where the motion passes a kink by chance are exact, and those beside them are not: runs that agree there tell nothing of
-/// other steps.
+/// Steps that end by chance where the motion passes a kink are exact, and other steps are not: agreement of such runs
+/// says nothing about other steps.
 #[test]
 fn kinks_are_met_or_refused() {
     let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Kink };
     let mut met = 0;
     for wanted in [1e-3, 1e-6, 1e-9] {
         for j in 1..=10 {
-            // The motion is of parabolas of duration 2 between the passages at `first` + 2n.
+            // The motion consists of parabolas of duration 2 between the passages at `first` + 2n.
             let first = 0.5f64.powi(j);
             let start = at(0.5 * first * first - first, 1.0 - first);
             for span in [8.0, 32.0] {
@@ -105,33 +106,34 @@ fn kinks_are_met_or_refused() {
     assert!(met > 0);
 }
 
-/// A motion that has come to rest, up to its round-off, is followed on.
+/// A motion that has come to rest, up to round-off, is continued to the end of the span.
 #[test]
 fn motions_that_come_to_rest_are_followed() {
     let line = Line { gamma: -0.89, swing: 0.0, potential: Potential::Well };
     for span in [40.0, 90.0, 400.0] {
         let outcome = run_to(&line, at(0.3, -0.5), span, 1e-8).unwrap();
         assert_eq!(outcome.status, Status::Completed, "{span}");
-        // At the bottom of the well: its force there is round-off.
+        // The minimum of the well, where the force is round-off.
         let x = VelocityPoint::new([outcome.q[0]], [outcome.p[0]], 0.0);
         let force = line.gradient(0.0, &x).x[0];
         assert!(span < 90.0 || (force.abs() <= 1e-14 && outcome.p[0].abs() <= 1e-14), "{span}: {force:e}, {outcome:?}");
     }
 }
 
-/// What is at rest stays there, while z goes on.
+/// A position at rest stays at rest, while z changes.
 #[test]
 fn rest_is_followed() {
     let line = Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole };
     let start = VelocityPoint::new([0.0], [0.0], -0.98);
     let outcome = run_to(&line, start, 20.0, 1e-8).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.p[0]), (Status::Completed, 0.0, 0.0));
-    // z' = gamma (1 + cos t) z. The accuracy is not that of z, but steps that do not resolve it to a twentieth are refused.
+    // z' = gamma (1 + cos t) z. The accuracy does not apply to z, but steps that do not resolve it to a twentieth are
+    // refused.
     let z = -0.98 * (-0.25 * (20.0 + 20.0f64.sin())).exp();
     assert!(outcome.z.is_some_and(|found| (found - z).abs() <= 0.05 * z.abs()), "{:?}, not {z}", outcome.z);
 }
 
-/// A singularity is found to be one in bounded work, by whatever method.
+/// A singularity is recognised in bounded work, by every method.
 #[test]
 fn singularities_end_the_search_soon() {
     let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Pole };
@@ -150,12 +152,13 @@ fn singularities_end_the_search_soon() {
             ),
             "{refused:?}"
         );
-        // Of ten that are allowed on a busy core.
+        // Half of the ten seconds that are allowed on a busy core.
         assert!(clock.elapsed().as_secs_f64() < 5.0, "{integrator}: {:?}", clock.elapsed());
     }
 }
 
-/// Where a motion decays below the normal numbers, to a few units of the smallest, runs differ by roundings and are not chaotic.
+/// Where a motion decays below the normal numbers, to a few units of the smallest, runs differ by rounding and not by
+/// chaos.
 #[test]
 fn what_decays_below_the_numbers_is_rounded() {
     let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };

@@ -1,11 +1,11 @@
-//! Claims that hold where a motion begins, and not where it goes.
+//! Declared structure that holds at the start of a motion, and not along it.
 
-use super::rest::Draws;
+use super::draws::Draws;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Status, Steps, Until};
 
-/// What a bump at `10 < q < 16` changes.
+/// The term that a bump at `10 < q < 16` changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bumped {
     Drag,
@@ -16,11 +16,11 @@ enum Bumped {
 #[derive(Clone, Copy, Debug)]
 struct Bump {
     of: Bumped,
-    /// Its place and its half width.
+    /// Its centre and half width.
     at: f64,
     half: f64,
     height: f64,
-    /// Whether it has edges.
+    /// Whether it has a jump at its edges.
     plateau: bool,
     slope: f64,
 }
@@ -30,7 +30,7 @@ impl Lagrangian<1> for Bump {
         let u = (q[0] - self.at) * self.half.recip();
         let room = -(u * u) + 1.0;
         let zero = T::from(0.0);
-        // A function with all its derivatives, and a number.
+        // A smooth function, or a constant.
         let inside = if self.plateau { T::from(1.0) } else { (-(room.recip()) + 1.0).exp() };
         let bump = zero.if_less(room, inside, zero) * self.height;
         let kinetic = v[0] * v[0] * 0.5;
@@ -54,7 +54,7 @@ impl Lagrangian<1> for Bump {
 }
 
 #[test]
-fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
+fn claims_that_are_false_beyond_the_start_are_found_along_the_motion() {
     let (mut silent, mut seen, mut other) = (Vec::new(), 0, 0);
     let integrators: Vec<_> = AnyIntegrator::all();
     for case in 0..500 {

@@ -1,14 +1,15 @@
-//! Steps that are far too long are marked or refused, by every integrator; and what must not decide about them.
+//! Steps that are far too long are flagged as unresolved or refused, by every integrator; and properties that must not
+//! affect this.
 
 use crate::run_of;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, max_or_nan};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{
-    AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, Stepper, Steps, UnresolvedStep,
+    AnyIntegrator, InputError, SplittingScheme, Status, Stepper, Steps, UnresolvedStep, gauss::Gauss, rules::Method,
 };
 
-/// How a run of three given steps ends, and its mark; where it begins.
+/// The outcome of a run of three given steps, and its unresolved step.
 fn run<L: Lagrangian<1>>(
     system: &L,
     integrator: AnyIntegrator,
@@ -19,10 +20,11 @@ fn run<L: Lagrangian<1>>(
     Ok((outcome.status, outcome.unresolved))
 }
 
-/// 0.4 radians in each step or, of many stages, 0.2 in each stage, are followed by all, a quarter of that with order one; and nobody
-/// follows 40, or two and a half a stage of Gauss' methods: the longest schemes have some twenty substeps.
+/// Every integrator resolves steps of 0.4 radians or, with many stages, of 0.2 in each stage, and a quarter of that
+/// with order one; and none resolves 40, or two and a half for each stage of Gauss' methods: the longest schemes have
+/// some twenty substeps.
 fn every_integrator<L: Lagrangian<1>>(system: &L) {
-    let (mut marked, mut of_all) = (0, 0);
+    let (mut flagged, mut of_all) = (0, 0);
     for integrator in AnyIntegrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok()) {
         let (parts, coarse) = match integrator {
             AnyIntegrator::Gauss { stages } => (max_or_nan(0.5 * stages as f64, 1.0), 2.5 * stages as f64 + 2.5),
@@ -32,24 +34,24 @@ fn every_integrator<L: Lagrangian<1>>(system: &L) {
         assert_eq!(run(system, integrator, fine), Ok((Status::Completed, None)), "{integrator}, h = {fine}");
         let found = run(system, integrator, coarse);
         assert_ne!(found, Ok((Status::Completed, None)), "{integrator}, h = {coarse}");
-        marked += usize::from(matches!(found, Ok((Status::Completed, _))));
+        flagged += usize::from(matches!(found, Ok((Status::Completed, _))));
         of_all += 1;
     }
-    // Most runs go on, and are marked.
-    assert!(2 * marked > of_all, "{marked} of {of_all}");
+    // Most runs are completed, and flagged.
+    assert!(2 * flagged > of_all, "{flagged} of {of_all}");
 }
 
 #[test]
-fn coarse_steps_of_a_linear_motion_are_marked() {
+fn coarse_steps_of_a_linear_motion_are_flagged() {
     every_integrator(&OneCoordinate::from(HarmonicOscillator { gamma: -0.01 }));
 }
 
 #[test]
-fn coarse_steps_of_a_pendulum_are_marked() {
+fn coarse_steps_of_a_pendulum_are_flagged() {
     every_integrator(&OneCoordinate::from(Pendulum { gamma: -0.01 }));
 }
 
-/// `-v^2/6 + 2 q^4`, a force that grows without bound: long steps are solved by Newton's method, or not at all.
+/// `-v^2/6 + 2 q^4`, a force that grows without bound: long steps are solved by Newton's method, or have no solution.
 struct Runaway;
 
 impl Lagrangian<1> for Runaway {
@@ -62,7 +64,7 @@ impl Lagrangian<1> for Runaway {
     }
 }
 
-/// The action does not act back: whether it is computed decides neither the motion nor where it ends.
+/// Where the motion does not depend on the action, computing the action changes neither the motion nor its end.
 #[test]
 fn the_action_does_not_decide_where_a_run_ends() {
     let mut by_newton = 0;
@@ -80,8 +82,8 @@ fn the_action_does_not_decide_where_a_run_ends() {
     assert!(by_newton > 0);
 }
 
-/// The velocity at the start is that of the momentum, from whatever guess: also from one whose difference from it has no digits
-/// left.
+/// The velocity at the start is that of the momentum for any guess, also for one so large that its difference from the
+/// velocity has lost all digits.
 #[test]
 fn a_guess_of_the_velocity_may_be_of_any_size() {
     let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma: -0.01 }), 8, 0.1).unwrap();
@@ -92,7 +94,7 @@ fn a_guess_of_the_velocity_may_be_of_any_size() {
     };
     for guess in [0.0, -5.0, 1e10, 1e160] {
         let (found, right) = (end(guess), end(0.4));
-        // A rounding or two of numbers below one.
+        // One or two roundings of numbers below one.
         assert!(
             (found.q - right.q).norm() + (found.p - right.p).norm() <= 4.0 * f64::EPSILON,
             "from {guess:e}: {found:?}"
@@ -115,21 +117,21 @@ impl Lagrangian<1> for Kinked {
     }
 }
 
-/// The integrators whose steps tell nothing between their nodes.
-fn blind() -> impl Iterator<Item = AnyIntegrator> {
-    let looks =
+/// The integrators without a check of the motion between their nodes.
+fn without_check_between_nodes() -> impl Iterator<Item = AnyIntegrator> {
+    let checked =
         |i: &AnyIntegrator| matches!(i, AnyIntegrator::Gauss { stages: 3.. } | AnyIntegrator::TransformedGauss { .. });
-    AnyIntegrator::all().into_iter().filter(move |i| !looks(i))
+    AnyIntegrator::all().into_iter().filter(move |i| !checked(i))
 }
 
-/// A force that jumps by a tenth of the velocity in a step is seen, wherever in the run and in the step it jumps.
+/// A force that jumps by a tenth of the velocity in a step is noticed, wherever in the run and in the step it jumps.
 #[test]
-fn no_energy_is_lost_over_a_kink_in_silence() {
+fn an_error_of_the_energy_at_a_kink_is_flagged() {
     let (mut lost, mut kept) = (Vec::new(), 0);
     for (at, slope) in [(0.3, 1.0), (0.0, 5.0), (-0.2, 100.0)] {
         let system = Kinked { at, slope };
         let energy = |q: f64, p: f64| 0.5 * (p * p + q * q) + slope * (q - at).abs();
-        for (integrator, count) in blind().flat_map(|i| [10, 50, 200].map(|n| (i, n))) {
+        for (integrator, count) in without_check_between_nodes().flat_map(|i| [10, 50, 200].map(|n| (i, n))) {
             let start = VelocityPoint::new([1.0], [0.0], 0.0);
             let run = run_of(&system, start, 3.0, integrator, Steps::Count(count));
             let Ok(end) = run else { continue };
@@ -145,33 +147,35 @@ fn no_energy_is_lost_over_a_kink_in_silence() {
         }
     }
     assert!(lost.is_empty(), "{} lost, {kept} kept: {lost:?}", lost.len());
-    // Short steps are not marked, but where the energy is off by a hundredth of the kinetic one.
+    // Short steps are flagged only where the error of the energy is a hundredth of the kinetic energy.
     assert!(kept > 30, "{kept}");
 }
 
-/// A revolution of a thin orbit, whose passage of the centre is over in a step or two.
+/// A revolution of an eccentric orbit, whose passage of the centre takes one or two steps.
 #[test]
-fn a_centre_that_is_passed_in_a_step_is_marked() {
+fn a_centre_that_is_passed_in_a_step_is_flagged() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
-    let (mut silent, mut marked) = (Vec::new(), 0);
+    let (mut silent, mut flagged) = (Vec::new(), 0);
     for e in [0.9, 0.97, 0.99, 0.999] {
         let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
-        for (integrator, count) in blind().flat_map(|i| (20..40).step_by(3).chain([32]).map(move |n| (i, n))) {
+        for (integrator, count) in
+            without_check_between_nodes().flat_map(|i| (20..40).step_by(3).chain([32]).map(move |n| (i, n)))
+        {
             let end = run_of(&system, start, std::f64::consts::TAU, integrator, Steps::Count(count));
             let Ok(end) = end else { continue };
-            marked += u32::from(end.unresolved.is_some());
+            flagged += u32::from(end.unresolved.is_some());
             let off = (end.q - start.q).norm() + (end.p - start.v).norm();
             if (end.status, end.unresolved) == (Status::Completed, None) && off > 0.3 {
                 silent.push((e, integrator.to_string(), count, off));
             }
         }
     }
-    assert!(silent.is_empty() && marked > 100, "{marked} marked, {}: {silent:?}", silent.len());
+    assert!(silent.is_empty() && flagged > 100, "{flagged} flagged, {}: {silent:?}", silent.len());
 }
 
-/// Steps that resolve the motion raise doubts where they are long, and no mark.
+/// Long steps that resolve the motion give suspect intervals, which are checked and not flagged.
 #[test]
-fn a_doubt_is_no_mark() {
+fn a_suspect_interval_is_not_flagged() {
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
     let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for integrator in AnyIntegrator::all().into_iter().filter(|i| i.order() > 1 && i.check::<1, _>(&system).is_ok()) {
@@ -191,7 +195,7 @@ fn a_doubt_is_no_mark() {
     }
 }
 
-/// A pendulum by `sin(q + pi/2)`, whose forces beside the origin are rounded like those at pi/2.
+/// A pendulum by `sin(q + pi/2)`, whose forces near the origin have the rounding of numbers near pi/2.
 struct Shifted;
 
 impl Lagrangian<1> for Shifted {
@@ -210,9 +214,9 @@ impl Lagrangian<1> for Shifted {
     }
 }
 
-/// What has come to rest beside the origin moves by its rounding alone, which is no motion to be resolved.
+/// A motion that has come to rest near the origin moves by rounding alone, which is no motion to be resolved.
 #[test]
-fn a_motion_at_rest_is_not_marked() {
+fn a_motion_at_rest_is_not_flagged() {
     for scheme in SplittingScheme::ALL {
         for count in [1000, 1024] {
             let start = VelocityPoint::new([1.0], [0.3], 0.0);
@@ -222,14 +226,16 @@ fn a_motion_at_rest_is_not_marked() {
             assert!(end.q[0].abs() < 1e-14, "{}, {:e}", scheme.name(), end.q[0]);
         }
     }
-    // The equations of an implicit step have no solution there, as forces jump from one number to the next: they are solved to that.
+    // The equations of an implicit step have no solution there, as the forces jump from one number to the next: they
+    // are solved up to that.
     let (start, midpoint) = (VelocityPoint::new([1.0], [0.3], 0.0), AnyIntegrator::Discrete(Method::Midpoint));
     let end = run_of(&Shifted, start, 100.0, midpoint, Steps::Count(1000)).unwrap();
     assert_eq!((end.status, end.unresolved), (Status::Completed, None));
     assert!(end.q[0].abs() < 1e-14, "{:e}", end.q[0]);
 }
 
-/// A step that ends at a centre of force has nodes on one side of it alone: what turns the velocity there is compared with halves.
+/// A step that ends at a centre of force has nodes on one side of it alone: the change of the velocity there is
+/// compared with that of half steps.
 #[test]
 fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
@@ -253,7 +259,7 @@ fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
     assert!(silent.is_empty(), "{silent:?} of {lost}");
 }
 
-/// Steps that move by so little that each is rounded in the same way: the sum of many loses none of it.
+/// Steps so short that each is rounded in the same way: the sum of many of them is accurate.
 #[test]
 fn tiny_steps_lose_nothing() {
     let (system, count) = (OneCoordinate::from(Pendulum { gamma: -0.1 }), 1000);
@@ -264,13 +270,13 @@ fn tiny_steps_lose_nothing() {
         // Taylor's series; the time is 1e-7 at most.
         let (t, a) = (h * f64::from(count), -f64::sin(q) - 0.1 * v);
         let (right_q, right_p) = (q + t * (v + 0.5 * t * a), v + t * (a + 0.5 * t * (-f64::cos(q) * v - 0.1 * a)));
-        // A rounding of the start, the end and the series.
+        // The rounding of the start, the end and the series.
         let off = max_or_nan((end.q[0] - right_q).abs(), (end.p[0] - right_p).abs());
         assert!(off <= 4.0 * f64::EPSILON, "{}, h = {h:e}: {off:e}", scheme.name());
     }
 }
 
-/// Two coordinates of which the first has a mass that grows with z, from below zero: the motion ends where it vanishes.
+/// Two coordinates, the first with a mass that grows with z from a negative value: the motion ends where it vanishes.
 struct Massless;
 
 impl Lagrangian<2> for Massless {
@@ -279,12 +285,12 @@ impl Lagrangian<2> for Massless {
     }
 }
 
-/// A step may have a solution beyond the end of its motion, and so may all after it.
+/// The equations of a step may have a solution beyond the end of the motion, and so may those of all later steps.
 #[test]
-fn a_step_past_the_end_of_a_motion_is_marked() {
+fn a_step_past_the_end_of_a_motion_is_flagged() {
     let start = VelocityPoint::new([-0.674, 0.863], [1.348, 0.541], 0.0);
     let (mut silent, mut whole) = (Vec::new(), 0);
-    for integrator in blind() {
+    for integrator in without_check_between_nodes() {
         // The mass vanishes after 0.0017.
         for count in [10, 20, 40] {
             let Ok(end) = run_of(&Massless, start, 1.6, integrator, Steps::Count(count)) else { continue };

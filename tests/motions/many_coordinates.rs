@@ -1,20 +1,26 @@
-//! Systems of many coordinates, in the two mebibytes of stack that a thread of the standard library has.
+//! Systems of many coordinates, in the two mebibytes of stack of a thread of the standard library.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends, System};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, WithoutClosedDerivatives, legendre};
 use discrete_herglotz::{
-    DiscreteLagrangian, Gauss, Midpoint, Solver, Splitting, SplittingScheme, Stepper, check_claims, derived_jet,
-    derived_second_jet,
+    DiscreteLagrangian, SplittingScheme, Stepper,
+    checks::check_claims,
+    gauss::Gauss,
+    rules::Midpoint,
+    solve::Solver,
+    splitting::Splitting,
+    theory::{derived_jet, derived_second_jet},
 };
 
 const MEBIBYTE: usize = 1 << 20;
 
-/// What a step gives for the longest wave of a chain: its amplitude and speed, and how far the sites are from a wave.
+/// The state of the longest wave of a chain: its amplitude and speed, and the distance of the sites from a wave.
 fn wave<const N: usize>(state: &PhasePoint<N>) -> ([f64; 2], f64) {
     let shape = Chain::<N>::default().initial().q;
     let [q, p] = [state.q, state.p].map(|x| x.dot(&shape) / shape.norm_squared());
-    let off = contact_geom::max_abs_or_nan((state.q - shape * q).iter().chain(&(state.p - shape * p)).copied());
+    let off =
+        contact_geom::numbers::max_abs_or_nan((state.q - shape * q).iter().chain(&(state.p - shape * p)).copied());
     ([q, p], off)
 }
 
@@ -39,7 +45,8 @@ fn start<const N: usize>() -> PhasePoint<N> {
     legendre(&chain::<N>(), 0.0, &chain::<N>().initial())
 }
 
-/// What a method of order two may err by in a step: `h^2` times the time's third power of the frequency, below pi/N.
+/// The error of one step of a method of order two: `h^2` times the time and the third power of the frequency, which is
+/// below pi/N.
 fn second<const N: usize>() -> f64 {
     0.1 * (STEP * std::f64::consts::PI / N as f64).powi(2)
 }
@@ -47,7 +54,7 @@ fn second<const N: usize>() -> f64 {
 fn check<const N: usize>(what: &str, steps: f64, state: &PhasePoint<N>, tolerance: f64) {
     let ([q, p], off) = wave(state);
     let [q_exact, p_exact] = exact::<N>(chain::<N>().gamma, steps * STEP);
-    let error = contact_geom::max_abs_or_nan([q - q_exact, p - p_exact]);
+    let error = contact_geom::numbers::max_abs_or_nan([q - q_exact, p - p_exact]);
     assert!(error <= tolerance && off <= 1e-13, "{what}, N = {N}: {error:e}, {off:e} off the wave");
 }
 
@@ -82,7 +89,7 @@ fn collocation_by_newton<const N: usize>() {
     check::<N>("Gauss by Newton's method", 1.0, &step.end, 1e-3 * second::<N>());
 }
 
-/// By the value of L alone: with W at the stages, and nothing claimed.
+/// From the value of L alone: with W at the stages, and no declared structure.
 fn collocation_of_values<const N: usize>() {
     let gauss = Gauss::new(WithoutClosedDerivatives(chain::<N>()), 2, STEP).unwrap();
     let mut run = gauss.stepper(0.0, start(), SVector::zeros()).unwrap();
@@ -90,7 +97,7 @@ fn collocation_of_values<const N: usize>() {
     check::<N>("Gauss by values", 2.0, &run.state(), 1e-3 * second::<N>());
 }
 
-/// Builds, verifies and takes steps by a rule, a splitting and collocation.
+/// Constructs, verifies and takes steps by a rule, a splitting and collocation.
 fn all<const N: usize>() -> [fn(); 6] {
     let gauss: [fn(); 3] = [collocation::<N>, collocation_by_newton::<N>, collocation_of_values::<N>];
     [claims::<N>, rule::<N>, splitting::<N>, gauss[0], gauss[1], gauss[2]]
@@ -111,7 +118,7 @@ fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
     all::<128>().into_iter().for_each(in_small_thread);
 }
 
-/// By blocks of directions as by the Hessian of L.
+/// Jets by blocks of directional derivatives agree with those by the Hessian of L.
 #[test]
 fn derived_jets_of_many_coordinates() {
     const N: usize = 11;
@@ -124,7 +131,7 @@ fn derived_jets_of_many_coordinates() {
     };
     let (jet, second) = (derived_jet(&midpoint, 0.0, &x).unwrap(), derived_second_jet(&midpoint, 0.0, &x).unwrap());
     let closed = midpoint.second_jet(0.0, &x).unwrap();
-    // The terms are of the size of the masses divided by the step, below 10.
+    // The terms are at most the masses divided by the step, below 10.
     let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 100.0 * f64::EPSILON);
     for first in [jet, second.first] {
         let pairs = [(first.d1, closed.first.d1), (first.d2, closed.first.d2)];

@@ -1,21 +1,24 @@
-//! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
+//! Output of runs by every integrator: rows at times, events, runs backward, stopped and resumed runs.
 
 use crate::run_of;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Lagrangian, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Problem, Progress, Quotient, ResumeState, Rows, Run,
     StepView, Steps, Stop, Until,
 };
-use discrete_herglotz::{Gauss, InputError, Method, Outcome, Status};
+use discrete_herglotz::{InputError, Outcome, Status, gauss::Gauss, rules::Method};
 use std::ops::ControlFlow;
 
-/// Every integrator that takes a system.
-fn takers<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = AnyIntegrator> {
+/// Every integrator that accepts a system.
+fn applicable<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = AnyIntegrator> {
     AnyIntegrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok())
 }
 
-/// So many steps up to a time; in transformed time, whose rate is about one, of the same size.
+/// A number of steps up to a time; in transformed time, whose rate is about one, steps of the same size.
 fn steps(integrator: AnyIntegrator, count: usize, span: f64) -> Steps {
     match integrator {
         AnyIntegrator::TransformedGauss { .. } => Steps::Size(span.abs() / count as f64),
@@ -23,7 +26,7 @@ fn steps(integrator: AnyIntegrator, count: usize, span: f64) -> Steps {
     }
 }
 
-/// A run in so many steps up to a time after the start.
+/// A run in a number of steps up to a time after the start.
 fn run_in<'r, 'o, L: Lagrangian<N>, const N: usize>(
     problem: &'r Problem<'r, L, N>,
     integrator: AnyIntegrator,
@@ -44,13 +47,14 @@ fn distance<const N: usize>(a: &PhasePoint<N>, b: &PhasePoint<N>) -> f64 {
     max_or_nan(max_abs_or_nan((a.q - b.q).iter().chain((a.p - b.p).iter()).copied()), (a.z - b.z).abs())
 }
 
-/// There and back again: symmetric integrators return to round-off, others up to the error of their order.
+/// Forward and backward: symmetric integrators return to the start up to round-off, others up to the error of their
+/// order.
 #[test]
 fn there_and_back() {
     fn check<L: Lagrangian<N>, const N: usize>(system: &L, start: VelocityPoint<N>) -> usize {
         let problem = Problem::new(system, 0.5, start).unwrap();
         let mut count = 0;
-        for integrator in takers(system) {
+        for integrator in applicable(system) {
             let by = |problem: &Problem<'_, L, N>, from: f64, to: f64| {
                 problem.by(integrator).steps(steps(integrator, 40, to - from)).run(Until::Time(to)).unwrap()
             };
@@ -59,9 +63,10 @@ fn there_and_back() {
             let back = by(&Problem::new(system, there.t, &there).unwrap(), 2.5, 0.5);
             assert_eq!((back.status, back.unresolved), (Status::Completed, None), "{integrator}");
             assert!((back.t - 0.5).abs() <= 4.0 * f64::EPSILON, "{integrator}: {}", back.t);
-            // Of 80 steps; in transformed time the last step of either way is another, so that the error of the method is left.
-            let clocked = matches!(integrator, AnyIntegrator::TransformedGauss { .. });
-            let rounded = symmetric(integrator) && !clocked;
+            // The rounding of 80 steps; in transformed time the last steps of the two runs differ, so that the error of
+            // the method remains.
+            let transformed = matches!(integrator, AnyIntegrator::TransformedGauss { .. });
+            let rounded = symmetric(integrator) && !transformed;
             let bound = if rounded { 1e-13 } else { 0.5 * f64::powi(0.3, integrator.order().min(24) as i32) + 1e-13 };
             let off = distance(&back.state(), problem.state());
             assert!(off <= bound, "{integrator}: {off:e}");
@@ -76,7 +81,8 @@ fn there_and_back() {
     assert!(check(&kepler, kepler.initial()) > 50);
 }
 
-/// States between the ends of steps have the error of the steps, within ten times; observed or not, the run is the same to the last bit.
+/// States between the ends of steps are as accurate as the steps, within a factor ten; the run is the same to the last
+/// bit with and without observers.
 #[test]
 fn rows_at_times() {
     let (kepler, span) = (Kepler::<2> { mu: 1.0, gamma: -0.05 }, 2.0);
@@ -85,7 +91,7 @@ fn rows_at_times() {
     let times: Vec<f64> = (0..=13).map(|k| span * f64::from(k) / 13.0).collect();
     let truth: Vec<_> = times.iter().map(|t| if *t == 0.0 { None } else { Some(fine(*t).state()) }).collect();
     let problem = Problem::new(&kepler, 0.0, start).unwrap();
-    for integrator in takers(&kepler) {
+    for integrator in applicable(&kepler) {
         let mut rows = Rows::at(times.iter().copied()).unwrap().with_velocity();
         let observed = run_in(&problem, integrator, 40, span).observe(&mut rows).run(Until::Time(span)).unwrap();
         assert_eq!(observed, run_in(&problem, integrator, 40, span).run(Until::Time(span)).unwrap(), "{integrator}");
@@ -101,7 +107,7 @@ fn rows_at_times() {
     }
 }
 
-/// Rows by steps and the last, with columns; a run back records them in its own order.
+/// Rows by steps and at the end, with columns; a run backward records them in its own order.
 #[test]
 fn rows_every_so_many_steps() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
@@ -117,12 +123,13 @@ fn rows_every_so_many_steps() {
     }
 }
 
-/// Velocity, energy and conformal factor at given times: the energy decays as the factor, also between the ends of steps.
+/// Velocity, energy and conformal factor at given times: the energy decays as the factor, also between the ends of
+/// steps.
 #[test]
-fn what_rows_hold() {
+fn columns_of_rows() {
     let system = OneCoordinate::from(QuadraticInZ::default());
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
-    for integrator in takers(&system) {
+    for integrator in applicable(&system) {
         let mut rows = Rows::at((0..=7).map(|k| f64::from(k) / 7.0)).unwrap();
         rows = rows.with_velocity().with_energy().with_conformal_factor();
         let names = ["t", "q0", "v0", "p0", "z", "energy", "log_factor"];
@@ -135,7 +142,7 @@ fn what_rows_hold() {
             let x = VelocityPoint::new([q], [v], z);
             assert!((p - contact_geom::legendre(&system, t, &x).p[0]).abs() <= 4.0 * f64::EPSILON * p.abs());
             assert!((energy - (v * p - system.value(t, &x.q, &x.v, z))).abs() <= 8.0 * f64::EPSILON);
-            // By the order of the steps; by those of order one the energy is off by a step's size.
+            // The error of the order of the steps; for order one the error of the energy is of the size of a step.
             let bound = 4.0 * f64::powi(0.15, integrator.order().min(16) as i32) + 1e-13;
             let off = energy / numbers[0][5] / log_factor.exp() - 1.0;
             assert!(off.abs() <= bound, "{integrator}, t = {t}: {off:e}");
@@ -143,14 +150,15 @@ fn what_rows_hold() {
     }
 }
 
-/// A hundred times at the most, from 0 to 1; in transformed time too, which counts its steps itself.
+/// Progress is reported at most a hundred times, from 0 to 1; also in transformed time, where the run counts its steps
+/// itself.
 #[test]
-fn progress_is_told() {
+fn progress_is_reported() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    // In transformed time the number of steps is not known, and it is told after so many steps.
-    let (gauss, clocked) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::TransformedGauss { stages: 2 });
-    for (integrator, count, least) in [(gauss, 777, 98), (clocked, 7000, 6)] {
+    // In transformed time the number of steps is not known, and progress is reported after a number of steps.
+    let (gauss, transformed) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::TransformedGauss { stages: 2 });
+    for (integrator, count, least) in [(gauss, 777, 98), (transformed, 7000, 6)] {
         let mut parts = Vec::new();
         let mut progress = Progress::new(|part| parts.push(part));
         run_in(&problem, integrator, count, 5.0).observe(&mut progress).run(Until::Time(5.0)).unwrap();
@@ -160,12 +168,13 @@ fn progress_is_told() {
     }
 }
 
-/// Two momenta of one motion decay alike: their quotient is that of the start, by steps of any method; a quotient of others is not.
+/// Two momenta of one motion have the same factor: their quotient is conserved, by steps of any method; other quotients
+/// are not.
 #[test]
 fn quotients_are_conserved() {
     let system = contact_geom::systems::UniformField { field: [0.0, 0.0], gamma: -0.3 };
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0, 0.0], [0.3, 0.7], 0.0)).unwrap();
-    for integrator in takers(&system) {
+    for integrator in applicable(&system) {
         let mut momenta = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1]);
         let mut other = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1] * x.p[1]);
         run_in(&problem, integrator, 30, 3.0).observe(&mut momenta).observe(&mut other).run(Until::Time(3.0)).unwrap();
@@ -175,7 +184,7 @@ fn quotients_are_conserved() {
     }
 }
 
-/// Events by every integrator: as exact as its steps, in both directions, and terminal ones end the run there.
+/// Events by every integrator: as accurate as its steps, in both directions, and terminal ones end the run.
 #[test]
 fn events_by_every_integrator() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
@@ -183,8 +192,8 @@ fn events_by_every_integrator() {
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let lowest = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     let mut first = None;
-    let all: Vec<AnyIntegrator> = takers(&pendulum).collect();
-    // The truth is found by the first of these.
+    let all: Vec<AnyIntegrator> = applicable(&pendulum).collect();
+    // The reference is found by the first integrator.
     let gauss = AnyIntegrator::Gauss { stages: 8 };
     for integrator in [gauss].into_iter().chain(all) {
         let mut passes = Events::new([lowest(), lowest().rising(), lowest().falling()]);
@@ -204,7 +213,7 @@ fn events_by_every_integrator() {
         let crossing = end.crossings[0];
         assert_eq!(stopped.status, Status::Stopped { step: stopped.steps, t: crossing.t, by: "an event" });
         assert_eq!((stopped.t, stopped.state()), (crossing.t, crossing.state), "{integrator}");
-        // From there on, to the same next event: a run in other steps.
+        // A run in other steps from the crossing to the next event.
         let onward = Problem::new(&pendulum, stopped.t, &stopped).unwrap();
         let mut next = Events::new([lowest().rising().terminal()]);
         let rest = 12.0 - stopped.t;
@@ -213,12 +222,12 @@ fn events_by_every_integrator() {
     }
 }
 
-/// The factor of a run that an event ends within a step is that up to there, as of a run to that time.
+/// The factor of a run that an event ends within a step is that of a run to the time of the event.
 #[test]
 fn the_factor_of_a_stop_is_that_up_to_it() {
     let system = OneCoordinate::from(QuadraticInZ::default());
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
-    for integrator in takers(&system) {
+    for integrator in applicable(&system) {
         let mut events = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.53).terminal()]);
         let run = run_in(&problem, integrator, 20, 1.0).with_conformal_factor();
         let stopped = run.observe(&mut events).run(Until::Time(1.0)).unwrap();
@@ -232,7 +241,7 @@ fn the_factor_of_a_stop_is_that_up_to_it() {
     }
 }
 
-/// A function that is not finite ends the run there; one that is zero at the start has no sign before it moves.
+/// A function that is not finite ends the run; a function that is zero at the start has no sign before it changes.
 #[test]
 fn events_that_are_not_defined() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
@@ -251,7 +260,7 @@ fn events_that_are_not_defined() {
         matches!(outcome.status, Status::Failed { cause: discrete_herglotz::StepError::Event { t }, .. } if t >= 2.1),
         "{outcome:?}"
     );
-    // What another function does before, in the same step of 2.0 to 2.2, is not lost.
+    // The events of another function earlier in the same step of 2.0 to 2.2 are kept.
     let undefined = || Event::new(|t, _: &PhasePoint<1>| if t < 2.1 { 1.0 } else { f64::NAN });
     let mut with_another = Events::new([undefined(), Event::new(|t, _| t - 2.05)]);
     assert!(matches!(run(&mut with_another).status, Status::Failed { .. }));
@@ -266,12 +275,13 @@ fn events_that_are_not_defined() {
     assert!(matches!(outcome.status, Status::Failed { cause: discrete_herglotz::StepError::Event { .. }, .. }));
 }
 
-/// An observer that stops, at the start or after some steps; what it asks for decides what is computed, and no bit of the motion.
+/// An observer that stops a run, at the start or after some steps; its requests determine what is computed, and do not
+/// change the motion.
 #[test]
 fn observers_ask_and_stop() {
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    for integrator in takers(&kepler) {
+    for integrator in applicable(&kepler) {
         let plain = run_in(&problem, integrator, 20, 1.0).without_action().run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.z, plain.log_factor), (None, None));
         let mut seen = Vec::new();
@@ -299,7 +309,7 @@ fn observers_ask_and_stop() {
     }
 }
 
-/// Output times out of order, outside of the span, or not finite.
+/// Output times that are not in order, outside of the span, or not finite.
 #[test]
 fn what_cannot_be_observed_is_refused() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
@@ -320,31 +330,32 @@ fn what_cannot_be_observed_is_refused() {
     assert_eq!(run(&[0.5, 1.5], 1.0), Err(InputError::Times { index: 1, t: 1.5 }));
     assert_eq!(run(&[0.5, 1.0], -1.0), Err(InputError::Times { index: 0, t: 0.5 }));
     assert_eq!(run(&[-0.25, -0.5], -1.0), Ok(()));
-    // To where it starts there is the start alone.
+    // A run to its start has the start alone.
     assert_eq!((run(&[], 0.0), run(&[0.0], 0.0)), (Ok(()), Ok(())));
     assert_eq!(run(&[0.0, 0.5], 0.0), Err(InputError::Times { index: 0, t: 0.0 }));
     assert!(Gauss::new(&pendulum, 4, -0.1).is_ok());
 }
 
-/// A run that is interrupted anywhere goes on to the last bit, by every integrator, with what it has compensated and extrapolated.
+/// A run that is interrupted anywhere and resumed is the same to the last bit, by every integrator, with its
+/// compensated sums and extrapolated starts.
 #[test]
-fn interrupted_runs_go_on() {
+fn interrupted_runs_are_resumed() {
     fn check<L: Lagrangian<N>, const N: usize>(system: &L, start: VelocityPoint<N>, name: &str) -> usize {
         let path = std::env::temp_dir().join(format!("interrupted_{name}_{}", std::process::id()));
         let problem = Problem::new(system, 0.0, start).unwrap();
         let mut places = 0;
-        for integrator in takers(system) {
+        for integrator in applicable(system) {
             let whole = run_in(&problem, integrator, 60, 6.0).with_conformal_factor().run(Until::Time(6.0)).unwrap();
             assert_eq!(whole.status, Status::Completed, "{integrator}");
-            // Places without a period.
+            // Places that are not periodic.
             for place in [1, 2 + whole.steps * 5 / 13, whole.steps - 1] {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut killed = |at: &StepView<'_, N>| match at.k {
+                let mut interrupt = |at: &StepView<'_, N>| match at.k {
                     k if k == place => ControlFlow::Break(Stop::here("a test")),
                     _ => ControlFlow::Continue(()),
                 };
                 let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
-                let stopped = run.observe(&mut saved).observe(&mut killed).run(Until::Time(6.0)).unwrap();
+                let stopped = run.observe(&mut saved).observe(&mut interrupt).run(Until::Time(6.0)).unwrap();
                 assert_eq!((stopped.steps, saved.error.is_none()), (place, true), "{integrator}");
                 let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
                 let resumed = run.resume(ResumeState::read(&path).unwrap()).run(Until::Time(6.0)).unwrap();
@@ -352,7 +363,7 @@ fn interrupted_runs_go_on() {
                 places += 1;
             }
         }
-        // Another run is refused.
+        // The checkpoint of another run is refused.
         let other = run_in(&problem, AnyIntegrator::Discrete(Method::Midpoint), 61, 6.0);
         let refused = other.resume(ResumeState::read(&path).unwrap()).run(Until::Time(6.0));
         assert_eq!(refused, Err(InputError::AnotherRun));
@@ -369,38 +380,39 @@ fn interrupted_runs_go_on() {
     assert!(places > 400, "{places}");
 }
 
-/// What a run has seen of steps that do not resolve its motion it goes on with, wherever it is interrupted: where it looks, and at its end.
+/// The detection of unresolved steps is resumed with the run, wherever it is interrupted: its samples, and the result
+/// at the end.
 #[test]
-fn marks_are_resumed() {
+fn unresolved_steps_are_resumed() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
     let path = std::env::temp_dir().join(format!("interrupted_marks_{}", std::process::id()));
-    let mut marked = 0;
+    let mut flagged = 0;
     for e in [0.9, 0.99] {
         let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
-        for integrator in takers(&system) {
+        for integrator in applicable(&system) {
             let run = || run_in(&problem, integrator, 40, std::f64::consts::TAU).with_conformal_factor();
             let until = Until::Time(std::f64::consts::TAU);
             let whole = run().run(until).unwrap();
-            marked += usize::from(whole.unresolved.is_some());
+            flagged += usize::from(whole.unresolved.is_some());
             for place in [1, 8, 16, 17, 32, whole.steps].into_iter().filter(|k| (1..=whole.steps).contains(k)) {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut killed = |at: &StepView<'_, 2>| match at.k {
+                let mut interrupt = |at: &StepView<'_, 2>| match at.k {
                     k if k == place => ControlFlow::Break(Stop::here("a test")),
                     _ => ControlFlow::Continue(()),
                 };
-                let stopped = run().observe(&mut saved).observe(&mut killed).run(until).unwrap();
+                let stopped = run().observe(&mut saved).observe(&mut interrupt).run(until).unwrap();
                 let resumed = run().resume(ResumeState::read(&path).unwrap()).run(until).unwrap();
-                // In words, since a misfit may be no number.
+                // As text, since a defect may be NaN.
                 assert_eq!(format!("{resumed:?}"), format!("{whole:?}"), "{integrator} from {place}: {stopped:?}");
             }
         }
     }
     std::fs::remove_file(path).unwrap();
-    assert!(marked > 30, "{marked}");
+    assert!(flagged > 30, "{flagged}");
 }
 
-/// A file that is not there, not one of a run, of another version, cut off or changed.
+/// A file that does not exist, belongs to no run or to another version, or is truncated or changed.
 #[test]
 fn damaged_checkpoints_are_refused() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
@@ -433,7 +445,7 @@ fn damaged_checkpoints_are_refused() {
     newer[8] = 4;
     assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 4 })));
     std::fs::remove_file(path).unwrap();
-    // A place that cannot be written to ends the run, and says so.
+    // A path that cannot be written to ends the run, with a status.
     let mut nowhere = Checkpoint::every(5, "/dev/null/checkpoint").unwrap();
     let run = run_in(&problem, AnyIntegrator::Gauss { stages: 8 }, 10, 1.0).observe(&mut nowhere);
     let ended = run.run(Until::Time(1.0)).unwrap();

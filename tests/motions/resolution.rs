@@ -1,4 +1,4 @@
-//! Steps that do not resolve their motion are seen; those that do are not flagged.
+//! Steps that do not resolve their motion are flagged; steps that resolve it are not.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
@@ -6,18 +6,19 @@ use contact_geom::systems::{
 };
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
 use discrete_herglotz::{
-    ActionSplitting, Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Splitting, SplittingScheme, Stepper,
-    Strang, Trapezoidal,
+    DiscreteLagrangian, InputError, SplittingScheme, Stepper,
+    rules::{Composition, Flow, Midpoint, Trapezoidal},
+    splitting::{ActionSplitting, Splitting, Strang},
 };
 
 type Outcome = Result<(), InputError>;
 
-/// Whether a run says, by its status or by its mark, that it cannot be trusted.
-fn says_so<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> bool {
+/// Whether a run reports, by its status or as unresolved, that it is not reliable.
+fn is_reported<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> bool {
     motion.advance(steps).is_err() || motion.unresolved().is_some()
 }
 
-/// `z' = v^2/2 + z^2` leaves the real line before t = 1; so does every velocity with it.
+/// `z' = v^2/2 + z^2` has a pole before t = 1, and the velocity with it.
 struct Pole;
 
 impl Lagrangian<1> for Pole {
@@ -36,17 +37,21 @@ fn no_run_passes_a_pole() -> Outcome {
         let h = 2.0 / steps as f64;
         let (midpoint, trapezoidal) = (Midpoint::new(&Pole, h)?, Trapezoidal::new(&Pole, h)?);
         // A start whose first step fails is refused.
-        assert!(Flow::new(&midpoint, 0.0, start).map_or(true, |flow| says_so(flow, steps)), "midpoint, {steps}");
-        assert!(Flow::new(&trapezoidal, 0.0, start).map_or(true, |flow| says_so(flow, steps)), "trapezoidal, {steps}");
+        assert!(Flow::new(&midpoint, 0.0, start).map_or(true, |flow| is_reported(flow, steps)), "midpoint, {steps}");
+        assert!(
+            Flow::new(&trapezoidal, 0.0, start).map_or(true, |flow| is_reported(flow, steps)),
+            "trapezoidal, {steps}"
+        );
         let scheme = &SplittingScheme::YOSHIDA_4;
         let composition = Composition::new(|h| Trapezoidal::new(&Pole, h), scheme, h, 0.0, start);
-        assert!(composition.map_or(true, |motion| says_so(motion, steps)), "composition, {steps}");
-        assert!(says_so(ActionSplitting::new(&Pole, scheme, h, 0.0, start)?, steps), "splitting, {steps}");
+        assert!(composition.map_or(true, |motion| is_reported(motion, steps)), "composition, {steps}");
+        assert!(is_reported(ActionSplitting::new(&Pole, scheme, h, 0.0, start)?, steps), "splitting, {steps}");
     }
     Ok(())
 }
 
-/// Falls into Kepler's centre, and passes it at 1e-3 and less, with steps between 1/200 and 1/5 of the time of the fall.
+/// Falls into Kepler's centre, and passages at a distance of 1e-3 and less, with steps between 1/200 and 1/5 of the
+/// time of the fall.
 #[test]
 fn no_run_passes_a_centre_of_force() -> Outcome {
     let (mut missed, mut all) = (Vec::new(), 0);
@@ -60,51 +65,53 @@ fn no_run_passes_a_centre_of_force() -> Outcome {
                 for scheme in &SplittingScheme::ALL {
                     let motion = Splitting::new(&kepler, scheme, h * scheme.stages() as f64, 0.0, start)?.watched();
                     all += 1;
-                    if !says_so(motion, 1 + steps / scheme.stages()) {
+                    if !is_reported(motion, 1 + steps / scheme.stages()) {
                         missed.push((scheme.name(), gamma, aside, h));
                     }
                 }
                 let (midpoint, strang) = (Midpoint::new(&kepler, h)?, Strang::new(&kepler, h, 0.0, &start)?);
                 all += 2;
-                if !says_so(Flow::new(&midpoint, 0.0, start)?, steps) {
+                if !is_reported(Flow::new(&midpoint, 0.0, start)?, steps) {
                     missed.push(("midpoint", gamma, aside, h));
                 }
-                if !says_so(Flow::new(&strang, 0.0, start)?, steps) {
+                if !is_reported(Flow::new(&strang, 0.0, start)?, steps) {
                     missed.push(("strang as a flow", gamma, aside, h));
                 }
             }
         }
     }
     println!("{} missed of {all}: {missed:?}", missed.len());
-    // Long schemes with steps of nearly the whole fall may have no two substeps near the centre: 298 runs are not marked.
+    // Long schemes with steps of nearly the whole fall may have fewer than two substeps near the centre: 298 runs are
+    // not flagged.
     let short = ["strang", "strang as a flow", "midpoint", "blanes_moan_4", "blanes_moan_6"];
     assert!(!missed.iter().any(|(name, ..)| short.contains(name)), "{missed:?}");
     assert!(12 * missed.len() <= all, "{} of {all}", missed.len());
     Ok(())
 }
 
-/// Duffing's oscillator with steps just below those with which it blows up: every run that ends is marked.
+/// Duffing's oscillator with steps slightly shorter than those with which it blows up: every run that is completed is
+/// flagged.
 #[test]
-fn the_edge_of_stability_is_marked() -> Outcome {
+fn the_edge_of_stability_is_flagged() -> Outcome {
     let hard = OneCoordinate::from(Duffing { alpha: 1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.001 });
     let start = PhasePoint::new([1.5], [0.0], 0.0);
     for k in 0..10 {
         // The frequency at this amplitude is about 1.6.
         let h = 0.75 + 0.05 * f64::from(k);
-        assert!(says_so(Splitting::new(&hard, &SplittingScheme::STRANG, h, 0.0, start)?.watched(), 2000), "{h}");
+        assert!(is_reported(Splitting::new(&hard, &SplittingScheme::STRANG, h, 0.0, start)?.watched(), 2000), "{h}");
         let strang = Strang::new(&hard, h, 0.0, &start)?;
-        assert!(says_so(Flow::new(&strang, 0.0, start)?, 2000), "as a flow {h}");
+        assert!(is_reported(Flow::new(&strang, 0.0, start)?, 2000), "as a flow {h}");
     }
     Ok(())
 }
 
-/// Runs a motion to its end, without a mark.
+/// Runs a motion to its end, and asserts that no step is flagged.
 fn assert_not_flagged<const N: usize>(name: &str, mut motion: impl Stepper<N>, steps: usize) {
     assert_eq!(motion.advance(steps), Ok(()), "{name}");
     assert_eq!(motion.unresolved(), None, "{name}, until t = {}", motion.time());
 }
 
-/// Every splitting, and the rules, on a motion that they resolve: stages of the length h.
+/// Every splitting, and the rules, on a motion that they resolve, with stages of length h.
 fn assert_resolved<L: Lagrangian<N>, const N: usize>(l: &L, h: f64, t0: f64, start: PhasePoint<N>, t: f64) -> Outcome {
     let steps = (t / h) as usize;
     for scheme in &SplittingScheme::ALL {
@@ -134,7 +141,7 @@ fn assert_rules_resolve<L: Lagrangian<N>, const N: usize>(
     Ok(())
 }
 
-/// A pulse of force that begins at nothing, on a particle at rest.
+/// A smooth pulse of force, on a particle at rest.
 struct Pulse;
 
 impl Lagrangian<1> for Pulse {
@@ -158,13 +165,13 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
         PhasePoint::new([3.0], [0.0], 0.0),
         100.0,
     )?;
-    // Down to rest, at a place that is not zero, with velocities of rounding alone.
+    // Down to rest, at a place that is not zero, with velocities that are rounding errors.
     assert_resolved(&OneCoordinate::from(Duffing::default()), 0.02, 0.0, start, 500.0)?;
     assert_resolved(&OneCoordinate::from(Duffing::forced()), 0.01, 0.0, start, 500.0)?;
-    // Through subnormals to zero.
+    // Through subnormal numbers to zero.
     assert_resolved(&OneCoordinate::from(HarmonicOscillator { gamma: -2.0 }), 0.01, 0.0, start, 1000.0)?;
-    // At rest, before a force and after.
-    // A known false alarm: the long substeps of a composition of midpoint steps see such a beginning as a turn.
+    // At rest, before a force and after. A known false alarm: the long substeps of a composition of midpoint steps take
+    // such a beginning for a turn.
     let rest = PhasePoint::new([0.0], [0.0], 0.0);
     for scheme in &SplittingScheme::ALL {
         let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.watched();
@@ -172,7 +179,7 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
     }
     let midpoint = Midpoint::new(&Pulse, 0.01)?;
     assert_not_flagged("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
-    // Fast in the units of time, and slow.
+    // Fast and slow in the unit of time.
     for scale in [1e-6, 1e6] {
         let kepler = Kepler::<2> { mu: scale * scale, gamma: -1e-3 * scale };
         let fast = PhasePoint::new([1.5, 0.0], [0.0, scale * (1.0f64 / 3.0).sqrt()], 0.0);
@@ -181,7 +188,7 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
     // Pericentre at 0.1, where the frequency is 44.
     let kepler = Kepler::<2> { mu: 1.0, gamma: 0.0 };
     assert_resolved(&kepler, 0.001, 0.0, PhasePoint::new([1.9, 0.0], [0.0, (0.1f64 / 1.9).sqrt()], 0.0), 50.0)?;
-    // Mass matrices and actions that act back.
+    // Mass matrices that vary, and motions that depend on the action.
     let (double, square) =
         (TwoCoordinates::from(DoublePendulum::default()), OneCoordinate::from(QuadraticInZ { c: 0.3 }));
     assert_rules_resolve(&double, 0.02, 0.0, legendre(&double, 0.0, &double.initial()), 5000)?;
@@ -193,23 +200,23 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
     Ok(())
 }
 
-/// The mark names the step, is the same however the steps are taken, and stays.
+/// The unresolved step is reported with its number, does not depend on how the steps are taken, and is kept.
 #[test]
-fn the_mark_is_that_of_its_step() -> Outcome {
+fn the_unresolved_step_is_that_of_its_number() -> Outcome {
     let (kepler, start) = (Kepler::<2> { mu: 1.0, gamma: 0.0 }, PhasePoint::new([1.0, 0.0], [0.0, 0.0], 0.0));
     let mut motion = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
     let mut at_once = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
     let seen = (0..200).find(|_| motion.advance(1).is_ok() && motion.unresolved().is_some());
     assert_eq!(at_once.advance(200), Ok(()));
-    let mark = at_once.unresolved();
-    assert_eq!((seen, motion.unresolved()), (mark.map(|mark| mark.step), mark));
+    let found = at_once.unresolved();
+    assert_eq!((seen, motion.unresolved()), (found.map(|found| found.step), found));
     // The fall takes 1.11.
-    assert!(mark.is_some_and(|mark| (18..26).contains(&mark.step) && mark.defect > 1.0), "{mark:?}");
+    assert!(found.is_some_and(|found| (18..26).contains(&found.step) && found.defect > 1.0), "{found:?}");
     Ok(())
 }
 
-/// A singular W is refused by name, however its equations can be solved; one that is only in poor units is not, and neither is
-/// one of a large condition: its step is right to what the condition allows.
+/// A singular W is refused by name, by every route; a W that is ill-scaled is not refused, and neither is an
+/// ill-conditioned one: its step is accurate to what the condition allows.
 #[test]
 fn a_singular_mass_matrix_is_refused() -> Outcome {
     struct Linear;
@@ -244,7 +251,7 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
         let ld = Midpoint::new(&system, 0.1)?;
         let mut flow = Flow::new(&ld, 0.0, start)?;
         assert_eq!(Stepper::advance(&mut flow, 10), Ok(()), "{condition:e}");
-        // The sum falls as a particle does, whatever the difference: its momentum has the condition one.
+        // The sum falls like a particle, whatever the difference: its momentum has the condition one.
         let reference = Stretched(1.0);
         let start = legendre(&reference, 0.0, &contact_geom::VelocityPoint { q: SVector::from([0.3, 0.4]), v, z: 0.1 });
         let ld = Midpoint::new(&reference, 0.1)?;
@@ -255,7 +262,7 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
         let off = (sum(&flow) - sum(&expected)).abs();
         assert!(off <= 100.0 * condition * f64::EPSILON, "{condition:e}: {off:e}");
     }
-    // Beyond 1/eps it is singular, whatever a pivot says.
+    // Beyond 1/eps it is singular, whatever its pivots.
     let ld = Midpoint::new(&Stretched(1e17), 0.1)?;
     assert!(singular(Flow::new(&ld, 0.0, PhasePoint::new([0.3, 0.4], [0.5, 0.5], 0.1))));
 
@@ -272,7 +279,7 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
     Ok(())
 }
 
-/// A time or a state that is not finite is named, by every door.
+/// A time or a state that is not finite is refused by name, by every entry point.
 #[test]
 fn what_is_not_finite_is_refused() -> Outcome {
     fn named<T>(result: Result<T, InputError>, name: &str) -> bool {
@@ -294,7 +301,7 @@ fn what_is_not_finite_is_refused() -> Outcome {
             assert!(named(Strang::new(&pendulum, 0.1, t0, &start), name), "{name}");
             assert!(named(ActionSplitting::new(&square, scheme, 0.1, t0, start), name), "{name}");
             assert!(named(Composition::new(|h| Midpoint::new(&pendulum, h), scheme, 0.1, t0, start), name), "{name}");
-            for method in discrete_herglotz::Method::ALL {
+            for method in discrete_herglotz::rules::Method::ALL {
                 assert!(named(method.discretise(&pendulum, 0.1, t0, &start), name), "{method} {name}");
             }
         }

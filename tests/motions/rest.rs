@@ -1,8 +1,10 @@
-//! Motions that come to rest: no step of theirs is flagged, wherever they rest.
+//! Motions that come to rest: none of their steps is flagged as unresolved, wherever they come to rest.
 
+use super::draws::Draws;
+use crate::common::lagrangians::WithStructure;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
 
 /// Systems of one coordinate that come to rest away from 0, with a drag.
@@ -12,11 +14,11 @@ enum Resting {
     Torque { torque: f64, gamma: f64 },
     /// Two wells.
     Duffing { beta: f64, gamma: f64 },
-    /// A bead on a hoop that turns, beside its lowest place.
+    /// A bead on a rotating hoop, with equilibria away from its lowest point.
     Hoop { square: f64, gamma: f64 },
     /// A Morse potential.
     Morse { gamma: f64 },
-    /// A spring about a place: linear.
+    /// A linear spring with an equilibrium away from 0.
     Spring { stiffness: f64, place: f64, gamma: f64 },
 }
 
@@ -50,27 +52,6 @@ impl Lagrangian<1> for Resting {
     }
 }
 
-/// Numbers between 0 and 1, the same in each run of the test.
-pub struct Draws(u64);
-
-impl Draws {
-    /// Those of a case.
-    pub fn of(case: u64) -> Self {
-        let mut draws = Draws(case.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        draws.next();
-        draws
-    }
-
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + self.next() * (high - low)
-    }
-}
-
 fn draw(draws: &mut Draws) -> (Resting, VelocityPoint<1>) {
     let gamma = -f64::exp(draws.between(f64::ln(0.05), f64::ln(3.0)));
     let system = match (draws.next() * 4.0) as u32 {
@@ -83,7 +64,7 @@ fn draw(draws: &mut Draws) -> (Resting, VelocityPoint<1>) {
         1 => Resting::Duffing { beta: f64::exp(draws.between(-2.0, 2.0)), gamma },
         _ => Resting::Hoop { square: draws.between(1.2, 4.0), gamma },
     };
-    // Half of them beside the equilibrium at or near 0.
+    // Half of the starts are close to an equilibrium at or near 0.
     let size = if draws.next() < 0.5 { 1.0 } else { f64::powf(10.0, -draws.between(0.0, 8.0)) };
     (system, VelocityPoint::new([size * draws.between(-1.5, 1.5)], [size * draws.between(-1.0, 1.0)], 0.0))
 }
@@ -105,11 +86,12 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         | Resting::Spring { gamma, .. }
         | Resting::Morse { gamma }) = system;
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
-        // Until e^(gamma t/2) is between 1e-3 and 1e-40; where the drag is above critical it takes longer.
+        // Until e^(gamma t/2) is between 1e-3 and 1e-40; above the critical drag it takes longer.
         let span = draws.between(14.0, 180.0) / -max_or_nan(-gamma.abs(), -2.0 / gamma.abs());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let by_accuracy = draws.next() < 0.25;
-        // A type only claims to be linear: a transient that ends within one step is marked, since a false claim looks the same.
+        // Linearity is only declared: a transient that ends within one step is flagged, since a false declaration looks
+        // the same.
         if by_accuracy && matches!(system, Resting::Spring { .. }) {
             continue;
         }
@@ -118,7 +100,8 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         } else {
             let parts = match integrator {
                 AnyIntegrator::Gauss { stages } => 0.1 * stages as f64,
-                // The rate of order one is off by half the square of `gamma h` in each step, which is an energy that decays too fast.
+                // For order one the error of the rate is half the square of `gamma h` in each step, so that the energy
+                // decays too fast.
                 _ if integrator.order() == 1 => 0.01,
                 _ => 0.1,
             };
@@ -138,8 +121,8 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
     assert!(flagged.is_empty() && 10 * done > 8 * cases, "{} of {done} flagged: {flagged:#?}", flagged.len());
 }
 
-/// Beside its equilibrium at 0 the force of a Morse potential, `2 (1 - e^-x) e^-x`, is rounded like 1: the motion decays to that rounding, which no
-/// step resolves and no accuracy relative to the motion can reach.
+/// Near its equilibrium at 0 the force of a Morse potential, `2 (1 - e^-x) e^-x`, has the rounding of numbers of size
+/// 1: the motion decays to that rounding, which no step resolves and which no relative accuracy can reach.
 #[test]
 fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
     let integrators = ["gauss_8", "gauss_11", "strang", "yoshida_6", "blanes_moan_6", "midpoint_by_kahan_li_8"];
@@ -148,14 +131,15 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
         let gamma = -f64::exp(drawn.between(f64::ln(0.05), f64::ln(3.0)));
         let system = Resting::Morse { gamma };
         let start = VelocityPoint::new([drawn.between(-0.5, 1.0)], [drawn.between(-1.0, 1.0)], 0.0);
-        // Until its oscillation, or what is slower beyond the critical drag, is between 1e-9 and 1e-43 of the start.
+        // Until its oscillation, or the slower of the two decays above the critical drag, is between 1e-9 and 1e-43 of
+        // the start.
         let span = drawn.between(20.0, 100.0) / -max_or_nan(0.5 * gamma, 2.0 / gamma);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let integrator: AnyIntegrator = integrators[case % integrators.len()].parse().unwrap();
         let wanted = f64::powf(10.0, -drawn.between(4.0, 9.0));
         let (run, what) = match case % 3 {
             0 => (problem.accuracy(wanted), format!("accuracy {wanted:e}")),
-            // By the order that there is.
+            // Only for methods whose order suffices.
             1 if integrator.order() > 2 => {
                 (problem.by(integrator).accuracy(wanted), format!("{integrator}, accuracy {wanted:e}"))
             }
@@ -163,7 +147,7 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
         };
         let end = run.run(Until::Time(span));
         let right = matches!(&end, Ok(end) if end.status == Status::Completed && end.unresolved.is_none());
-        // Some hundred roundings of the force, added up.
+        // The sum of some hundred roundings of the force.
         if !(right && end.as_ref().is_ok_and(|end| end.q[0].abs() < 1e-8)) {
             wrong.push(format!("{case}: {system:?} from {start:?} to {span} by {what}: {end:?}"));
         }
@@ -171,20 +155,11 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The same of which nothing is claimed: its steps solve the general equations of the stages.
-#[derive(Clone, Copy, Debug)]
-struct Unclaimed(Resting);
-
-impl Lagrangian<1> for Unclaimed {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        self.0.value(t, q, v, z)
-    }
-}
-
 #[test]
 fn general_steps_are_solved_to_the_rounding_of_forces() {
     for gamma in [-0.1, -0.5, -2.0] {
-        let system = Unclaimed(Resting::Morse { gamma });
+        // Without declared structure the steps solve the general equations of the stages.
+        let system = WithStructure(Resting::Morse { gamma }, Structure::default());
         let start = VelocityPoint::new([0.4], [-0.3], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         // Until the oscillation is below 1e-25 of the start.
@@ -193,7 +168,7 @@ fn general_steps_are_solved_to_the_rounding_of_forces() {
             let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(0.1 * stages as f64));
             let end = run.run(until).unwrap();
             assert_eq!((end.status, end.unresolved), (Status::Completed, None), "{gamma}, {stages} stages: {end:?}");
-            // Some hundred roundings of the force, added up.
+            // The sum of some hundred roundings of the force.
             assert!(end.q[0].abs() < 1e-13, "{gamma}, {stages} stages: {end:?}");
         }
         assert!(problem.accuracy(1e-8).run(until).is_ok_and(|end| end.unresolved.is_none()), "{gamma}");
@@ -202,13 +177,13 @@ fn general_steps_are_solved_to_the_rounding_of_forces() {
 
 /// A damped pendulum down to the smallest numbers.
 #[test]
-fn what_is_at_rest_ends_and_says_so() {
+fn a_motion_at_rest_ends_with_a_status() {
     for (system, gamma) in [-0.05, -0.1, -1.0].map(|gamma| (Pendulum { gamma }, gamma)) {
         let start = VelocityPoint::new([1.0], [0.5], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let mut rows = Rows::at((0..=100).map(|k| 1e4 * f64::from(k))).unwrap();
         let by_accuracy = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(1e6)).unwrap();
-        // Those that were reached.
+        // The rows up to the time at which the run ends.
         let reached = (by_accuracy.t / 1e4).floor() as usize + 1;
         assert!(rows.rows.len() == reached && reached < 10, "{gamma}: {} rows", rows.rows.len());
         let by_steps = problem.steps(Steps::Size(0.5)).run(Until::Time(1e6)).unwrap();
@@ -223,7 +198,8 @@ fn what_is_at_rest_ends_and_says_so() {
     }
 }
 
-/// `v^2/2 + q^2/2 + gamma z` from the stable direction of its hill: the motion comes as close as numbers can, and leaves.
+/// `v^2/2 + q^2/2 + gamma z` from the stable direction of its hill: the motion approaches the hill up to round-off, and
+/// leaves it.
 struct Hill;
 
 impl Lagrangian<1> for Hill {
@@ -235,7 +211,7 @@ impl Lagrangian<1> for Hill {
     }
 }
 
-/// A pendulum that is pushed after a long time.
+/// A pendulum with a pulse of force after a long time.
 struct Pushed;
 
 impl Lagrangian<1> for Pushed {
@@ -250,7 +226,7 @@ impl Lagrangian<1> for Pushed {
 
 #[test]
 fn what_will_move_again_does_not_end() {
-    // q = e^(-2t) + 1e-300 e^(t/2), both far below the numbers that are at rest in between.
+    // q = e^(-2t) + 1e-300 e^(t/2), in between far below the numbers that count as rest.
     let start = VelocityPoint::new([1e-200], [-2e-200], 0.0);
     let problem = Problem::new(&Hill, 0.0, start).unwrap();
     let end = problem.by(SplittingScheme::YOSHIDA_4).steps(Steps::Size(0.05)).run(Until::Time(1000.0)).unwrap();
@@ -261,9 +237,10 @@ fn what_will_move_again_does_not_end() {
     assert!(end.q[0].abs() > 0.1, "{end:?}");
 }
 
-/// The action of a linear motion is that of its distance from the equilibrium: no terms of the size of the place itself are left of it.
+/// The action of a linear motion depends on its distance from the equilibrium: terms of the size of the place itself
+/// cancel.
 #[test]
-fn the_action_of_a_spring_does_not_know_its_place() {
+fn the_action_of_a_spring_does_not_depend_on_its_place() {
     // Powers of two, so that the distance is the same number.
     let of = |place: f64, by: AnyIntegrator| {
         let spring = Resting::Spring { stiffness: 1.7, place, gamma: -0.3 };
@@ -277,11 +254,11 @@ fn the_action_of_a_spring_does_not_know_its_place() {
         for place in [8.0, 1024.0, 65536.0] {
             let (q, z) = of(place, by);
             assert!((q - expected_q).abs() <= 4.0 * f64::EPSILON * place, "{by}, {place}: {q:e}, {expected_q:e}");
-            // z' = gamma z + v^2/2 - k x^2/2 with x rounded like the place: of the way some hundred roundings of x^2 are left, which decay as z does, and at rest the
-            // square of the rounding.
+            // z' = gamma z + v^2/2 - k x^2/2, where x has the rounding of the place: some hundred roundings of x^2 on
+            // the way, which decay as z does, and at rest the square of the rounding.
             let damped = (-0.3f64 * 100.0).exp() * f64::EPSILON * 256.0 * place;
             let at_rest = 1.7 * (2.0 * f64::EPSILON * place).powi(2) / 0.3;
-            // Beside the rest of the motion, of half the rate.
+            // The remaining motion, which decays at half the rate.
             let between = 1.7 * expected_q.abs() * 4.0 * f64::EPSILON * place / 0.3;
             assert!((z - expected).abs() <= damped + between + at_rest, "{by}, {place}: {z:e}, {expected:e}");
         }

@@ -1,22 +1,24 @@
-//! Brouwer's law: the rounding of steps adds up as a random walk, with no drift in any direction.
+//! Brouwer's law: the rounding of steps accumulates as a random walk, without drift.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
-    ActionSplitting, Composition, Flow, InputError, LeftMidpoint, Midpoint, Rectangle, Splitting, SplittingScheme,
-    Stepper, Strang, Trapezoidal,
+    InputError, SplittingScheme, Stepper,
+    rules::{Composition, Flow, LeftMidpoint, Midpoint, Rectangle, Trapezoidal},
+    splitting::{ActionSplitting, Splitting, Strang},
 };
 
 type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
 
-/// The steps after which the walk is looked at.
+/// The numbers of steps after which the walk is measured.
 const LENGTHS: [usize; 3] = [1 << 10, 1 << 12, 1 << 14];
 
-/// 64 motions of an oscillator at all phases. A step of every method is linear in (q, p), with determinant one but for the drag:
-/// so it keeps a quadratic form of its own, which contracts as `e^(gamma t)`, and is left from it by rounding alone. Asserted:
-/// the mean of that is zero within [`LARGEST_BIAS`] of its deviations, and the root of its mean square grows with the power 1/2 of the
-/// steps, within 0.15 (64 walks tell it to 0.09 over a factor 16), or less. `rate` is the logarithm of a step's contraction.
+/// 64 motions of an oscillator at all phases. A step of every method is linear in (q, p), with determinant one apart
+/// from the drag: it preserves a quadratic form, which contracts as `e^(gamma t)`, and deviates from it by rounding
+/// alone. Asserted: the mean of the deviations is zero within [`LARGEST_BIAS`] standard errors, and their root mean
+/// square grows at most like the square root of the number of steps, within 0.15 in the exponent (64 walks determine it
+/// to 0.09 over a factor 16). `rate` is the logarithm of the contraction of a step.
 fn assert_random_walk(
     name: &str,
     rate: f64,
@@ -31,7 +33,7 @@ fn assert_random_walk(
     let (from_q, from_p) = (step(1.0, 0.0)?, step(0.0, 1.0)?);
     let (a, b) = (-from_q.p[0], from_p.q[0]);
     let c = from_q.q[0] - from_p.p[0];
-    // The contact energy has the drag's share -gamma z, and z is `pq/2` on the quadratic motion.
+    // The contact energy has the term -gamma z of the drag, and z is `pq/2` on the quadratic motion.
     let share = |gamma: f64| -0.5 * gamma * (a + b);
     let form = |x: &PhasePoint<1>, share: f64| {
         let (q, p) = (x.q[0], x.p[0]);
@@ -40,7 +42,7 @@ fn assert_random_walk(
     let mut deviations = [[0.0; 64]; 3];
     #[allow(clippy::needless_range_loop)] // It seeds the start as well.
     for k in 0..64 {
-        // By the golden angle, at amplitudes between one and two.
+        // At multiples of the golden angle, with amplitudes between one and two.
         let (sin, cos) = (2.399_963 * k as f64).sin_cos();
         let amplitude = 1.0 + k as f64 / 64.0;
         let (q, p) = (amplitude * cos, amplitude * sin);
@@ -69,8 +71,8 @@ fn assert_random_walk(
     Ok(())
 }
 
-/// In standard errors. The largest of thirty means has 2.2, but for the rectangle rule: 4.0 without drag, which is 4e-19 a step; why is
-/// not known.
+/// In standard errors. The largest of thirty means is 2.2, but for the rectangle rule it is 4.0 without drag, which is
+/// 4e-19 a step, for an unknown reason.
 const LARGEST_BIAS: f64 = 3.0;
 const BIAS_OF_RECTANGLE: f64 = 4.5;
 
@@ -129,10 +131,10 @@ fn rounding_is_a_random_walk() -> Result<(), InputError> {
     Ok(())
 }
 
-/// The same where the drag is `-c z^2/2` with a small c: the factor of each map of the action is one but for its last digits.
+/// The same with the drag `-c z^2/2` for a small c: the factor of each map of the action is one up to its last digits.
 #[test]
 fn rounding_is_a_random_walk_under_a_nonlinear_drag() -> Result<(), InputError> {
-    /// An oscillator with the rate `L_z = -c z`, at an action of 1e3 which it moves by one.
+    /// An oscillator with the rate `L_z = -c z`, at an action of 1e3, which changes by one.
     struct Slow(f64);
     impl Lagrangian<1> for Slow {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -142,7 +144,7 @@ fn rounding_is_a_random_walk_under_a_nonlinear_drag() -> Result<(), InputError> 
             Structure { autonomous: true, separable: true, constant_mass: true, ..Structure::default() }
         }
     }
-    // The rate is -1e-12, to 1e-15, and what it is off by has the mean zero.
+    // The rate is -1e-12 up to 1e-15, with a deviation of mean zero.
     let (free, slow) = (Slow(0.0), Slow(1e-15));
     let scheme = SplittingScheme::STRANG;
     assert_random_walk(

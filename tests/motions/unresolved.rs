@@ -1,15 +1,16 @@
-//! Given steps that cannot resolve their motion, seen by the energy that it should have; and that it is not seen where it need not be.
+//! Given steps that cannot resolve their motion are flagged by the error of the energy; and steps that resolve it are
+//! not.
 
-use super::rest::Draws;
+use super::draws::Draws;
 use crate::run_of;
 use contact_geom::systems::Kepler;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Status, Steps, Until};
 
-/// Forces of a centre, and others.
+/// Central forces, and others.
 #[derive(Clone, Copy, Debug)]
 enum Field {
-    /// `-1/x - x`: a wall, and a fall against it.
+    /// `-1/x - x`: a wall, and a force towards it.
     Wall,
     /// `1/sqrt(x^2 + y^2 + soft^2)`.
     Softened { soft: f64 },
@@ -59,7 +60,7 @@ fn wall() -> Plane {
     Plane { field: Field::Wall, gamma: 0.0 }
 }
 
-/// Each ends with an error of order one.
+/// Runs whose energy has an error of order one are flagged.
 #[test]
 fn an_energy_that_should_be_kept_is_watched() {
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.01 };
@@ -90,8 +91,8 @@ fn an_energy_that_should_be_kept_is_watched() {
     assert!(silent.is_empty(), "{silent:?} of {all}");
 }
 
-/// Random systems by random steps: those whose energy ends wrong by as much as the motion has are flagged; those that are right to a hundredth
-/// are not.
+/// Random systems with random steps: those whose energy ends with an error of the size of the kinetic energy are
+/// flagged; those that are accurate are not.
 #[test]
 fn steps_of_random_size_are_right_or_flagged() {
     let cases = 2000;
@@ -133,7 +134,7 @@ fn steps_of_random_size_are_right_or_flagged() {
         if end.status != Status::Completed {
             continue;
         }
-        // As far as the motion is known.
+        // Only where the motion can be computed accurately.
         let Ok(truth) = problem.accuracy(1e-7).run(Until::Time(span)) else { continue };
         if truth.status != Status::Completed {
             continue;
@@ -148,7 +149,7 @@ fn steps_of_random_size_are_right_or_flagged() {
         let expected = energy(start.q.into(), start.v.into(), start.z) * sigma;
         let off = (energy(end.q.into(), end.p.into(), end.z.unwrap()) - expected).abs();
         let kinetic = max_or_nan(truth.p.norm_squared(), end.p.norm_squared());
-        // A motion that falls to rest may forget what its first steps have done.
+        // A motion that comes to rest may forget the errors of its first steps.
         let forgets = gamma * span < -1.0;
         if error <= 0.005 && !forgets {
             right += 1;
@@ -169,7 +170,7 @@ fn steps_of_random_size_are_right_or_flagged() {
     assert!(right > 500 && wrong > 20 && 100 * false_flags.len() < right, "{right} right: {false_flags:#?}");
 }
 
-/// The estimate is of the size of the error.
+/// The error estimate is of the size of the error.
 #[test]
 fn the_error_of_given_steps_is_estimated() {
     let system = Plane { field: Field::Softened { soft: 0.3 }, gamma: -0.02 };
@@ -185,8 +186,8 @@ fn the_error_of_given_steps_is_estimated() {
             let error = ((end.q - truth.q).norm_squared() + (end.p - truth.p).norm_squared()).sqrt()
                 / (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
             let estimate = end.error_estimate.unwrap();
-            // Of order two it is three quarters of the error, and the two runs may be off in different directions where both are coarse; the
-            // reference is known to 1e-12.
+            // For order two it is three quarters of the error, and the errors of the two runs may have different
+            // directions where both are coarse; the error of the reference is 1e-12.
             let covered = estimate >= 0.3 * error - 1e-11 && estimate <= 4.0 * error + 1e-11;
             assert!(covered, "{integrator}, h = {h}: {estimate:e} for {error:e}");
         }

@@ -1,10 +1,11 @@
-//! The accuracy of velocities: where momenta determine them badly, and where coordinates differ in size.
+//! The accuracy of velocities: where the momenta determine them badly, and where coordinates differ in size.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Run, SelectionFailure, Status, Steps, Until};
 
-/// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity turns by the angle `B t`, and `p = v + B (-y, x)/2` is large beside it.
+/// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity rotates by the angle `B t`, and `p = v + B (-y,
+/// x)/2` is much larger than it.
 struct Charge {
     b: f64,
     structured: bool,
@@ -42,8 +43,8 @@ fn off(charge: &Charge, t: f64, v: Option<SVector<f64, 2>>) -> f64 {
     v.map_or(f64::NAN, |v| (v - exact).norm())
 }
 
-/// However strong the field, the velocity is as accurate as the state: by the integrator that is chosen, and by those of low order, whose steps are no shorter than
-/// the error asks for.
+/// The velocity is as accurate as the state for any strength of the field: by the default integrator, and by those of
+/// low order, whose steps are as long as the error allows.
 #[test]
 fn a_strong_magnetic_field() {
     for structured in [false, true] {
@@ -51,7 +52,8 @@ fn a_strong_magnetic_field() {
             for turns in [3.0, 40.0] {
                 let charge = Charge { b, structured };
                 let (problem, t) = (Problem::new(&charge, 0.0, far_away()).unwrap(), turns / b);
-                // Beyond, their reference is refused for the rounding between its nodes.
+                // In stronger fields the reference of their trial runs is refused because of the rounding between its
+                // nodes.
                 let low = if b <= 1e5 { [2, 3].as_slice() } else { &[] };
                 for stages in low.iter().copied().map(Some).chain([None]) {
                     let run = problem.accuracy(1e-6);
@@ -66,9 +68,9 @@ fn a_strong_magnetic_field() {
     }
 }
 
-/// Where the rounding of the momentum hides the velocity that is said.
+/// Where the rounding of the momentum exceeds the velocity, an accuracy is refused.
 #[test]
-fn a_velocity_that_no_momentum_tells() {
+fn a_velocity_below_the_rounding_of_the_momentum() {
     let charge = Charge { b: 1e13, structured: false };
     let problem = Problem::new(&charge, 0.0, far_away()).unwrap();
     let refused = problem.accuracy(1e-6).plan(Until::Time(40.0 / charge.b)).err();
@@ -78,7 +80,8 @@ fn a_velocity_that_no_momentum_tells() {
     );
 }
 
-/// The estimate of given steps covers the velocity: it is that of half the steps, `1 - 2^-4` of the error.
+/// The error estimate of given steps includes the velocity: it is the difference from half the steps, `1 - 2^-4` of the
+/// error.
 #[test]
 fn estimates_cover_the_velocity() {
     for (b, h) in [(1.0, 0.5), (1e5, 0.5), (1e7, 0.25)] {
@@ -91,7 +94,7 @@ fn estimates_cover_the_velocity() {
     }
 }
 
-/// The estimate of a motion that ends where it turns, and began there, is relative to its speed in between.
+/// The error estimate of a motion that begins and ends at rest is relative to its speed in between.
 #[test]
 fn an_end_at_rest_is_no_error_of_the_velocity() {
     let oscillators = Oscillators { coupling: 0.0 };
@@ -99,15 +102,16 @@ fn an_end_at_rest_is_no_error_of_the_velocity() {
     let (t, steps) = (64.0 * std::f64::consts::TAU, 1024);
     let run = problem.by(AnyIntegrator::Gauss { stages: 4 }).steps(Steps::Count(steps)).with_error_estimate();
     let estimate = run.run(Until::Time(t)).unwrap().error_estimate.unwrap_or(f64::NAN);
-    // The phase of a step is off by h^9 (4!)^2 / (8! 9!), that of the Pade approximation of exp.
+    // The error of the phase of a step is h^9 (4!)^2 / (8! 9!), that of the Pade approximation of exp.
     let phase = steps as f64 * (t / steps as f64).powi(9) * 24f64.powi(2) / (40320.0 * 362880.0);
-    // The next term is about h^2/20 of it, and the distance from half steps 1 - 2^-8.
+    // The next term is about h^2/20 of it, and the difference from half steps 1 - 2^-8.
     assert!((estimate / phase - 1.0).abs() <= 0.05, "{estimate:e}, {phase:e}");
     let chosen = problem.accuracy(1e-9).run(Until::Time(t)).unwrap();
     assert_eq!((chosen.status, chosen.unresolved), (Status::Completed, None));
 }
 
-/// Two oscillators, the second the faster the further the first is from its centre: `v.v/2 - x^2/2 - (1 + c x^2) y^2/2`.
+/// Two oscillators, the second the faster the further the first is from its centre: `v.v/2 - x^2/2 - (1 + c x^2)
+/// y^2/2`.
 struct Oscillators {
     coupling: f64,
 }
@@ -129,7 +133,7 @@ impl Lagrangian<2> for Oscillators {
     }
 }
 
-/// A small coordinate that becomes fast is followed where its scale is given, and is not without.
+/// A small coordinate that becomes fast is resolved where its scale is given, and is not resolved otherwise.
 #[test]
 fn each_coordinate_by_its_own_scale() {
     const SMALL: f64 = 1e-8;
@@ -142,7 +146,7 @@ fn each_coordinate_by_its_own_scale() {
             let run = problem.accuracy(1e-6);
             let outcome = scales.into_iter().fold(run, |run, scales| run.scales(scales)).run(Until::Time(t)).unwrap();
             let of_q = (outcome.q - exact.q).component_div(&SVector::from([1.0, SMALL]));
-            // The small one is 30 times as fast.
+            // The small coordinate is 30 times as fast.
             let of_v = (outcome.v.unwrap() - exact.v.unwrap()).component_div(&SVector::from([30.0, 30.0 * SMALL]));
             max_or_nan(of_q.norm(), of_v.norm())
         };

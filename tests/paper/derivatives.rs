@@ -1,15 +1,17 @@
-//! The duals against another library's, and the helper that checks closed derivatives.
+//! Derivatives by dual numbers against another library, and the function that checks closed derivatives.
 
 use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
-    ChartVector, Derivatives, Dual, Hessian, Lagrangian, MaxAbsOrNan, MaxOrNan, Scalar, VelocityPoint,
-    WithoutClosedDerivatives, check_closed_derivatives,
+    ChartVector, Derivatives, Dual, Hessian, Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives,
+    check_closed_derivatives,
+    numbers::{MaxAbsOrNan, MaxOrNan},
 };
 use num_dual::HyperDual64;
 
-/// Every second derivative of every Lagrangian, and so every first, against hyper-dual numbers of another library.
+/// All second derivatives, and with them all first derivatives, of every Lagrangian against hyper-dual numbers of
+/// another library.
 #[test]
 fn against_num_dual() {
     struct Visitor;
@@ -57,7 +59,7 @@ fn against_num_dual() {
 /// A number with its first and second derivative.
 type Second = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
 
-/// The functions that no system of the catalogue uses, by the identities between them.
+/// The elementary functions that no system of the catalogue uses, by the identities between them.
 #[test]
 fn elementary_functions() {
     on_random("elementary functions", 1, |u| {
@@ -89,7 +91,8 @@ fn elementary_functions() {
     });
 }
 
-/// A Lagrangian with closed derivatives: right ones pass, wrong ones are seen, and steps use them.
+/// Closed derivatives that are right pass the check, and wrong ones fail it; without closed derivatives there is
+/// nothing to check.
 #[test]
 fn closed_derivatives() {
     struct Closed {

@@ -1,58 +1,59 @@
-//! The theorems, one file each, over every system and every discretisation.
+//! The statements of the paper, section by section, over every system and every method; and what they are built on:
+//! derivatives, the table of methods, and steps.
 
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
-// What a test cannot go on without is a failure of it.
-#![allow(clippy::unwrap_used)]
+// In a test a missing value is a failure.
+#![allow(missing_docs, clippy::unwrap_used)]
 
-// The integrators use the rest of it.
+// Other targets use the rest of it.
 #[allow(dead_code)]
+#[path = "../common/mod.rs"]
 mod common;
 
-mod bad_input;
 mod derivatives;
-mod exact_composition;
-mod exact_is_discrete;
-mod exact_motion;
-mod exact_series;
 mod methods;
-mod orders;
-mod s01_contact_condition;
-mod s02_reeb_field;
-mod s03_hamiltonian_field;
-mod s04_conformal_field;
-mod s05_conformal_factor;
-mod s06_energy_decay;
-mod s07_regularity;
-mod s08_herglotz_field;
-mod s09_legendre;
-mod s10_continuous_principle;
-mod s11_dissipated_quantities;
-mod s12_noether;
-mod s13_action_differential;
-mod s14_two_steps;
-mod s15_herglotz_principle;
-mod s16_vermeeren_bravetti_seri;
-mod s17_local_diffeomorphisms;
-mod s18_momentum_matching;
-mod s19_flow_exists;
-mod s20_three_expressions;
-mod s21_discrete_forms;
-mod s22_forms_related;
-mod s23_flow_conformal;
-mod s24_hamiltonian_flow_conformal;
-mod s26_discrete_noether;
-mod s27_multiplier;
-mod s28_projected_flow;
-mod s29_exponential_map;
-mod s30_two_exponentials;
-mod s31_projection;
-mod s32_retraction;
-mod s33_linear_equation;
-mod s34_derivatives;
-mod s35_legendre_transforms;
-mod s36_exact_flow;
-mod s37_free_particle;
-mod s38_oscillator;
-mod s40_error_orders;
+mod section_2;
+mod section_3;
+mod section_4;
+mod section_5;
+mod section_6;
 mod steps;
+mod table;
+
+use contact_geom::{Statement, statements as continuous};
+use discrete_herglotz::theory::statements as discrete;
+use exact_lagrangian::statements as exact;
+use std::collections::BTreeSet;
+use table::Row;
+
+/// The tables of each section, and the statements with tests of their own.
+const SECTIONS: [(&str, &[&[Row]], &[Statement]); 5] = [
+    ("2", &[section_2::AT_POINTS, section_2::WITH_METHODS, section_2::ALONG_MOTIONS], section_2::BY_NAME),
+    ("3", &[section_3::WITH_METHODS], section_3::BY_NAME),
+    ("4", &[section_4::ALONG_MOTIONS], &[]),
+    ("5", &[section_5::WITH_METHODS], section_5::BY_NAME),
+    ("6", &[], section_6::BY_NAME),
+];
+
+/// Every statement is in a table of its section or has a test of its own, and the tables hold all that the libraries
+/// evaluate.
+#[test]
+fn every_statement_is_tested() {
+    let mut tested = BTreeSet::new();
+    for (section, tables, by_name) in SECTIONS {
+        for statement in tables.iter().copied().flatten().map(|row| row.statement).chain(by_name.iter().copied()) {
+            assert!(statement.section().starts_with(section), "statement {statement} is not of section {section}");
+            tested.insert(statement);
+        }
+    }
+    assert_eq!(tested, BTreeSet::from(Statement::ALL));
+
+    let of = |tables: &[&[Row]]| -> BTreeSet<Statement> {
+        tables.iter().copied().flatten().map(|row| row.statement).collect()
+    };
+    assert_eq!(of(&[section_2::AT_POINTS]), BTreeSet::from(continuous::STATEMENTS));
+    let with_methods = [section_2::WITH_METHODS, section_3::WITH_METHODS, section_5::WITH_METHODS];
+    assert_eq!(of(&with_methods), BTreeSet::from(discrete::STATEMENTS));
+    assert_eq!(of(&[section_2::ALONG_MOTIONS, section_4::ALONG_MOTIONS]), BTreeSet::from(exact::STATEMENTS));
+}

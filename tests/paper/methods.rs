@@ -1,16 +1,22 @@
-//! The table of methods: names, hypotheses, and every property that it states, each seen in the numbers.
+//! The table of methods: names, hypotheses, and every property that it states, each compared with numbers.
 
-use crate::common::{Pairs, SYMMETRIC, discretise, pairs, systems};
+use crate::table::{Pairs, SYMMETRIC, discretise, pairs};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, PerturbedKepler, QuadraticInZ, System,
+    catalogue_size,
 };
 use contact_geom::{
-    ChartVector, DiscretePoint, Lagrangian, MaxAbsOrNan, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
+    ChartVector, DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
+    numbers::MaxAbsOrNan,
 };
-use discrete_herglotz::{DiscreteLagrangian, InputError, Method, Quadrature, Rule, RuleVisitor};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError,
+    rules::{Method, Quadrature, Rule, RuleVisitor},
+};
 
-/// A name leads back to its method, so that no two are the same; an unknown one is answered with all that are known.
+/// A name is parsed back to its method, so that no two names are equal; the error for an unknown name lists all
+/// names.
 #[test]
 fn names() {
     for method in Method::ALL {
@@ -40,12 +46,13 @@ fn hypotheses_of_strang() {
     assert_eq!(made(&DoublePendulum::default()).err(), unclaimed("separable"));
 }
 
-/// The rules take a Lagrangian that claims nothing, hence every system, and they are in the table.
+/// The rules accept a Lagrangian that declares no structure, hence every system, and they are in the table of
+/// methods.
 #[test]
 fn rules_take_every_lagrangian() {
     assert!(Method::RULES.iter().all(|rule| Method::ALL.contains(rule) && rule.check(&Structure::default()).is_ok()));
     let Pairs { all, symmetric } = pairs();
-    assert!(all >= systems() * Method::RULES.len() && all <= systems() * Method::ALL.len());
+    assert!(all >= catalogue_size() * Method::RULES.len() && all <= catalogue_size() * Method::ALL.len());
     assert!(symmetric >= SYMMETRIC * Method::RULES.len() && symmetric <= SYMMETRIC * Method::ALL.len());
 }
 
@@ -83,7 +90,7 @@ fn rules_by_name() {
     assert_eq!(same.0, Method::RULES);
 }
 
-/// No method takes a step that is 0 or not finite; a negative one goes back.
+/// No method accepts a step that is 0 or not finite; a negative step runs backward.
 #[test]
 fn bad_steps() {
     let system = Pendulum::default();
@@ -101,7 +108,8 @@ fn bad_steps() {
     }
 }
 
-/// Linear drag in a long step: `sigma_d` is `e^(gamma h)` for the methods that say so, and visibly not for the others.
+/// Linear drag in a long step: `sigma_d` is `e^(gamma h)` for the methods with an exact rate, and differs visibly
+/// for the others.
 #[test]
 fn exact_rates() {
     let (system, h) = (HarmonicOscillator { gamma: -1.0 }, 0.5);
@@ -114,7 +122,7 @@ fn exact_rates() {
     }
 }
 
-/// Of an L quadratic in z, a method explicit in z makes an L_d quadratic in `z0`: its third difference is zero.
+/// For an L quadratic in z, a method explicit in z has an L_d quadratic in `z0`: its third difference is zero.
 #[test]
 fn implicit_in_z() {
     let system = QuadraticInZ { c: 1.0 };
@@ -127,7 +135,7 @@ fn implicit_in_z() {
     }
 }
 
-/// The motion reversed in time is one of this Lagrangian: `z` changes its sign, and `dz/dt` does not.
+/// The Lagrangian of the motion reversed in time: `z` changes its sign, and `dz/dt` does not.
 struct Reversed<'a, S>(&'a S);
 
 impl<const N: usize, S: System<N>> Lagrangian<N> for Reversed<'_, S> {
@@ -139,7 +147,8 @@ impl<const N: usize, S: System<N>> Lagrangian<N> for Reversed<'_, S> {
     }
 }
 
-/// A symmetric method leads back to where a step began once the motion is reversed, to round-off; another one does not.
+/// A symmetric method returns to the start of a step when the motion is reversed, to round-off; other methods do
+/// not.
 #[test]
 fn symmetric() {
     fn of<const N: usize, S: System<N>>(system: &S) {

@@ -1,19 +1,24 @@
-//! Steps and runs: forward against the route through derivatives of the value, backward against forward, small steps and
-//! large systems.
+//! Steps and runs: against steps by derivatives of the value, backward against forward, small steps and large systems.
 
-use crate::common::{around, discretise, on_random, step_from};
+use crate::common::{around, on_random, step_from};
+use crate::table::discretise;
 use contact_geom::systems::{Chain, Pendulum, System, SystemVisitor, visit_catalogue};
-use contact_geom::{ChartVector, DiscretePoint, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, legendre};
+use contact_geom::{
+    ChartVector, DiscretePoint, PhasePoint, Scalar, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+};
 use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Flow, Method, Midpoint, Problem, Rows, Solver, Status, StepError, StepView,
-    Stepper, Steps, Stop, Until, legendre_minus,
+    AnyIntegrator, DiscreteLagrangian, Problem, Rows, Status, StepError, StepView, Stepper, Steps, Stop, Until,
+    rules::{Flow, Method, Midpoint},
+    solve::Solver,
+    theory::legendre_minus,
 };
 use std::ops::ControlFlow;
 
-/// A discrete Lagrangian of which only the value is taken: the slow route of a user's own.
-struct WithoutClosedDerivatives<D>(D);
+/// A discrete Lagrangian that has only a value, so that its steps take the general route.
+struct DerivedFromValue<D>(D);
 
-impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for WithoutClosedDerivatives<D> {
+impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for DerivedFromValue<D> {
     fn step_size(&self) -> f64 {
         self.0.step_size()
     }
@@ -22,8 +27,8 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for Without
     }
 }
 
-/// The fast steps agree with those by derivatives of the value, forward and back, and undo each other: to 1e-10, since the
-/// slow route subtracts positions, which loses `eps / h`.
+/// The steps of the methods agree with those by derivatives of the value, forward and backward, and backward steps
+/// invert forward ones: to 1e-10, since the general route subtracts positions, which loses `eps / h`.
 #[test]
 fn forward_and_backward() {
     struct Visitor;
@@ -44,7 +49,7 @@ fn forward_and_backward() {
         let mut solver = Solver::default();
         let from = legendre_minus(ld, t, x).map_err(say)?;
         let guess = (x.q1 - x.q0) / ld.step_size();
-        let slow = WithoutClosedDerivatives(ld);
+        let slow = DerivedFromValue(ld);
         let forward = ld.forward(t, &from, &guess, &mut solver).map_err(say)?;
         let forward_slow = slow.forward(t, &from, &guess, &mut solver).map_err(say)?;
         let back = ld.backward(t, &forward.end, &guess, &mut solver).map_err(say)?;
@@ -67,8 +72,8 @@ fn forward_and_backward() {
     visit_catalogue(&mut Visitor);
 }
 
-/// The state is (q, p, z), so that small steps lose no digits: one time unit in steps from 1e-1 to 1e-5 comes back to its
-/// start by the inverse flow, to round-off that grows like the number of steps.
+/// The state is (q, p, z), so that small steps lose no digits: one time unit in steps from 1e-1 to 1e-5 is inverted by
+/// the backward flow, up to round-off that grows like the number of steps.
 #[test]
 fn small_steps_keep_their_digits() {
     for exponent in 1..=5 {
@@ -85,8 +90,8 @@ fn small_steps_keep_their_digits() {
     }
 }
 
-/// A chain beyond the crossover runs through faer, and its steps are those of the general route; a conserved relation, the
-/// total momentum of a free chain, follows the product of sigma_d.
+/// A chain with more coordinates than the crossover is solved with faer: the total momentum of a free chain is its
+/// initial value times the product of the sigma_d.
 #[test]
 fn a_large_chain() {
     let run = || {
@@ -108,7 +113,7 @@ fn a_large_chain() {
     assert!(thread.is_ok_and(|t| t.join().is_ok()));
 }
 
-/// A run records what it is asked to, no more, and can be stopped and continued.
+/// A run records the requested rows, and can be stopped and continued.
 #[test]
 fn records() {
     let pendulum = Pendulum::default();
@@ -126,12 +131,12 @@ fn records() {
     assert_eq!(rows.iter().map(|row| row.t).collect::<Vec<_>>(), [2.0, 3.0, 4.0]);
     let PhasePoint { q, p, z } = *problem.state();
     assert_eq!((rows[0].q, rows[0].p, rows[0].z), (q, p, Some(z)));
-    // From there on in five steps more.
+    // Five more steps from the state at which the run was stopped.
     let onward = Problem::new(&pendulum, stopped.t, &stopped).unwrap();
     let mut record = Rows::every(1).unwrap();
     let ended = onward.by(by_rule).steps(Steps::Size(0.1)).observe(&mut record).run(Until::Steps(5)).unwrap();
     assert_eq!((ended.status, ended.steps, ended.t, record.rows.len()), (Status::Completed, 5, 5.0, 6));
-    // The same run again is the same to the bit, and so is one in two parts by one stepper.
+    // A repeated run is the same to the bit, and so is a run in two parts by one stepper.
     let again = || {
         let mut rows = Rows::every(1).unwrap();
         let run = problem.by(by_rule).steps(Steps::Size(0.1)).observe(&mut rows);
@@ -146,7 +151,7 @@ fn records() {
     assert_eq!((stepper.advance(5), stepper.time()), (Ok(()), 5.0));
     let end = stepper.state();
     assert_eq!((end.q, end.p, Some(end.z)), (rows[30].q, rows[30].p, rows[30].z));
-    // A new start has no velocities before it to guess the next from, which rounding tells.
+    // A new start has no earlier velocities to extrapolate, which changes the rounding.
     let off = ChartVector::from(ended.state()).minus(end.into()).max_abs_or_nan();
     assert!(off <= 64.0 * f64::EPSILON, "{off:e}");
 }

@@ -1,21 +1,21 @@
-//! Runs that ask for an accuracy: the true error is at most ten times what was asked for, or the run is refused.
+//! Runs with an accuracy: the true error is at most ten times the requested one, or the run is refused.
 
-use super::dice::Dice;
 use super::problem::{Problem, integrators};
+use super::random_numbers::RandomNumbers;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use discrete_herglotz::Status;
 
-/// The most steps that a case may take.
+/// The largest number of steps of a case.
 const STEPS: usize = 200_000;
 
-pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn accurate<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, span, .. } = problem;
-    // A rule of order 1 or 2 to twelve digits has no end; by order, what is reasonable.
-    let integrator = dice.pick(&integrators());
+    // Twelve digits by a rule of order 1 or 2 would take too many steps; the accuracy depends on the order.
+    let integrator = random.pick(&integrators());
     let least: f64 = if integrator.order() <= 2 { 1e-4 } else { 1e-10 };
-    let tolerance = dice.scale(least, 1e-2);
-    let action = dice.chance(0.5);
+    let tolerance = random.scale(least, 1e-2);
+    let action = random.chance(0.5);
     let posed = match problem.posed() {
         Ok(posed) => posed,
         Err(error) => return Ok(refused(&error)),
@@ -53,11 +53,11 @@ pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checke
     }
     ensure(error <= 10.0 * tolerance, Kind::AboveTolerance, || {
         format!(
-            "{integrator}: error {error:.1e} where {tolerance:.1e} was asked for, {} steps, condition {:.1e}, lie {:?}, patience {:.1e}",
+            "{integrator}: error {error:.1e} where {tolerance:.1e} was requested, {} steps, condition {:.1e}, false_claim {:?}, bump_time {:.1e}",
             plan.count(),
             truth.condition,
-            system.lie,
-            system.patience(start),
+            system.false_claim,
+            system.bump_time(start),
         )
     })?;
     Ok(Verdict::Right)

@@ -1,20 +1,24 @@
-//! The exact side: the motion in one go and in pieces, exp_h and its inverse, the jets of the exact discrete Lagrangian.
+//! The exact flow: motions in one piece and in several, exp_h and its inverse, the jets of the exact discrete
+//! Lagrangian.
 
-use super::dice::Dice;
 use super::flows::is_conformal;
 use super::problem::Problem;
+use super::random_numbers::RandomNumbers;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ensure, exact as named};
-use contact_geom::{ChartVector, legendre, max_or_nan};
-use discrete_herglotz::{DiscreteLagrangian, derived_jet, legendre_plus};
+use contact_geom::{ChartVector, legendre, numbers::max_or_nan};
+use discrete_herglotz::{
+    DiscreteLagrangian,
+    theory::{derived_jet, legendre_plus},
+};
 use exact_lagrangian::{ExactLagrangian, herglotz_flow};
 
-/// The condition above which rounding alone leaves nothing to compare.
+/// The condition above which rounding alone makes a comparison impossible.
 const CHAOTIC: f64 = 1e9;
 
-pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn motion<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, span, pace } = problem;
-    // So that what is fast can be followed to its end.
+    // A shorter span for fast motions, so that they can be computed to the end.
     let span = &(span / pace);
     let motion = match herglotz_flow(system, *t0, start, *span) {
         Ok(motion) => motion,
@@ -33,7 +37,7 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
     };
     let at = legendre(system, t0 + span, &motion.end);
     let error = truth.error(&at.q, &at.p, Some(at.z));
-    // Some units of round-off a panel; the pieces have as many in all.
+    // Some units of round-off for each panel; the pieces have as many in all.
     let bound = truth.rounding(*t0, max_or_nan(100.0, f64::from(motion.panels)) as usize);
     ensure(error <= bound, Kind::RoutesDiffer, || {
         format!(
@@ -41,8 +45,8 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
             truth.condition
         )
     })?;
-    // And back: what dissipation has damped grows again.
-    if dice.chance(0.2)
+    // Backward, where motions that were damped grow.
+    if random.chance(0.2)
         && let Ok(back) = herglotz_flow(system, t0 + span, &motion.end, -span)
     {
         ensure(ChartVector::from(back.end).is_finite(), Kind::NotFinite, || format!("back to {back:?}"))?;
@@ -50,9 +54,9 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
     Ok(Verdict::Right)
 }
 
-pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn between_points<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, pace, .. } = problem;
-    let h = dice.scale(1e-3, 1.0) / pace;
+    let h = random.scale(1e-3, 1.0) / pace;
     let ld = match ExactLagrangian::<_, N>::new(system, h) {
         Ok(ld) => ld,
         Err(error) => return Ok(super::verdict::refused(&error)),
@@ -66,7 +70,7 @@ pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> 
         Ok(found) => found,
         Err(error) => return Ok(named(&error)),
     };
-    // Perhaps another motion than the one drawn, but one through both points.
+    // The motion may differ from the one drawn, but passes through both points.
     let again = match ld.exponential().at(*t0, &found.start) {
         Ok(again) => again,
         Err(error) => {
@@ -76,7 +80,7 @@ pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> 
     };
     let missed = (again.q1 - x.q1).amax();
     let size = max_or_nan(x.q0.amax(), x.q1.amax()) + h * found.start.v.amax();
-    // Far from t = 0 a force in time is known to the rounding of the time, in units of its period.
+    // Far from t = 0 a force in time has the error of the rounding of the time, in units of its period.
     ensure(missed <= (1e-11 + 1e2 * f64::EPSILON * t0.abs()) * size, Kind::Residual, || {
         format!("h = {h:.1e}: the motion found misses by {missed:.1e}")
     })?;
@@ -86,17 +90,17 @@ pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> 
     };
     let finite = [jet.value, jet.dz, jet.sigma()].into_iter().chain(jet.d1.iter().chain(&jet.d2).copied());
     ensure(finite.into_iter().all(f64::is_finite) && plus.check().is_ok(), Kind::NotFinite, || format!("{jet:?}"))?;
-    if dice.chance(0.2)
+    if random.chance(0.2)
         && let Ok(derived) = derived_jet(&ld, *t0, &x)
     {
         let apart = max_or_nan((derived.d1 - jet.d1).amax(), (derived.d2 - jet.d2).amax());
         let size = max_or_nan(jet.d1.amax(), jet.d2.amax());
-        // Positions lose eps/h of the velocity between them.
+        // Positions determine the velocity between them up to eps/h.
         ensure(apart <= 1e-9 / h * size, Kind::RoutesDiffer, || {
             format!("h = {h:.1e}: the jet {jet:?}, by automatic differentiation {derived:?}")
         })?;
     }
-    if dice.chance(0.2) {
+    if random.chance(0.2) {
         let from = legendre(system, *t0, start);
         is_conformal(&ld, *t0, &from, &start.v)?;
     }

@@ -1,30 +1,30 @@
-//! Runs with fixed steps: by every integrator, judged by the motion itself and by runs with shorter steps.
+//! Runs with fixed steps by every integrator, compared with the motion and with runs of shorter steps.
 
-use super::dice::Dice;
 use super::problem::{Problem, integrators};
+use super::random_numbers::RandomNumbers;
 use super::system::RandomSystem;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{ChartVector, OneParameterGroup, Symmetry, VelocityPoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Outcome, Plan, Row, Rows, Run, Solver, Status, Steps};
+use discrete_herglotz::{DiscreteLagrangian, Outcome, Plan, Row, Rows, Run, Status, Steps, solve::Solver};
 use exact_lagrangian::ExactLagrangian;
 
-/// The error, relative to the size of the motion, below which a run has found its motion.
+/// The error, relative to the size of the motion, below which a run agrees with its motion.
 const FOUND: f64 = 0.1;
 
-/// The error of a single step that is one of order one.
+/// The error above which a single step counts as wrong.
 const ORDER_ONE: f64 = 1.0;
 
 /// The condition above which a motion has no answer to compare with.
 const CHAOTIC: f64 = 1e7;
 
-/// The most steps of a run here, and of one to compare with it.
+/// The largest number of steps of a run, and of a run to compare it with.
 const STEPS: usize = 200;
 const REFINED: usize = 1 << 12;
 
-/// What is asked of a run beside its final `(q, p)`.
+/// The outputs of a run in addition to its final `(q, p)`.
 #[derive(Clone, Debug)]
-struct Asked<const N: usize> {
+struct Outputs<const N: usize> {
     action: bool,
     conformal_factor: bool,
     /// The steps between two rows.
@@ -33,7 +33,7 @@ struct Asked<const N: usize> {
     momentum: Option<Symmetry<N>>,
 }
 
-impl<const N: usize> Asked<N> {
+impl<const N: usize> Outputs<N> {
     fn of<'p, 'o>(&self, run: Run<'p, 'o, RandomSystem<N>, N>) -> Run<'p, 'o, RandomSystem<N>, N> {
         let run = if self.action { run } else { run.without_action() };
         if self.conformal_factor { run.with_conformal_factor() } else { run }
@@ -49,25 +49,25 @@ impl<const N: usize> Asked<N> {
     }
 }
 
-/// Draws what is asked of a run, runs it and judges it.
-pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+/// Draws the outputs of a run, runs it and checks the result.
+pub fn fixed<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, span, .. } = problem;
-    let integrator = dice.pick(&integrators());
-    let count = (dice.scale(1.0, STEPS as f64).round() as usize).max(1);
+    let integrator = random.pick(&integrators());
+    let count = (random.scale(1.0, STEPS as f64).round() as usize).max(1);
     let h = span / count as f64;
-    let steps = if dice.chance(0.5) { Steps::Count(count) } else { Steps::Size(h) };
-    let momentum = if N == 2 && dice.chance(0.2) { Symmetry::rotation(0, 1).ok() } else { None };
-    let asked = Asked {
-        action: dice.chance(0.6),
-        conformal_factor: dice.chance(0.3),
-        rows: dice.chance(0.3).then(|| 1 + dice.below(20)),
+    let steps = if random.chance(0.5) { Steps::Count(count) } else { Steps::Size(h) };
+    let momentum = if N == 2 && random.chance(0.2) { Symmetry::rotation(0, 1).ok() } else { None };
+    let outputs = Outputs {
+        action: random.chance(0.6),
+        conformal_factor: random.chance(0.3),
+        rows: random.chance(0.3).then(|| 1 + random.below(20)),
         momentum,
     };
     let posed = match problem.posed() {
         Ok(posed) => posed,
         Err(error) => return Ok(refused(&error)),
     };
-    let plan = match asked.of(posed.by(integrator).steps(steps)).plan(problem.until()) {
+    let plan = match outputs.of(posed.by(integrator).steps(steps)).plan(problem.until()) {
         Ok(plan) => plan,
         Err(error) => return Ok(refused(&error)),
     };
@@ -75,8 +75,8 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         Ok(stepper) => stepper,
         Err(error) => return Ok(refused(&error)),
     };
-    let mut rows = asked.rows();
-    let run = asked.of(posed.by(integrator).steps(steps));
+    let mut rows = outputs.rows();
+    let run = outputs.of(posed.by(integrator).steps(steps));
     let run = if let Some(rows) = &mut rows { run.observe(rows) } else { run };
     let outcome = match run.run(problem.until()) {
         Ok(outcome) => outcome,
@@ -89,7 +89,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         ensure(step == outcome.steps, Kind::RoutesDiffer, || format!("step {step} failed after {}", outcome.steps))?;
         return Ok(ended(&cause));
     }
-    // A motion that is at rest has no other end.
+    // A motion at rest has no other end.
     let rests = matches!(status, Status::Stopped { by: "rest", .. });
     ensure(rests || outcome.steps == plan.count(), Kind::RoutesDiffer, || {
         format!("{} steps of {}", outcome.steps, plan.count())
@@ -97,16 +97,16 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let late = (outcome.t - (t0 + span)).abs();
     ensure(late <= 4.0 * f64::EPSILON * (t0.abs() + span), Kind::RoutesDiffer, || format!("ends {late:e} late"))?;
 
-    // The same run with nothing observed.
+    // The same run without observers.
     let halted = stepper.advance(plan.count());
     let bare = stepper.state();
     let same = halted.is_ok() && bare.q == q && bare.p == p && z.is_none_or(|z| z == bare.z);
     ensure(same, Kind::ObservedDiffers, || {
         let apart = larger_of(&(bare.q - q), &(bare.p - p));
-        format!("{integrator}: {apart:e} between a run with {asked:?} and one without, {halted:?}")
+        format!("{integrator}: {apart:e} between a run with {outputs:?} and one without, {halted:?}")
     })?;
     if outcome.unresolved.is_some() {
-        return Ok(Verdict::Marked);
+        return Ok(Verdict::Flagged);
     }
 
     let truth = match truth(system, *t0, start, *span) {
@@ -118,19 +118,20 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         Ok(_) | Err(_) => return Ok(Verdict::NoReference),
     };
     let error = truth.error(&q, &p, z);
-    // What rounding does in a run that solves nonlinear equations, or carries a momentum, to some hundred units a run.
+    // The rounding of a run that solves nonlinear equations, or has a momentum among its outputs, of some hundred units
+    // a run.
     let floor = truth.rounding(*t0, count);
     if error <= floor {
         return Ok(Verdict::Right);
     }
-    // The order cannot be asked of a step that is too long; that the error falls can.
-    let finer = Asked { conformal_factor: false, ..asked };
+    // Steps that are too long do not show the order, but the error must decrease.
+    let finer = Outputs { conformal_factor: false, ..outputs };
     let mut ends = vec![Some((q, p, z))];
     let mut errors = vec![error];
     let mut refined = 2 * count;
     let small_enough = |error: f64, first: f64| error <= 0.7 * first.min(FOUND) || error <= floor;
     while refined <= REFINED && (errors.len() == 1 || !small_enough(errors[errors.len() - 1], error)) {
-        // A poor step may go where a good one refuses to.
+        // A poor step may continue where a good one refuses to.
         let run = finer.of(posed.by(integrator).steps(Steps::Count(refined))).run(problem.until()).ok();
         let end = run.filter(|o| o.status == Status::Completed).map(|o| (o.q, o.p, o.z));
         errors.push(end.as_ref().map_or(f64::INFINITY, |(q, p, z)| truth.error(q, p, *z)));
@@ -139,7 +140,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     }
     let last = errors[errors.len() - 1];
     if !small_enough(last, error) {
-        // Where the runs agree with each other, and not with the motion, they converge to something else.
+        // Runs that agree with each other, and not with the motion, converge to a wrong limit.
         let settled = match &ends[ends.len() - 2..] {
             [Some((q, p, _)), Some((fine_q, fine_p, _))] => {
                 truth.error(&(fine_q - q + truth.end.q), &(fine_p - p + truth.end.p), None) <= 0.1 * last
@@ -148,10 +149,10 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         };
         ensure(!settled, Kind::DoesNotConverge, || {
             format!(
-                "{integrator} from {count} steps, doubled: errors {errors:?}, condition {:.1e}, lie {:?}, patience {:.1e}",
+                "{integrator} from {count} steps, doubled: errors {errors:?}, condition {:.1e}, false_claim {:?}, bump_time {:.1e}",
                 truth.condition,
-                system.lie,
-                system.patience(start),
+                system.false_claim,
+                system.bump_time(start),
             )
         })?;
         return Ok(Verdict::NoReference);
@@ -160,7 +161,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         return Ok(Verdict::Right);
     }
     let (step, worst) = worst_step(problem, &plan, truth.size)?;
-    ensure(worst <= ORDER_ONE, Kind::UnmarkedStep, || {
+    ensure(worst <= ORDER_ONE, Kind::UnflaggedStep, || {
         format!(
             "{integrator}, h = {h:.2e}: step {step} of {count} is wrong by {worst:.1e} sizes of the motion; at the end {error:.1e}"
         )
@@ -172,10 +173,10 @@ fn larger_of<const N: usize>(
     a: &contact_geom::nalgebra::SVector<f64, N>,
     b: &contact_geom::nalgebra::SVector<f64, N>,
 ) -> f64 {
-    contact_geom::max_abs_or_nan(a.iter().chain(b).copied())
+    contact_geom::numbers::max_abs_or_nan(a.iter().chain(b).copied())
 }
 
-/// Refuses an outcome with a number that is not finite; a factor may be too small or too large for a number in one step.
+/// Fails for an outcome with a number that is not finite; a factor may underflow or overflow in one step.
 fn finite<'r, const N: usize>(outcome: &Outcome<N>, rows: impl Iterator<Item = &'r Row<N>>) -> Result<(), Wrong> {
     let end = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z).chain([outcome.t]);
     let rows = rows.flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.columns.clone()).chain([r.t]));
@@ -183,11 +184,11 @@ fn finite<'r, const N: usize>(outcome: &Outcome<N>, rows: impl Iterator<Item = &
     ensure(good, Kind::NotFinite, || format!("{outcome:?}"))
 }
 
-/// The steps of a run whose motion may have no end, or more than can be followed, before no more are looked at.
+/// The number of steps without a reference motion, or with one that takes too long, after which the comparison ends.
 const LOST: usize = 4;
 
-/// The step of a run that is farthest from the motion through its start, in sizes of the motion, up to the first that is
-/// [wrong](ORDER_ONE): what runs away after it takes the motion long to follow.
+/// The step of a run with the largest distance from the motion through its start, in units of the size of the motion,
+/// up to the first step that is [wrong](ORDER_ONE): after that the motion may run away and take long to compute.
 fn worst_step<const N: usize>(
     problem: &Problem<N>,
     plan: &Plan<'_, RandomSystem<N>, N>,
@@ -207,14 +208,14 @@ fn worst_step<const N: usize>(
             return Ok(worst);
         }
         let to = stepper.state();
-        // Where the motion from a step's start is not defined up to its end, no step should be there.
+        // Where the motion from the start of a step is not defined up to its end, the step should not exist.
         let error = match exact.forward(t, &from, &guess, &mut Solver::default()) {
             Ok(motion) => {
                 guess = motion.velocity;
                 let apart = ChartVector::from(motion.end).minus(to.into());
-                contact_geom::max_or_nan(
-                    contact_geom::max_abs_or_nan(apart.x.iter().copied()) / size_q,
-                    contact_geom::max_abs_or_nan(apart.y.iter().copied()) / size_p,
+                contact_geom::numbers::max_or_nan(
+                    contact_geom::numbers::max_abs_or_nan(apart.x.iter().copied()) / size_q,
+                    contact_geom::numbers::max_abs_or_nan(apart.y.iter().copied()) / size_p,
                 )
             }
             Err(_) => {

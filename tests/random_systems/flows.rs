@@ -1,18 +1,24 @@
-//! Flows of discrete Lagrangians: each step solves its equations, is conformally contact, and has a way back.
+//! Flows of discrete Lagrangians: each step solves its equations, is conformally contact, and can be taken backward.
 
-use super::dice::Dice;
 use super::problem::Problem;
+use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, DiscreteJet, DiscretePoint, PhasePoint, legendre, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    ChartVector, DiscreteJet, DiscretePoint, PhasePoint, legendre,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use discrete_herglotz::{
-    DiscreteLagrangian, DiscretePath, DiscreteStep, Flow, Method, Solver, legendre_minus, legendre_plus,
+    DiscreteLagrangian, DiscreteStep,
+    rules::{Flow, Method},
+    solve::Solver,
+    theory::{DiscretePath, legendre_minus, legendre_plus},
 };
 
-pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn flow<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, .. } = problem;
-    let method = dice.pick(Method::ALL);
-    let (h, steps) = (dice.scale(1e-4, 1.0), 1 + dice.below(40));
+    let method = random.pick(Method::ALL);
+    let (h, steps) = (random.scale(1e-4, 1.0), 1 + random.below(40));
     let state = legendre(system, *t0, start);
     let ld = match method.discretise(system, h, *t0, &state) {
         Ok(ld) => ld,
@@ -30,7 +36,7 @@ pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         step_solves_its_equations(&ld, pair[0].0, &pair[0].1, &pair[1].1).map_err(|wrong| named(wrong, method))?;
     }
     if rows.len() > 1 {
-        let k = dice.below(rows.len() - 1);
+        let k = random.below(rows.len() - 1);
         let guess = (rows[k + 1].1.q - rows[k].1.q) / h;
         is_conformal(&ld, rows[k].0, &rows[k].1, &guess).map_err(|wrong| named(wrong, method))?;
         let points = rows.iter().map(|(_, x)| x.q).collect();
@@ -39,7 +45,7 @@ pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
             let finite = residuals.iter().flatten().all(|r| r.is_finite());
             ensure(finite, Kind::NotFinite, || format!("{method}: residuals {residuals:?}"))?;
         }
-        // Back to where the last step has come from, or to another point that the step leads from.
+        // Backward to the start of the last step, or to another point from which a step ends at the same state.
         let to = *flow.state();
         if flow.step_back().is_ok() {
             let back = *flow.state();
@@ -61,8 +67,8 @@ fn named(wrong: Wrong, name: impl std::fmt::Display) -> Wrong {
     Wrong { what: format!("{name}: {}", wrong.what), ..wrong }
 }
 
-/// The discrete Herglotz equations of a step, `F-L_d` at its start and `F+L_d` at its end, to the rounding of the positions
-/// times the slope of the momenta in them.
+/// Checks the discrete Herglotz equations of a step, `F-L_d` at its start and `F+L_d` at its end, up to the rounding of
+/// the positions times the derivative of the momenta by the positions.
 pub fn step_solves_its_equations<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -82,10 +88,10 @@ pub fn step_solves_its_equations<const N: usize>(
     let sigma = jet.first.sigma();
     let actions = from.z.abs() + to.z.abs() + value.abs();
     let sizes = momenta * (1.0 + dz.abs()) + slope * places + by_action * actions * (1.0 + momenta);
-    // 1e3 roundings of each term: Newton's method ends some units above round-off, and L sums up to a dozen terms. Rounding of
-    // one equation moves the solution by its inverse, and the other by the slope.
+    // 1e3 roundings of each term: Newton's method ends some units above round-off, and L has up to a dozen terms. The
+    // rounding of one equation moves the solution by its inverse, and the other equation by its derivative.
     let condition = max_or_nan(1.0, slope / jet.regularity().smallest) * max_or_nan(1.0, 1.0 / sigma);
-    // And what the equations change by in the rounding of the time, far from t = 0.
+    // The change of the equations by the rounding of the time, far from t = 0.
     let later = t + 16.0 * f64::EPSILON * t.abs();
     let (Ok(minus_later), Ok(plus_later)) = (legendre_minus(ld, later, &x), legendre_plus(ld, later, &x)) else {
         return Ok(());
@@ -97,7 +103,7 @@ pub fn step_solves_its_equations<const N: usize>(
         + f64::MIN_POSITIVE;
     let (at_start, at_end) = (max((minus.p - from.p).as_slice()), max((plus.p - to.p).as_slice()));
     let action = (plus.z - to.z).abs();
-    // Where the slopes overflow there is no bound to hold.
+    // Where the derivatives overflow there is no bound.
     let applies = bound.is_finite() && bound_z.is_finite();
     let good = at_start <= bound && at_end <= bound && action <= bound_z;
     ensure(!applies || good, Kind::Residual, || {
@@ -110,7 +116,8 @@ pub fn step_solves_its_equations<const N: usize>(
     })
 }
 
-/// That a step contracts the contact form by its sigma_d: by differences of the step in all coordinates of its start.
+/// Checks that a step scales the contact form by its sigma_d, by differences of the step in all coordinates of its
+/// start.
 pub fn is_conformal<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -123,7 +130,8 @@ pub fn is_conformal<const N: usize>(
     let mut worst = 0.0f64;
     let end_at = ChartVector::from(end);
     for i in 0..ChartVector::<N>::DIMENSION {
-        // The third root of round-off is the best for differences of the third order; in units of what is like the coordinate.
+        // The third root of round-off is the best step for differences of the third order, in units of the coordinates
+        // of the same kind.
         let like = |x: &ChartVector<N>| match i / N {
             0 => max_abs_or_nan(x.x.iter().copied()),
             1 => max_abs_or_nan(x.y.iter().copied()),
@@ -140,7 +148,7 @@ pub fn is_conformal<const N: usize>(
         let difference =
             |a: &PhasePoint<N>, b: &PhasePoint<N>| ChartVector::from(*a).minus((*b).into()).scale(0.5 / step);
         let (narrow, wide) = (difference(&up.end, &down.end), difference(&up_2.end, &down_2.end).scale(0.5));
-        // Where two differences do not agree the step is not smooth at this scale: nothing can be said.
+        // Where two differences disagree the step is not smooth at this scale, and nothing is asserted.
         let off = narrow.minus(wide);
         if off.amax() > 1e-4 * narrow.amax() {
             return Ok(());
@@ -149,8 +157,8 @@ pub fn is_conformal<const N: usize>(
         let direction = ChartVector::<N>::from_fn(unit);
         let at_end = narrow.z - end.p.dot(&narrow.x);
         let at_start = sigma * (direction.z - from.p.dot(&direction.x));
-        // And the noise of the differences, as large as that by which two of them differ, or as the rounding of the ends; which the
-        // terms may be below.
+        // The noise of the differences, which is the difference of two of them, or the rounding of the ends; the terms
+        // may be smaller than it.
         let rounding = 8.0 * (f64::EPSILON * (end.z.abs() + end.p.abs().dot(&end.q.abs())) + f64::MIN_POSITIVE) / step;
         let noise = off.z.abs() + end.p.abs().dot(&off.x.abs()) + rounding;
         let size = narrow.z.abs() + end.p.abs().dot(&narrow.x.abs()) + at_start.abs();

@@ -1,15 +1,20 @@
-//! Contact Gauss collocation by its own door: chunks, dense output, events.
+//! Contact Gauss collocation by its own entry point: steps in chunks, dense output, events.
 
-use super::dice::Dice;
 use super::flows::{is_conformal, step_solves_its_equations};
 use super::problem::Problem;
+use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use contact_geom::{ChartVector, PhasePoint, legendre, max_abs_or_nan, max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Event, Events, Gauss, Start, Status, StepFailure, Stepper, Steps, Until};
+use contact_geom::{
+    ChartVector, PhasePoint, legendre,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
+use discrete_herglotz::{
+    AnyIntegrator, Event, Events, Start, Status, StepFailure, Stepper, Steps, Until, gauss::Gauss,
+};
 
-pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn gauss<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, .. } = problem;
-    let (stages, h, steps) = (1 + dice.below(16), dice.scale(1e-3, 1.0), 1 + dice.below(20));
+    let (stages, h, steps) = (1 + random.below(16), random.scale(1e-3, 1.0), 1 + random.below(20));
     let state = legendre(system, *t0, start);
     let gauss = match Gauss::new(system, stages, h) {
         Ok(gauss) => gauss,
@@ -24,17 +29,17 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let end = whole.state();
     ensure(ChartVector::from(end).is_finite(), Kind::NotFinite, || format!("gauss_{stages}: {end:?}"))?;
 
-    // The same in chunks, looked at between them.
+    // The same in chunks, with dense output between them.
     let Ok(mut parts) = stepper() else { return Ok(Verdict::NoReference) };
     let (mut taken, mut halted) = (0, Ok(()));
     let mut last = (*t0, state);
     while taken < steps && halted.is_ok() {
-        let chunk = (1 + dice.below(4)).min(steps - taken);
+        let chunk = (1 + random.below(4)).min(steps - taken);
         halted = parts.advance(chunk).map_err(|halt| StepFailure { taken: taken + halt.taken, ..halt });
         taken += chunk;
         if halted.is_ok() {
-            looked_at(&parts, stages, dice)?;
-            if chunk == 1 && dice.chance(0.1) {
+            check_dense_output(&parts, stages, random)?;
+            if chunk == 1 && random.chance(0.1) {
                 step_solves_its_equations(&gauss, last.0, &last.1, &parts.state())?;
             }
             last = (parts.time(), parts.state());
@@ -43,11 +48,11 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     ensure(halted == all && parts.state() == end, Kind::ObservedDiffers, || {
         format!("gauss_{stages}: {all:?} and {halted:?}, {end:?} and {:?}", parts.state())
     })?;
-    if dice.chance(0.2) {
+    if random.chance(0.2) {
         is_conformal(&gauss, *t0, &state, &start.v)?;
     }
 
-    // Without the action the motion is the same to the bit, up to where one of both ends.
+    // Without the action the motion is the same to the bit, up to the first failure of either.
     let Ok(mut bare) = gauss.stepper_without_action(*t0, state, start.v) else { return Ok(Verdict::NoReference) };
     let without = bare.advance(steps);
     let same = match (all, without) {
@@ -58,36 +63,36 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         format!("gauss_{stages} without the action: {all:?} and {without:?}, {end:?} and {:?}", bare.state())
     })?;
 
-    with_events(problem, (stages, h, steps), dice)?;
+    with_events(problem, (stages, h, steps), random)?;
     Ok(match all {
-        _ if whole.unresolved().is_some() => Verdict::Marked,
+        _ if whole.unresolved().is_some() => Verdict::Flagged,
         Ok(()) => Verdict::Right,
         Err(halt) => ended(&halt.cause),
     })
 }
 
-/// A run with an event where the first coordinate crosses a level: its states are there, its times in order, and the run is the same as
-/// without.
+/// A run with an event where the first coordinate crosses a level: the states of the crossings are on the level, the
+/// times are in order, and the run is the same as without the event.
 fn with_events<const N: usize>(
     problem: &Problem<N>,
     (stages, h, steps): (usize, f64, usize),
-    dice: &mut Dice,
+    random: &mut RandomNumbers,
 ) -> Result<(), Wrong> {
     let Problem { system, t0, start, .. } = problem;
-    let level = start.q[0] + dice.between(-0.5, 0.5);
+    let level = start.q[0] + random.between(-0.5, 0.5);
     let event = Event::new(|_, x: &PhasePoint<N>| x.q[0] - level);
-    let event = match dice.below(3) {
+    let event = match random.below(3) {
         0 => event,
         1 => event.rising(),
         _ => event.falling(),
     };
-    let terminal = dice.chance(0.3);
+    let terminal = random.chance(0.3);
     let mut events = Events::new([if terminal { event.terminal() } else { event }]);
-    // A run is refused more than a stepper: it looks at the claims along the whole span.
+    // A run is refused more often than a stepper, since it checks the declared structure along the whole span.
     let Ok(posed) = problem.posed() else { return Ok(()) };
     let by_steps = posed.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(h)).observe(&mut events);
     let Ok(plan) = by_steps.plan(Until::Steps(steps)) else { return Ok(()) };
-    // It may differ from h in the last digit.
+    // The step size may differ from h in the last digit.
     let of_run = plan.step_size();
     let (Ok(outcome), Ok(gauss)) = (by_steps.run(Until::Steps(steps)), Gauss::new(system, stages, of_run)) else {
         return ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: a plan and no run"));
@@ -101,7 +106,7 @@ fn with_events<const N: usize>(
     let mut before = *t0;
     for crossing in &events.crossings {
         let off = (crossing.state.q[0] - level).abs();
-        // The rounding of a step's sums over up to 16 terms, and what the motion does in the spacing of the time.
+        // The rounding of the sums of a step of up to 16 terms, and the motion in the spacing of the time.
         let size = ChartVector::from(crossing.state).amax()
             + ChartVector::from(end).amax()
             + ChartVector::from(*at).amax()
@@ -122,7 +127,7 @@ fn with_events<const N: usize>(
             let there = events.crossings.last().map(|c| (c.t, c.state)) == Some((t, state)) && t == outcome.t;
             ensure(terminal && there, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}"))
         }
-        // Of the run itself it is the same failure; before that one there may be a part of a step that cannot be taken.
+        // The failure is that of the run, or an earlier one: a part of a step cannot be taken.
         Status::Failed { step, cause, .. } => {
             let same = without == Err(StepFailure { taken: step, cause });
             let before = without.map_or_else(|halt| halt.taken, |()| steps) >= step && step > 0;
@@ -130,22 +135,22 @@ fn with_events<const N: usize>(
                 format!("gauss_{stages}: {outcome:?} with events, {without:?} without")
             })
         }
-        // The plan has taken all steps, and looked.
+        // The plan has taken all steps and checked the structure.
         Status::FalseClaim { .. } => ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}")),
     }
 }
 
-/// The dense output of the last step: at its ends the states, between them finite.
-fn looked_at<const N: usize>(
-    stepper: &discrete_herglotz::GaussStepper<'_, &super::system::RandomSystem<N>, N>,
+/// The dense output of the last step: at its ends it is the states, and between them finite.
+fn check_dense_output<const N: usize>(
+    stepper: &discrete_herglotz::gauss::GaussStepper<'_, &super::system::RandomSystem<N>, N>,
     stages: usize,
-    dice: &mut Dice,
+    random: &mut RandomNumbers,
 ) -> Result<(), Wrong> {
     let Some(curve) = stepper.dense() else {
         return ensure(false, Kind::RoutesDiffer, || "no dense output after a step".into());
     };
     let (from, to) = curve.span();
-    let within = curve.at(from + (to - from) * dice.between(0.0, 1.0));
+    let within = curve.at(from + (to - from) * random.between(0.0, 1.0));
     let (end, state) = (curve.at(to), stepper.state());
     let apart = ChartVector::from(end).minus(state.into());
     // The times are `t0 + k h`, from a start that may be ten units away.
@@ -153,11 +158,12 @@ fn looked_at<const N: usize>(
     ensure(ChartVector::from(within).is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
         format!("gauss_{stages}: {within:?} between {from} and {to}")
     })?;
-    // Of a step that is too long, which is marked, the stages are so large that their sums have no digits left.
+    // In a step that is too long, and flagged, the stages are so large that their sums lose all digits.
     if stepper.unresolved().is_some() {
         return Ok(());
     }
-    // Sums of up to 16 terms with weights to 33, of what is largest on the way; and what the motion does in the spacing of the time.
+    // Sums of up to 16 terms with weights to 33, of the largest numbers in the step; and the motion in the spacing of
+    // the time.
     let places: Vec<_> =
         (0..=16).map(|i| ChartVector::from(curve.at(from + (to - from) * f64::from(i) / 16.0))).collect();
     let fastest = (0..=16)

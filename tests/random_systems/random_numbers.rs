@@ -1,35 +1,35 @@
-//! Draws that a number reproduces.
+//! Random numbers that the number of a case determines.
 
 use proptest::prelude::RngExt;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 
-/// A stream of draws.
-pub struct Dice(TestRng);
+/// A stream of random numbers.
+pub struct RandomNumbers(TestRng);
 
-impl Dice {
-    /// The stream of a case: no two cases share one.
+impl RandomNumbers {
+    /// The stream of a case; different cases have different streams.
     pub fn of(case: u64) -> Self {
         let mut seed = *b"contact mechanics, a random case";
         seed[..8].copy_from_slice(&case.to_le_bytes());
-        Dice(TestRng::from_seed(RngAlgorithm::ChaCha, &seed))
+        RandomNumbers(TestRng::from_seed(RngAlgorithm::ChaCha, &seed))
     }
 
-    /// A number of an interval.
+    /// A number in an interval.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0.random_range(low..=high)
     }
 
-    /// A positive number, its logarithm uniform.
+    /// A positive number with a uniform logarithm.
     pub fn scale(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// A number below another.
+    /// An integer from 0 to n - 1.
     pub fn below(&mut self, n: usize) -> usize {
         self.0.random_range(0..n)
     }
 
-    /// One of some.
+    /// One of some values.
     pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {
         of[self.below(of.len())]
     }

@@ -1,17 +1,20 @@
-//! Splittings and compositions by their own doors: in chunks, with compensated sums, without the action.
+//! Splittings and compositions by their own entry points: in chunks, with compensated sums, without the action.
 
-use super::dice::Dice;
 use super::problem::Problem;
+use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{ChartVector, PhasePoint, legendre};
-use discrete_herglotz::{ActionSplitting, InputError, Splitting, SplittingScheme, StepFailure, Stepper};
+use discrete_herglotz::{
+    InputError, SplittingScheme, StepFailure, Stepper,
+    splitting::{ActionSplitting, Splitting},
+};
 
-pub fn splitting<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, .. } = problem;
-    let scheme = dice.pick(&SplittingScheme::ALL);
-    let (h, steps) = (dice.scale(1e-4, 1.0), 1 + dice.below(60));
+    let scheme = random.pick(&SplittingScheme::ALL);
+    let (h, steps) = (random.scale(1e-4, 1.0), 1 + random.below(60));
     let state = legendre(system, *t0, start);
-    let chunks: Vec<usize> = (0..steps).map(|_| 1 + dice.below(5)).collect();
+    let chunks: Vec<usize> = (0..steps).map(|_| 1 + random.below(5)).collect();
     let linear = |compensated: bool, action: bool| {
         Splitting::new(system, &scheme, h, *t0, state).map(|s| {
             let s = if compensated { s.compensated() } else { s };
@@ -36,8 +39,8 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Check
     }
 }
 
-/// Of four steppers from one start, the first in one go, the second in chunks, the third with compensated sums, the last
-/// perhaps without the action.
+/// Compares four steppers from one start: the first in one piece, the second in chunks, the third with compensated
+/// sums, the last without the action where the scheme has it.
 fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
     let start = four[0].state();
     let all = four[0].advance(steps);
@@ -57,7 +60,7 @@ fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: 
     ensure(halted == all && ends[0] == ends[1], Kind::ObservedDiffers, || {
         format!("{all:?} in one go, {halted:?} in chunks: {:?} and {:?}", ends[0], ends[1])
     })?;
-    // z may end what a run without it survives.
+    // z may end a run that continues without it.
     let same = match (all, bare) {
         (Ok(()), Ok(())) => ends[0].q == ends[3].q && ends[0].p == ends[3].p,
         (Ok(()), Err(_)) => false,
@@ -67,13 +70,13 @@ fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: 
     if let (Ok(()), Ok(())) = (all, compensated) {
         let apart = ChartVector::from(ends[0]).minus(ends[2].into()).amax();
         let size = ChartVector::from(start).amax() + ChartVector::from(ends[0]).amax();
-        // What rounding is grown by is not known here: only that it stays rounding.
+        // The growth of rounding is not known here: the difference must remain small.
         ensure(apart <= 1e-3 * size, Kind::RoutesDiffer, || {
             format!("compensated sums move the end by {apart:.1e} of {size:.1e}")
         })?;
     }
     Ok(match all {
-        _ if four[0].unresolved().is_some() => Verdict::Marked,
+        _ if four[0].unresolved().is_some() => Verdict::Flagged,
         Ok(()) => Verdict::Right,
         Err(halt) => ended(&halt.cause),
     })

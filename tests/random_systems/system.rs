@@ -1,6 +1,7 @@
-//! A Lagrangian whose terms are drawn at run time: one type, so that each method is compiled once, and any kind of structure.
+//! A Lagrangian whose terms are drawn at run time: one type, so that each method is compiled once, with any kind of
+//! structure.
 
-use super::dice::Dice;
+use super::random_numbers::RandomNumbers;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use std::f64::consts::TAU;
@@ -10,13 +11,13 @@ use std::f64::consts::TAU;
 pub struct RandomSystem<const N: usize> {
     scale: f64,
     mass: SMatrix<f64, N, N>,
-    /// `gamma(t) = steady + swing cos(frequency t)`; the scale leaves it alone.
+    /// `gamma(t) = steady + swing cos(frequency t)`, which is not scaled.
     drag: Drag,
     monomials: Vec<Monomial<N>>,
     waves: Vec<Wave<N>>,
     pub bumps: Vec<Bump>,
-    /// A claim that is made although it does not hold.
-    pub lie: Option<&'static str>,
+    /// A property that is declared although it does not hold.
+    pub false_claim: Option<&'static str>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,7 @@ struct Wave<const N: usize> {
     phase: f64,
 }
 
-/// `factor e^(-((x - centre)/width)^2)`, a hidden thing.
+/// `factor e^(-((x - centre)/width)^2)`, a narrow term.
 #[derive(Clone, Copy, Debug)]
 pub struct Bump {
     factor: f64,
@@ -57,7 +58,7 @@ pub struct Bump {
     on: On,
 }
 
-/// What a bump is narrow in.
+/// The variable in which a bump is narrow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Along {
     /// The first coordinate.
@@ -66,7 +67,7 @@ pub enum Along {
     Time,
 }
 
-/// What a bump acts on.
+/// The term that a bump changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum On {
     /// A hill, or a pulse of force on the first coordinate.
@@ -77,7 +78,7 @@ enum On {
     Mass,
 }
 
-/// How much structure a system has.
+/// The amount of structure of a system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// A polynomial of degree two, with constant or varying drag.
@@ -86,16 +87,16 @@ pub enum Kind {
     Separable,
     /// `v.Mv/2 - V(t, q) + f(z)`.
     NonlinearDrag,
-    /// Anything but a mass that varies.
+    /// Any terms with a constant mass.
     ConstantMass,
-    /// Anything.
+    /// Any terms.
     General,
 }
 
 impl<const N: usize> RandomSystem<N> {
-    /// Draws one.
-    pub fn draw(dice: &mut Dice) -> Self {
-        let kind = dice.pick(&[
+    /// Draws a system.
+    pub fn draw(random: &mut RandomNumbers) -> Self {
+        let kind = random.pick(&[
             Kind::Quadratic,
             Kind::Separable,
             Kind::Separable,
@@ -104,89 +105,96 @@ impl<const N: usize> RandomSystem<N> {
             Kind::General,
             Kind::General,
         ]);
-        let timed = dice.chance(0.35);
-        let frequency = |dice: &mut Dice| if timed && dice.chance(0.5) { dice.scale(0.1, 20.0) } else { 0.0 };
+        let timed = random.chance(0.35);
+        let frequency =
+            |random: &mut RandomNumbers| if timed && random.chance(0.5) { random.scale(0.1, 20.0) } else { 0.0 };
         let drag = Drag {
-            steady: if dice.chance(0.2) { 0.0 } else { -dice.scale(1e-4, 3.0) * dice.pick(&[1.0, 1.0, 1.0, -0.3]) },
-            swing: if timed && dice.chance(0.5) { dice.between(-1.0, 1.0) } else { 0.0 },
-            frequency: dice.scale(0.1, 10.0),
+            steady: if random.chance(0.2) {
+                0.0
+            } else {
+                -random.scale(1e-4, 3.0) * random.pick(&[1.0, 1.0, 1.0, -0.3])
+            },
+            swing: if timed && random.chance(0.5) { random.between(-1.0, 1.0) } else { 0.0 },
+            frequency: random.scale(0.1, 10.0),
         };
         let mut system = RandomSystem {
-            scale: if dice.chance(0.06) { dice.scale(1e-12, 1e12) } else { 1.0 },
-            mass: Self::draw_mass(dice),
+            scale: if random.chance(0.06) { random.scale(1e-12, 1e12) } else { 1.0 },
+            mass: Self::draw_mass(random),
             drag,
             monomials: Vec::new(),
             waves: Vec::new(),
             bumps: Vec::new(),
-            lie: None,
+            false_claim: None,
         };
-        // A well holds most motions; without one they run away, which is a case too.
-        if dice.chance(0.8) {
+        // Most motions are in a well; without one they run away, which is tested too.
+        if random.chance(0.8) {
             for i in 0..N {
-                let degree = if kind == Kind::Quadratic { 2 } else { dice.pick(&[2, 2, 4]) };
+                let degree = if kind == Kind::Quadratic { 2 } else { random.pick(&[2, 2, 4]) };
                 let mut q = [0; N];
                 q[i] = degree;
-                let factor = -dice.scale(0.1, 10.0);
+                let factor = -random.scale(0.1, 10.0);
                 system.monomials.push(Monomial { factor, frequency: 0.0, q, v: [0; N], z: 0 });
             }
         }
-        for _ in 0..dice.below(4) {
-            let factor = dice.between(-0.5, 0.5);
-            let monomial = Monomial { factor, frequency: frequency(dice), ..Self::draw_monomial(kind, dice) };
+        for _ in 0..random.below(4) {
+            let factor = random.between(-0.5, 0.5);
+            let monomial = Monomial { factor, frequency: frequency(random), ..Self::draw_monomial(kind, random) };
             system.monomials.push(monomial);
         }
         if kind != Kind::Quadratic {
-            for _ in 0..dice.below(3) {
-                let wave = Wave { frequency: frequency(dice), ..Self::draw_wave(kind, dice) };
+            for _ in 0..random.below(3) {
+                let wave = Wave { frequency: frequency(random), ..Self::draw_wave(kind, random) };
                 system.waves.push(wave);
             }
-            if dice.chance(0.15) {
-                let bump = Self::draw_bump(kind, timed, dice);
+            if random.chance(0.15) {
+                let bump = Self::draw_bump(kind, timed, random);
                 system.bumps.push(bump);
             }
         }
-        if dice.chance(0.08) {
+        if random.chance(0.08) {
             let made = system.true_structure();
-            let lies: Vec<_> = CLAIMS.iter().filter(|(_, claim)| !*claim(&mut { made })).collect();
-            if !lies.is_empty() {
-                system.lie = Some(lies[dice.below(lies.len())].0);
+            let false_claims: Vec<_> = CLAIMS.iter().filter(|(_, claim)| !*claim(&mut { made })).collect();
+            if !false_claims.is_empty() {
+                system.false_claim = Some(false_claims[random.below(false_claims.len())].0);
             }
         }
         system
     }
 
-    fn draw_mass(dice: &mut Dice) -> SMatrix<f64, N, N> {
-        match dice.below(10) {
+    fn draw_mass(random: &mut RandomNumbers) -> SMatrix<f64, N, N> {
+        match random.below(10) {
             0..5 => SMatrix::identity(),
-            5..8 => SMatrix::from_diagonal(&SVector::from_fn(|_, _| dice.scale(0.1, 10.0))),
+            5..8 => SMatrix::from_diagonal(&SVector::from_fn(|_, _| random.scale(0.1, 10.0))),
             8 => {
-                let a = SMatrix::<f64, N, N>::from_fn(|_, _| dice.between(-1.0, 1.0));
+                let a = SMatrix::<f64, N, N>::from_fn(|_, _| random.between(-1.0, 1.0));
                 a * a.transpose() + SMatrix::identity() * 0.2
             }
-            // Ratios of masses that strain a solver, and masses that are not positive.
-            _ => SMatrix::from_diagonal(&SVector::from_fn(|_, _| dice.scale(1e-4, 1e4) * dice.pick(&[1.0, 1.0, -1.0]))),
+            // Large ratios of masses, and masses that are not positive.
+            _ => SMatrix::from_diagonal(&SVector::from_fn(|_, _| {
+                random.scale(1e-4, 1e4) * random.pick(&[1.0, 1.0, -1.0])
+            })),
         }
     }
 
-    fn draw_monomial(kind: Kind, dice: &mut Dice) -> Monomial<N> {
+    fn draw_monomial(kind: Kind, random: &mut RandomNumbers) -> Monomial<N> {
         let (mut q, mut v, mut z) = ([0; N], [0; N], 0);
         let most = if kind == Kind::Quadratic { 2 } else { 4 };
-        let degree = 1 + dice.below(most);
-        let alone = dice.chance(0.4);
+        let degree = 1 + random.below(most);
+        let alone = random.chance(0.4);
         for _ in 0..degree {
-            let i = dice.below(N);
+            let i = random.below(N);
             match kind {
                 Kind::Separable => q[i] += 1,
                 Kind::NonlinearDrag if alone => z += 1,
                 Kind::NonlinearDrag => q[i] += 1,
-                Kind::Quadratic if dice.chance(0.7) => q[i] += 1,
+                Kind::Quadratic if random.chance(0.7) => q[i] += 1,
                 Kind::Quadratic => v[i] += 1,
-                Kind::ConstantMass => match dice.below(3) {
+                Kind::ConstantMass => match random.below(3) {
                     0 => q[i] += 1,
                     1 if v.iter().sum::<u32>() == 0 => v[i] += 1,
                     _ => z += 1,
                 },
-                Kind::General => match dice.below(3) {
+                Kind::General => match random.below(3) {
                     0 => q[i] += 1,
                     1 => v[i] += 1,
                     _ => z += 1,
@@ -196,35 +204,35 @@ impl<const N: usize> RandomSystem<N> {
         Monomial { factor: 0.0, frequency: 0.0, q, v, z }
     }
 
-    fn draw_wave(kind: Kind, dice: &mut Dice) -> Wave<N> {
-        let vector = |dice: &mut Dice| SVector::from_fn(|_, _| dice.between(-2.0, 2.0));
-        let (none, factor, phase) = (SVector::zeros(), dice.between(-1.0, 1.0), dice.between(0.0, TAU));
+    fn draw_wave(kind: Kind, random: &mut RandomNumbers) -> Wave<N> {
+        let vector = |random: &mut RandomNumbers| SVector::from_fn(|_, _| random.between(-2.0, 2.0));
+        let (none, factor, phase) = (SVector::zeros(), random.between(-1.0, 1.0), random.between(0.0, TAU));
         let wave = Wave { factor, q: none, v: none, z: 0.0, frequency: 0.0, phase };
         match kind {
-            Kind::NonlinearDrag if dice.chance(0.3) => Wave { z: dice.between(-2.0, 2.0), ..wave },
-            Kind::Quadratic | Kind::Separable | Kind::NonlinearDrag => Wave { q: vector(dice), ..wave },
-            Kind::ConstantMass => Wave { q: vector(dice), z: dice.between(-2.0, 2.0), ..wave },
-            // Small in v, so that W stays regular as a rule.
+            Kind::NonlinearDrag if random.chance(0.3) => Wave { z: random.between(-2.0, 2.0), ..wave },
+            Kind::Quadratic | Kind::Separable | Kind::NonlinearDrag => Wave { q: vector(random), ..wave },
+            Kind::ConstantMass => Wave { q: vector(random), z: random.between(-2.0, 2.0), ..wave },
+            // Small in v, so that W is usually regular.
             Kind::General => {
-                let (q, v, z) = (vector(dice), vector(dice) * 0.3, dice.between(-1.0, 1.0));
+                let (q, v, z) = (vector(random), vector(random) * 0.3, random.between(-1.0, 1.0));
                 Wave { q, v, z, ..wave }
             }
         }
     }
 
-    fn draw_bump(kind: Kind, timed: bool, dice: &mut Dice) -> Bump {
-        let along = if timed { dice.pick(&[Along::Position, Along::Time]) } else { Along::Position };
+    fn draw_bump(kind: Kind, timed: bool, random: &mut RandomNumbers) -> Bump {
+        let along = if timed { random.pick(&[Along::Position, Along::Time]) } else { Along::Position };
         let on = match (kind, along) {
-            (Kind::General, _) => dice.pick(&[On::Force, On::Drag, On::Mass]),
-            (Kind::ConstantMass, _) | (Kind::Separable, Along::Time) => dice.pick(&[On::Force, On::Drag]),
+            (Kind::General, _) => random.pick(&[On::Force, On::Drag, On::Mass]),
+            (Kind::ConstantMass, _) | (Kind::Separable, Along::Time) => random.pick(&[On::Force, On::Drag]),
             _ => On::Force,
         };
-        let factor = dice.scale(0.1, 10.0) * if on == On::Mass { 1.0 } else { dice.pick(&[-1.0, 1.0]) };
-        let centre = if along == Along::Time { dice.between(0.0, 10.0) } else { dice.between(-3.0, 3.0) };
-        Bump { factor, centre, width: dice.scale(1e-3, 1.0), along, on }
+        let factor = random.scale(0.1, 10.0) * if on == On::Mass { 1.0 } else { random.pick(&[-1.0, 1.0]) };
+        let centre = if along == Along::Time { random.between(0.0, 10.0) } else { random.between(-3.0, 3.0) };
+        Bump { factor, centre, width: random.scale(1e-3, 1.0), along, on }
     }
 
-    /// What holds, found from the coefficients.
+    /// The structure that holds, found from the coefficients.
     fn true_structure(&self) -> Structure {
         let zero = |e: &[u32]| e.iter().all(|e| *e == 0);
         let (monomials, waves, bumps) = (&self.monomials, &self.waves, &self.bumps);
@@ -260,8 +268,8 @@ impl<const N: usize> RandomSystem<N> {
         Structure { autonomous, z_free, z_affine, constant_rate, separable, quadratic, constant_mass }
     }
 
-    /// The shortest time in which the motion at a point can meet something new, by the bumps alone.
-    pub fn patience(&self, x: &VelocityPoint<N>) -> f64 {
+    /// The shortest time in which the motion at a point can pass a bump.
+    pub fn bump_time(&self, x: &VelocityPoint<N>) -> f64 {
         self.bumps.iter().fold(f64::INFINITY, |dt, bump| {
             let speed = if bump.along == Along::Time { 1.0 } else { x.v[0].abs() };
             dt.min(0.5 * bump.width / speed)
@@ -269,7 +277,7 @@ impl<const N: usize> RandomSystem<N> {
     }
 }
 
-/// The claims by name.
+/// The declared properties by name.
 type Claim = (&'static str, fn(&mut Structure) -> &mut bool);
 const CLAIMS: [Claim; 7] = [
     ("autonomous", |s| &mut s.autonomous),
@@ -333,7 +341,7 @@ impl<const N: usize> Lagrangian<N> for RandomSystem<N> {
     fn structure(&self) -> Structure {
         let mut structure = self.true_structure();
         for (name, claim) in CLAIMS {
-            if self.lie == Some(name) {
+            if self.false_claim == Some(name) {
                 *claim(&mut structure) = true;
             }
         }

@@ -1,20 +1,20 @@
-//! What a case may lead to.
+//! The results of a case.
 
 use discrete_herglotz::{InputError, StepError};
 use exact_lagrangian::ExactError;
 
-/// A result that the library can stand by, or has not claimed.
+/// A result that is right, or for which nothing is claimed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Checked, and right.
     Right,
-    /// A step too long for the motion was asked for; shorter ones lead to the motion.
+    /// The step was too long for the motion; runs with shorter steps converge to it.
     Coarse,
-    /// Checked as far as it goes: there is no reference for the motion, or the motion is so ill-conditioned that there is no
-    /// right answer.
+    /// Checked as far as possible: there is no reference for the motion, or the motion is so ill-conditioned that there
+    /// is no right answer.
     NoReference,
     /// Flagged as unresolved.
-    Marked,
+    Flagged,
     /// Refused before the first step.
     Refused(&'static str),
     /// Ended with a status.
@@ -24,13 +24,13 @@ pub enum Verdict {
 /// A result that is wrong.
 #[derive(Clone, Debug)]
 pub struct Wrong {
-    /// In what way.
+    /// The kind of the failure.
     pub kind: Kind,
-    /// The particulars.
+    /// The details.
     pub what: String,
 }
 
-/// The ways to be wrong.
+/// The kinds of failures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A panic.
@@ -39,27 +39,27 @@ pub enum Kind {
     Hang,
     /// A result that is infinite or not a number.
     NotFinite,
-    /// Shorter steps do not lead to the motion.
+    /// Runs with shorter steps do not converge to the motion.
     DoesNotConverge,
-    /// One step is wrong by the size of the motion, and not marked.
-    UnmarkedStep,
-    /// The motion ends before the run does, and nothing says so.
+    /// One step has an error of the size of the motion, and is not flagged.
+    UnflaggedStep,
+    /// The motion ends before the run does, without a warning.
     BeyondTheEnd,
-    /// The error is above ten times the accuracy that was asked for.
+    /// The error is above ten times the requested accuracy.
     AboveTolerance,
-    /// What is observed, or how a run is divided, changes the result.
+    /// The outputs, or the division of a run, change the result.
     ObservedDiffers,
     /// An equation that the result should solve is not solved.
     Residual,
-    /// A factor by which the contact form should be contracted is not the factor.
+    /// The contact form is not scaled by the factor that is reported.
     NotConformal,
-    /// Two routes to the same thing lead to different things.
+    /// Two routes to the same result disagree.
     RoutesDiffer,
 }
 
 pub type Checked = Result<Verdict, Wrong>;
 
-/// A failure, unless a condition holds.
+/// A failure unless a condition holds.
 pub fn ensure(holds: bool, kind: Kind, what: impl FnOnce() -> String) -> Result<(), Wrong> {
     if holds { Ok(()) } else { Err(Wrong { kind, what: what() }) }
 }
@@ -86,7 +86,7 @@ pub fn refused(error: &InputError) -> Verdict {
     })
 }
 
-/// The name of what went wrong along a motion, for the tally.
+/// The name of the failure of a step, for the tally.
 pub fn ended(cause: &StepError) -> Verdict {
     Verdict::Ended(match cause {
         StepError::NotConverged { .. } => "not converged",
@@ -100,7 +100,7 @@ pub fn ended(cause: &StepError) -> Verdict {
     })
 }
 
-/// The same of the exact side.
+/// The name of an error of the exact flow, for the tally.
 pub fn exact<const N: usize>(error: &ExactError<N>) -> Verdict {
     match error {
         ExactError::Input(error) => refused(error),

@@ -15,7 +15,7 @@ pub enum GeometryError {
         /// The number of entries that were passed.
         found: usize,
     },
-    /// A number is infinite or not a number.
+    /// A number is infinite or NaN.
     #[error("{what}[{index}] = {value} where a finite number is needed")]
     NonFinite {
         /// What the number is.

@@ -42,12 +42,12 @@ pub mod hamiltonian {
     };
 }
 
-/// Vector spaces of dual parts, and maxima that keep a NaN.
+/// Vector spaces of dual parts, and maxima that propagate NaN.
 pub mod numbers {
     pub use crate::number::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan};
 }
 
-/// What the other crates of this project build on: derivatives by dual numbers, seeds, small linear systems, rounding.
+/// Tools for the other crates of this project: derivatives by dual numbers, seeds, small linear systems, rounding.
 pub mod support {
     pub use crate::dynamics::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates};
     pub use crate::forms::{conformality_with_jacobian, generic, seed};

@@ -452,8 +452,8 @@ impl<F: ClosedFlow> SmoothFunction<1> for Closed<'_, F> {
     }
 }
 
-/// Statements 5 and 11 along a flow in closed form: `phi_t* eta = sigma_t eta` with `sigma_t = exp(int a)`, `a = -R(H)`, and
-/// `H o phi_t = sigma_t H`. The quadrature is on `[0, t]`; its own error is part of the residual.
+/// Statements 5 and 11 along a flow in closed form: `phi_t* eta = sigma_t eta` with `sigma_t = exp(int a)`,
+/// `a = -R(H)`, and `H o phi_t = sigma_t H`. The quadrature is on `[0, t]`; its own error is part of the residual.
 ///
 /// # Errors
 /// None in the domain of the flow.

@@ -1,5 +1,5 @@
-//! Every public function with numbers that are none, infinite, hardly above zero, zero and huge: an error or an answer, never a NaN
-//! in an answer, a panic, or more than bounded work.
+//! Every public function with arguments that are NaN, infinite, tiny, zero or huge: each call returns an error or a
+//! result without NaN, does not panic, and does a bounded amount of work.
 
 use crate::principle::{Curve, MotionCurve, NonHolonomic, SplineCurve, action, action_derivative};
 use crate::*;
@@ -9,7 +9,7 @@ use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
 use std::fmt::Debug;
 
-/// Any answer in words, in which a number that is none says so.
+/// The debug output of a result, in which a NaN can be found.
 fn told<A: Debug, E: Debug>(answer: Result<A, E>) -> Option<String> {
     answer.ok().map(|a| format!("{a:?}"))
 }
@@ -38,7 +38,7 @@ fn exact(h: f64) -> Result<ExactLagrangian<Pendulum, 1>, ExactError<1>> {
     Ok(ExactLagrangian::new(SYSTEM, h)?)
 }
 
-/// Each function of `(t, h, q, v, z)`, the coordinates being those of the point that it takes.
+/// Each function as a function of `(t, h, q, v, z)`, with the coordinates of the point that it takes.
 const CALLS: &[Call] = &[
     ("herglotz_flow", |a| told(herglotz_flow(&SYSTEM, a[0], &start(a), a[1]))),
     ("herglotz_flow back", |a| told(herglotz_flow(&SYSTEM, a[0], &start(a), -a[1]))),
@@ -102,7 +102,7 @@ const CALLS: &[Call] = &[
     ("follows_motion", |a| told(statements::follows_motion(&SYSTEM, a[0], &start(a), a[1], 2))),
 ];
 
-/// One bad number at a time among good ones.
+/// Replaces one argument at a time by a bad number.
 #[test]
 fn one_at_a_time() {
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, 5e-324, 1e-310, 1e-160, 1e160, -1e300, f64::MAX];
@@ -115,7 +115,8 @@ fn one_at_a_time() {
             arguments[place] = number;
             let since = std::time::Instant::now();
             let answer = call(arguments);
-            // The bound of one motion is about a second, and a search has it once; 10 s on a busy machine.
+            // The work of one motion, and of a whole search, is bounded by about a second; 10 s allow for a busy
+            // machine.
             if answer.is_some_and(|a| a.contains("NaN")) || since.elapsed().as_secs_f64() > 10.0 {
                 found.push(format!("{name} at {arguments:?} after {:?}", since.elapsed()));
             }

@@ -1,18 +1,18 @@
-//! Bad input, and what goes wrong along a motion, on the exact side.
+//! Errors of exact motions, and of their input.
 
 use contact_geom::{GeometryError, VelocityPoint};
 use discrete_herglotz::{InputError, StepError};
 use thiserror::Error;
 
-/// Why a motion, or the motion between two points, could not be computed. What goes wrong along the motion carries what
-/// was reached, so that one can go on from there.
+/// The reason why a motion, or the motion between two points, could not be computed. Errors along a motion carry the
+/// state that was reached, so that the computation can be continued from there.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum ExactError<const N: usize> {
     /// The input is not acceptable; nothing was computed.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// The motion is not defined up to the end: it blows up, meets a singular W, or leaves the domain of L. The start is
-    /// outside `U_h`, the domain of the exponential map; paper, section 4.1.
+    /// The motion is not defined up to the end: it blows up, meets a singular W, or leaves the domain of L. The start
+    /// is outside `U_h`, the domain of the exponential map; paper, section 4.1.
     #[error(
         "the motion is defined only until t = {t}: it blows up there, or leaves the domain on which L is regular; \
          take a smaller h or another start"
@@ -22,10 +22,11 @@ pub enum ExactError<const N: usize> {
         t: f64,
         /// The state at that time.
         reached: VelocityPoint<N>,
-        /// What the geometry says beyond, if it says something.
+        /// The error of the geometric formulas beyond that time, if there is one.
         cause: Option<GeometryError>,
     },
-    /// The motion needs more work than [`EVALUATIONS`](crate::EVALUATIONS): the drag is very strong, or the time very long.
+    /// The motion needs more work than [`EVALUATIONS`](crate::EVALUATIONS): the drag is very strong, or the time very
+    /// long.
     #[error("t = {t} was reached with the largest number of evaluations; go on from there, or take a smaller h")]
     Unfinished {
         /// The time that was reached.
@@ -41,13 +42,13 @@ pub enum ExactError<const N: usize> {
     NotConverged {
         /// The start of the last motion tried.
         last: VelocityPoint<N>,
-        /// The distance by which it misses the second point, its largest component.
+        /// The largest component of the distance between its end and the second point.
         residual: f64,
-        /// The smallest singular value of `dq1/dv0` there, a time.
+        /// The smallest singular value of `dq1/dv0` there, in units of time.
         smallest: f64,
     },
-    /// The points are conjugate along the motion: `dq1/dv0` is singular to round-off, and the exponential map is no local
-    /// diffeomorphism there.
+    /// The points are conjugate along the motion: `dq1/dv0` is singular to round-off, and the exponential map is not a
+    /// local diffeomorphism there.
     #[error(
         "the two points are conjugate along the motion (smallest singular value of dq1/dv0 {smallest:e}): \
          they do not determine it; take another h"
@@ -55,9 +56,9 @@ pub enum ExactError<const N: usize> {
     ConjugatePoint {
         /// The start of the last motion tried.
         last: VelocityPoint<N>,
-        /// The distance by which it misses the second point, its largest component.
+        /// The largest component of the distance between its end and the second point.
         residual: f64,
-        /// The smallest singular value of `dq1/dv0` there, a time.
+        /// The smallest singular value of `dq1/dv0` there, in units of time.
         smallest: f64,
     },
 }
@@ -68,7 +69,7 @@ impl<const N: usize> From<GeometryError> for ExactError<N> {
     }
 }
 
-/// What remains of an error in a step of a discrete Lagrangian, which knows no dimension.
+/// The conversion to the error of a step of a discrete Lagrangian, which carries no state.
 impl<const N: usize> From<ExactError<N>> for StepError {
     fn from(error: ExactError<N>) -> Self {
         match error {
@@ -86,7 +87,7 @@ impl<const N: usize> From<ExactError<N>> for StepError {
     }
 }
 
-/// What remains of an error in a formula of the geometry.
+/// The conversion to the error of a geometric formula.
 impl<const N: usize> From<ExactError<N>> for GeometryError {
     fn from(error: ExactError<N>) -> Self {
         match error {

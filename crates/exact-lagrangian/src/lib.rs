@@ -1,9 +1,9 @@
-//! The exact discrete Lagrangian of contact mechanics, and all that section 4 of the paper says of it, to round-off.
+//! The exact discrete Lagrangian of contact mechanics, and the results of section 4 of the paper on it, to round-off.
 //!
 //! A regular Lagrangian has the flow `phi_t` of its Herglotz vector field ([`herglotz_flow`]), the exponential map
-//! `exp_h : (q0, v0, z0) -> (q0, q1, z0)` ([`ContactExponential`]) and its inverse, the exact retraction
-//! `R_h^(e-)` ([`retract`](ContactExponential::retract)). The action along the motion from `q0` to `q1` is
-//! `L_h^e(q0, q1, z0) = z(h) - z0` ([`ExactLagrangian`]): one more discrete Lagrangian, whose flow is the motion itself.
+//! `exp_h : (q0, v0, z0) -> (q0, q1, z0)` ([`ContactExponential`]) and its inverse, the exact retraction `R_h^(e-)`
+//! ([`retract`](ContactExponential::retract)). The action along the motion from `q0` to `q1` is
+//! `L_h^e(q0, q1, z0) = z(h) - z0` ([`ExactLagrangian`]), a discrete Lagrangian whose flow is the motion itself.
 //!
 //! ```
 //! use contact_geom::{DiscretePoint, legendre, systems::CoupledInZ};
@@ -19,8 +19,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The theorem of section 4.2 as a diagram that commutes in both signs, with its worst defects over the 19 systems of the catalogue and
-//! steps from 1e-6 to 1, in units of the condition of the motion (`cargo run --release --bin exact_tour` has them one by one):
+//! The theorem of section 4.2 is a diagram that commutes for both signs. The largest defects over the 19 systems of the
+//! catalogue and steps from 1e-6 to 1 are given in units of the condition number of the motion
+//! (`cargo run --release --bin exact_tour` lists them one by one):
 //!
 //! ```text
 //!                  R_h^(e-), R_h^(e+)
@@ -31,14 +32,17 @@
 //!              '------------------------->  T*Q x R
 //! ```
 //!
-//! The derivatives on the left are taken by dual numbers through flow and shooting, never by the formulas that the theorem gives.
+//! The derivatives on the left-hand sides are computed by dual numbers through flow and shooting, not by the formulas
+//! of the theorem.
 //!
-//! Also here: [`NonHolonomic`], the constrained system that the paper proves its theorems with; Herglotz' principle for any curve
-//! ([`action`], [`action_derivative`]); [`error_orders`], the variational error analysis of a discrete Lagrangian against
-//! the exact one; [`compose`]; closed forms ([`QuadraticExact`]); and [`statements`], the theorems as residuals.
+//! The crate also contains [`NonHolonomic`](principle::NonHolonomic), the constrained system used in the proofs of the paper; Herglotz'
+//! principle for any curve ([`action`](principle::action), [`action_derivative`](principle::action_derivative)); [`error_orders`], the variational error analysis of a
+//! discrete Lagrangian against the exact one; [`compose`]; closed forms ([`QuadraticExact`]); and [`statements`], the
+//! residuals of the theorems.
 //!
-//! How exact: against closed forms some 1e-15, of the motion's own size where it decays by `e^-50`. How fast: `L_h^e` with its first
-//! derivatives costs 1.2 to 3.5 calls of a dop853 that computes the motion alone, to 1e-13. Nothing allocates for static N.
+//! Accuracy: the error against closed forms is about 1e-15, relative to the motion itself where it decays by `e^-50`.
+//! Cost: `L_h^e` with its first derivatives costs 1.2 to 3.5 times the computation of the motion alone by dop853 to
+//! 1e-13. No memory is allocated for static N.
 
 #[cfg(test)]
 mod bad_numbers;

@@ -12,18 +12,20 @@ use contact_geom::{Derivatives, DiscretePoint, GeometryError, Lagrangian, Regula
 use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
 use evolution::Evolution;
 
-/// The exact discrete Lagrangian of `L = L2(q, v) + gamma z`, with L2 an autonomous polynomial of degree two: inhomogeneous,
-/// gyroscopic, of any frequencies and any drag.
+/// The exact discrete Lagrangian of `L = L2(q, v) + gamma z`, where L2 is an autonomous polynomial of degree two. L2
+/// may be inhomogeneous and gyroscopic, with any frequencies, and the drag is arbitrary.
 ///
-/// Herglotz' equation `(W v + C^T q + g)' = K q + C v + f + gamma (W v + C^T q + g)`, with `K = L_qq`, `C = L_qv`, `W = L_vv`,
-/// `f = L_q(0)` and `g = L_v(0)`, is linear in `x = (q, v, 1)`; so x moves by a matrix `E(t) = e^(A t)`, and the action by a
-/// quadratic form: with `L2 = x.S x`, `z(h) = e^(gamma h) z0 + x0.G x0` where
-/// `G = int_0^h e^(gamma (h - s)) E(s)^T S E(s) ds`. Both are computed when it is made: by their series over a short time, and
-/// from there by doubling it, `E(2t) = E(t)^2` and `G(2t) = e^(gamma t) G(t) + E(t)^T G(t) E(t)`. No drag, critical drag and
-/// a short step are no special cases. The initial velocity of the motion from `q0` to `q1` is linear in `(q1 - q0, q0, 1)`.
+/// Herglotz' equation `(W v + C^T q + g)' = K q + C v + f + gamma (W v + C^T q + g)`, with `K = L_qq`, `C = L_qv`,
+/// `W = L_vv`, `f = L_q(0)` and `g = L_v(0)`, is linear in `x = (q, v, 1)`. Hence x evolves by a matrix
+/// `E(t) = e^(A t)`, and the action by a quadratic form: with `L2 = x.S x`, `z(h) = e^(gamma h) z0 + x0.G x0` where
+/// `G = int_0^h e^(gamma (h - s)) E(s)^T S E(s) ds`. Both are computed on construction: by their series over a short
+/// time, and then by doubling the time, `E(2t) = E(t)^2` and `G(2t) = e^(gamma t) G(t) + E(t)^T G(t) E(t)`. Zero drag,
+/// critical drag and short steps need no special treatment. The initial velocity of the motion from `q0` to `q1` is
+/// linear in `(q1 - q0, q0, 1)`.
 ///
-/// The error is some units of round-off times the condition of the motion, relative to the value also where h is small, as
-/// far as the rounding of `q1 - q0` lets it; that of the derivatives likewise. Nothing is allocated after it is made.
+/// The error is some units of round-off times the condition number of the motion. It is relative to the value, also for
+/// small h, up to the rounding of `q1 - q0`; the same holds for the derivatives. Memory is allocated on construction
+/// only.
 ///
 /// ```
 /// use contact_geom::{DiscretePoint, systems::UniformField};
@@ -42,10 +44,10 @@ pub struct QuadraticExact<const N: usize> {
     /// `e^(gamma h)`, and that minus one.
     sigma: f64,
     sigma_m1: f64,
-    /// The displacement `q1 - q0` and the velocity `v1`; of a coordinate that does not stay, `q1` itself.
+    /// The displacement `q1 - q0` and the velocity `v1`; for a coordinate that is not in `stays`, `q1` itself.
     displacement: Affine<N>,
     velocity: Affine<N>,
-    /// Which coordinates stay so near where they are that `dq1/dq0` has its digits from `dq1/dq0 - 1`.
+    /// The coordinates for which `dq1/dq0` is so close to one that `dq1/dq0 - 1` is stored to keep its digits.
     stays: [bool; N],
     /// The inverse of `dq1/dv0`.
     inverse: SMatrix<f64, N, N>,
@@ -66,19 +68,21 @@ struct Affine<const N: usize> {
     one: SVector<f64, N>,
 }
 
-/// The bound on derivatives that a claim says vanish, relative to the size of their terms: some thousand units of round-off, for
-/// Lagrangians whose constants are themselves rounded.
+/// The tolerance for derivatives that are zero according to a claim, relative to the size of their terms: some thousand
+/// units of round-off, for Lagrangians whose constants are themselves rounded.
 const FALSE_CLAIM: f64 = 1e-12;
 
 impl<const N: usize> QuadraticExact<N> {
-    /// That of a Lagrangian that claims to be autonomous and quadratic in its [`structure`](Lagrangian::structure).
+    /// The exact discrete Lagrangian of a Lagrangian that is declared autonomous and quadratic in its
+    /// [`structure`](Lagrangian::structure).
     ///
     /// # Errors
-    /// [`InputError::Dimension`] for `N = 0`; [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`]
-    /// and [`InputError::FalseClaim`] where L is not of the form; [`InputError::Geometry`] where W is singular to round-off;
-    /// [`InputError::FirstStep`] at a conjugate point, where two positions do not determine the motion, to within some
-    /// roundings of h, K and gamma, and where the motion overflows; [`InputError::Hypothesis`] where a motion has decayed below
-    /// the smallest number, so that no position tells of its velocity.
+    /// [`InputError::Dimension`] for `N = 0`; [`InputError::Step`] unless h is positive and finite;
+    /// [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L is not of the form; [`InputError::Geometry`]
+    /// where W is singular to round-off; [`InputError::FirstStep`] where the motion overflows, and at a conjugate
+    /// point, to within some roundings of h, K and gamma, where two positions do not determine the motion;
+    /// [`InputError::Hypothesis`] where a motion has decayed below the smallest number, so that the positions do not
+    /// determine its velocity.
     pub fn new(lagrangian: &impl Lagrangian<N>, h: f64) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
@@ -99,9 +103,10 @@ impl<const N: usize> QuadraticExact<N> {
         (0..N).filter(|i| stays[*i]).for_each(|i| displacement.q[(i, i)] = d[i]);
         let velocity = Affine { q: block(1, 0, 1.0 / unit), v: block(1, 1, 1.0), one: column(1, 1.0 / unit) };
         let Regularity { smallest, largest } = singular_values(&block(0, 1, 1.0));
-        // What the rounding of h and of the doublings does to dq1/dw0, whose change with h is dw1/dw0; and what that of K and
-        // of the drag does, which is more near the critical drag: measured by a change of both, in opposite directions and so
-        // large that some digits of the velocity are left where it is accepted.
+        // The effect on dq1/dw0 of the rounding of h, with respect to which its derivative is dw1/dw0, and of the
+        // doublings; and that of the rounding of K and of the drag, which is larger near critical drag. The latter is
+        // measured by changing both in opposite directions, by so much that the velocity keeps some correct digits
+        // where the step is accepted.
         let nearby = DMatrix::from_fn(n + 1, n + 1, |i, j| match (i / N, j / N) {
             (1, 0) => rate[(i, j)] * (1.0 + 64.0 * f64::EPSILON),
             (1, 1) => rate[(i, j)] * (1.0 - 64.0 * f64::EPSILON),
@@ -140,7 +145,7 @@ impl<const N: usize> QuadraticExact<N> {
         })
     }
 
-    /// The motion after the time h: `(q1, v1, z1)`. Not a number where the start is not, infinite beyond the largest.
+    /// The motion after the time h: `(q1, v1, z1)`. NaN where the start is NaN, infinite where the motion overflows.
     pub fn motion<T: Scalar>(&self, start: &VelocityPoint<N, T>) -> VelocityPoint<N, T> {
         let (q, v) = (&start.q, &start.v);
         VelocityPoint {
@@ -150,13 +155,14 @@ impl<const N: usize> QuadraticExact<N> {
         }
     }
 
-    /// The positions that stay, 0 for the others: beside `q0`, a `q1` that has decayed would be lost.
+    /// The positions of the coordinates in `stays`, 0 for the others, whose `q1` may have decayed and would be lost in
+    /// a sum with `q0`.
     fn staying<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
         SVector::from_fn(|i, _| if self.stays[i] { q[i] } else { T::zero() })
     }
 
-    /// Whether nothing is left of the positions in the action: drag has brought all of it below the smallest number, and
-    /// `-z0` alone would be no discrete Lagrangian.
+    /// Whether the action no longer depends on the positions: the drag has reduced all of its terms below the smallest
+    /// normal number, and `-z0` alone is not a discrete Lagrangian.
     fn is_lost(&self) -> bool {
         let nothing = |e: &f64| e.abs() < f64::MIN_POSITIVE;
         let form = [self.qq, self.qv, self.vv].iter().all(|m| m.iter().all(nothing));
@@ -188,11 +194,11 @@ impl<const N: usize> DiscreteLagrangian<N> for QuadraticExact<N> {
             return Err(StepError::SigmaVanished { sigma: self.sigma });
         }
         let still = SVector::from_element(T::zero());
-        // The displacement first: it may have few digits, and no more may be lost.
+        // The displacement is formed first: it may have few digits, and no more must be lost.
         let by_velocity = (x.q1 - self.staying(&x.q0)) - self.displacement.at(&x.q0, &still);
         let v0 = times(&self.inverse, &by_velocity);
         let value = x.z0 * self.sigma_m1 + self.form(&x.q0, &v0);
-        // A position that is not finite makes the value so, but for one that the form does not contain.
+        // A position that is not finite makes the value so, unless the form does not contain it.
         let finite = t.is_finite() && value.extent().is_finite() && v0.iter().all(|v| v.extent().is_finite());
         if finite { Ok(value) } else { Err(StepError::NonFinite) }
     }
@@ -211,10 +217,10 @@ struct Equations {
     gamma: f64,
     /// The time unit of the velocities `w = unit v`.
     unit: f64,
-    /// The rate A of `(q, w, 1)` and the form S, over the time h.
+    /// The matrix A of the linear equation of `(q, w, 1)` and the form S, over the time h.
     rate: DMatrix<f64>,
     form: DMatrix<f64>,
-    /// The norm of A but for its last column.
+    /// The norm of A without its last column.
     size: f64,
 }
 
@@ -229,11 +235,12 @@ impl Equations {
             v: over_mass(&second.vv, &(c - c.transpose()))?,
             one: over_mass(&second.vv, &(first.x + first.y * gamma))?,
         };
-        // Exactly what W^-1 gamma W is.
+        // This is W^-1 gamma W without rounding.
         (0..N).for_each(|i| acceleration.v[(i, i)] += gamma);
 
-        // Velocities as w = unit v, with the time unit h, or the inverse of the highest frequency where that is shorter:
-        // then A has no entry much larger than needed, and the short step of a fast oscillation is no shorter than it.
+        // Velocities are scaled as w = unit v, where the unit is h or, if it is shorter, the inverse of the highest
+        // frequency. Then A has no entries much larger than needed, and the short time of the series is not shorter
+        // than a fast oscillation requires.
         let stretch = (h * row_sum(&acceleration.q).sqrt()).log2().ceil().max(0.0).exp2();
         let unit = h / stretch;
         let n = 2 * N;
@@ -264,7 +271,7 @@ fn times<T: Scalar, const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<T, N>) -
     SVector::from_fn(|i, _| (0..N).fold(T::zero(), |sum, j| sum + x[j] * m[(i, j)]))
 }
 
-/// The largest sum of a row's absolute values.
+/// The maximum row sum norm.
 fn row_sum<const N: usize>(m: &SMatrix<f64, N, N>) -> f64 {
     m.row_iter().map(|r| r.abs().sum()).fold(0.0, f64::max)
 }
@@ -283,7 +290,7 @@ fn inverse_times<const N: usize, const M: usize>(
     Ok(solution)
 }
 
-/// `W^-1 b`; refuses a W that is singular to round-off whatever the units of the coordinates.
+/// `W^-1 b`; refuses a W that is singular to round-off, independent of the units of the coordinates.
 fn over_mass<const N: usize, const M: usize>(
     w: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,
@@ -299,7 +306,8 @@ fn over_mass<const N: usize, const M: usize>(
     inverse_times(w, b).map_err(|e| e.of(what, remedy).into())
 }
 
-/// Refuses a Lagrangian that does not claim to be autonomous and quadratic, or claims anything falsely at a generic point.
+/// Refuses a Lagrangian that is not declared autonomous and quadratic, or one of whose claims is false at a generic
+/// point.
 fn check_claims<const N: usize>(lagrangian: &impl Lagrangian<N>) -> Result<(), InputError> {
     let structure = lagrangian.structure();
     for (made, claim) in [(structure.autonomous, "autonomous"), (structure.quadratic, "quadratic")] {

@@ -1,16 +1,16 @@
-//! The paper's section 4 as residuals: each statement evaluated on a Lagrangian at a point of TQ x R for a time step, relative
-//! to its terms' size.
+//! Residuals of the statements of the paper's section 4: each statement is evaluated on a Lagrangian at a point of TQ x
+//! R for a time step, relative to the size of its terms.
 //!
-//! The derivatives of `L_h^e` that the theorems speak of are taken by dual numbers through flow and shooting, never by the
-//! formulas that the theorems give. All is on the branch of motions near the one from the given point, so that conjugate points
-//! before h do no harm.
+//! The derivatives of `L_h^e` in the theorems are computed by dual numbers through flow and shooting, not by the
+//! formulas of the theorems. Everything is evaluated on the branch of motions near the one from the given point, so
+//! that conjugate points before h have no effect.
 //!
-//! A residual of a true statement is round-off. It is given in units of the condition of the motion, the largest entry of
-//! `T phi_h` where that is above one (its square for second derivatives): by so much the motion itself magnifies the rounding of
-//! its start, as when it passes near a collision. Where a velocity is recovered from two rounded positions, the residual is given
-//! in units of what that loses; see [`condition`].
+//! The residual of a true statement is round-off. It is given in units of the condition number of the motion, the
+//! largest entry of `T phi_h` where that is above one (its square for second derivatives): by this factor the motion
+//! itself amplifies the rounding of its start, for example near a collision. Where a velocity is computed from two
+//! rounded positions, the residual is given in units of the resulting loss of accuracy; see [`condition`].
 
-// In a check `f64::max` and `amax` would lose a NaN.
+// `f64::max` and `amax` discard a NaN, which would make a check pass.
 #![deny(clippy::disallowed_methods)]
 
 use crate::map::exponential::HerglotzFlow;
@@ -48,8 +48,8 @@ pub const STATEMENTS: [Statement; 11] = [
     Statement::ExactFlow,
 ];
 
-/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the statement is
-/// not one of [`STATEMENTS`].
+/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the
+/// statement is not one of [`STATEMENTS`].
 ///
 /// # Errors
 /// Those of the motion over h (over 2h for [`Statement::ExactFlow`]).
@@ -77,7 +77,7 @@ pub fn residual<S: System<N>, const N: usize>(
     }))
 }
 
-/// The relative error that the initial velocity must have when it is recovered from two rounded positions, in units of
+/// The unavoidable relative error of the initial velocity when it is computed from two rounded positions, in units of
 /// round-off: `|q| |(dq1/dv0)^-1| / |v|`, at least 1. It grows like `1/h` as h goes to 0.
 ///
 /// # Errors
@@ -93,10 +93,11 @@ pub fn condition<const N: usize>(
     Ok((position / (differential.regularity().smallest * x.v.max_abs_or_nan())).max_or_nan(1.0))
 }
 
-/// How far a motion of a discrete Lagrangian's own equations is from the exact one: the discrete Herglotz equations of
-/// `L_h^e` solved step by step from `(q(0), q(h), z(0))`, against the flow of `xi_L`; the largest difference of `q_k` and `z_k`
-/// over a number of steps, in units of `k^2` times the largest position and action: the two rounded positions of each step are
-/// a velocity's rounding, which both grows with the motion and is added to in each step. Statement 36, item 3.
+/// The distance of the exact motion from the motion by the discrete Herglotz equations of `L_h^e`. These are solved
+/// step by step from `(q(0), q(h), z(0))` and compared with the flow of `xi_L`: the largest difference of `q_k` and
+/// `z_k` over a number of steps, in units of `k^2` times the largest position and action. The rounding of the two
+/// positions of each step is an error of the velocity, which grows with the motion and to which each step adds.
+/// Statement 36, item 3.
 ///
 /// # Errors
 /// Those of the motion and of the steps.
@@ -123,8 +124,8 @@ pub fn follows_motion<const N: usize>(
     Ok(worst)
 }
 
-/// An exact discrete Lagrangian whose steps are solved from the discrete Herglotz equations, as those of any other; not by
-/// the motion.
+/// An exact discrete Lagrangian whose steps are computed by solving the discrete Herglotz equations, as for any other
+/// discrete Lagrangian, and not by the motion.
 struct ByEquations<L, const N: usize>(ExactLagrangian<L, N>);
 
 impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByEquations<L, N> {
@@ -142,7 +143,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByEquations<L, 
     }
 }
 
-/// Where a statement is evaluated.
+/// The system, time, point and time step at which a statement is evaluated.
 struct Sample<'a, S, const N: usize> {
     system: &'a S,
     t: f64,
@@ -169,7 +170,7 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok((exact, self.exponential.at(self.t, self.x)?))
     }
 
-    /// The condition of the motion: the largest entry of `T phi_h`, at least 1.
+    /// The condition number of the motion: the largest entry of `T phi_h`, at least 1.
     fn growth(&self) -> Result<f64, ExactError<N>> {
         let end = self.exponential.varied(self.t, self.x)?.end;
         let of = |c: &SVector<_, N>| {
@@ -182,8 +183,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         ExactError::Input(InputError::FirstStep(e))
     }
 
-    /// Statement 10: along the motion the action's derivative vanishes for variations that vanish at the ends; along another
-    /// curve with the same ends it does not; and `dZ/dz0 = e^(int L_z)`.
+    /// Statement 10: along the motion the action's derivative vanishes for variations that vanish at the ends; along
+    /// another curve with the same ends it does not; and `dZ/dz0 = e^(int L_z)`.
     fn principle(&self) -> Result<f64, ExactError<N>> {
         let Sample { system, t, x, h, .. } = *self;
         let curve = MotionCurve { lagrangian: system, t0: t, start: *x };
@@ -197,7 +198,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         };
         let span = (t, h);
         let motion = herglotz_flow(system, t, x, h)?;
-        // The terms that cancel: L_v times the variation's velocity, over the time, grown by sigma.
+        // The size of the terms that cancel: L_v times the velocity of the variation, over the time, times the growth
+        // sigma.
         let p = legendre(system, t, x)
             .p
             .max_abs_or_nan()
@@ -212,7 +214,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
             }
             let bent = VariedCurve { curve: &curve, variation: &wave(i, 1.0), by: 0.01 * h };
             let slope = action_derivative(system, &bent, &wave(i, 1.0), span, (x.z, 0.0))?;
-            // The second variation is W pi^2/(2h) times the bend 0.01 h, less h/2 times the force's gradient.
+            // The second variation is W pi^2/(2h) times the amplitude 0.01 h, minus h/2 times the gradient of the
+            // force.
             if slope.abs() < 1e-4 {
                 return Ok(f64::INFINITY);
             }
@@ -238,7 +241,7 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(((solved.a - field.y).max_abs_or_nan() / size).max_or_nan(apart(solved.multiplier, -rate, size)))
     }
 
-    /// Statement 28: `T pi (Gamma) = xi_L o pi`, and the flows are pi-related; the constraint is kept.
+    /// Statement 28: `T pi (Gamma) = xi_L o pi`, the flows are pi-related, and the constraint is preserved.
     fn projected_flow(&self) -> Result<f64, ExactError<N>> {
         let Sample { system, t, x, h, .. } = *self;
         let chetaev = NonHolonomic::new(system);
@@ -251,8 +254,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(field.max_or_nan(flow).max_or_nan(along.defect))
     }
 
-    /// Statement 29: `exp_h` is a local diffeomorphism: `T exp_h` and the derivative of the retraction, by duals through the
-    /// shooting, are inverse to each other.
+    /// Statement 29: `exp_h` is a local diffeomorphism: `T exp_h` and the derivative of the retraction, by duals
+    /// through the shooting, are inverse to each other.
     fn local_diffeomorphism(&self) -> Result<f64, ExactError<N>> {
         let forward = self.exponential.differential(self.t, self.x)?;
         if forward.regularity().smallest == 0.0 {
@@ -278,9 +281,9 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(relative(through, self.exponential.at(self.t, self.x)?) / self.growth()?)
     }
 
-    /// Statement 31: `pr~_1` restricted to `M_d` is a local diffeomorphism, and the graph of `z1 = z0 + L_h^e` its inverse: the smallest
-    /// singular value is `(1 + |D1|^2 + |D2|^2 + sigma_d^2)^(-1/2)`, with the derivatives by duals; and
-    /// `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
+    /// Statement 31: `pr~_1` restricted to `M_d` is a local diffeomorphism, and the graph of `z1 = z0 + L_h^e` its
+    /// inverse: the smallest singular value is `(1 + |D1|^2 + |D2|^2 + sigma_d^2)^(-1/2)`, with the derivatives by
+    /// duals; and `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
     fn projection(&self) -> Result<f64, ExactError<N>> {
         let Sample { system, t, x, h, .. } = *self;
         let chetaev = NonHolonomic::new(system);
@@ -289,7 +292,7 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         let slope = 1.0 + jet.d1.norm_squared() + jet.d2.norm_squared() + jet.sigma().powi(2);
         let smallest = chetaev.projection_regularity(t, x, h)?.smallest;
         let graph = apart(smallest, slope.sqrt().recip(), smallest);
-        // The basis is known to round-off times the condition of the differential that it spans.
+        // The basis is accurate to round-off times the condition number of the differential whose columns it spans.
         let condition = self.exponential.differential(t, x)?.jacobian().singular_values();
         let graph = graph / (condition.max_abs_or_nan() / condition.min());
         // Rows q0, z0, q1 of the differential, in the order q0, q1, z0.
@@ -304,8 +307,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(graph.max_or_nan((&projected - &jacobian).max_abs_or_nan() / jacobian.max_abs_or_nan()) / self.growth()?)
     }
 
-    /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in units of the
-    /// condition of the exponential map.
+    /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in
+    /// units of the condition of the exponential map.
     fn retraction(&self) -> Result<f64, ExactError<N>> {
         let (exact, y) = self.exact()?;
         let found = exact.retract(self.t, &y)?;
@@ -317,8 +320,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(back.max_or_nan(forth.max_or_nan(end) / self.growth()?))
     }
 
-    /// Statement 33: along the motion a variation of z obeys `y' = a + b' y`, and is
-    /// `e^b(t) (int a e^(-b) ds + y(0))`; `L_h^e = z(h) - z(0)`. The integrals by Gauss' formula with 24 nodes on quarter panels.
+    /// Statement 33: along the motion a variation of z obeys `y' = a + b' y`, and is `e^b(t) (int a e^(-b) ds + y(0))`;
+    /// `L_h^e = z(h) - z(0)`. The integrals are computed by Gauss quadrature with 24 nodes on quarters of the panels.
     fn linear_equation(&self) -> Result<f64, ExactError<N>> {
         let Sample { system, t, x, h, .. } = *self;
         let [.., g] = collocations();
@@ -351,7 +354,7 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         let formula = formula.minus(end.end.z.d).max_abs_or_nan() / size;
         let (exact, y) = self.exact()?;
         let value = exact.retract(t, &y)?.action;
-        // The two positions are rounded, and the action depends on them by the momenta.
+        // The two positions are rounded, and the derivatives of the action with respect to them are the momenta.
         let terms = action.abs().max_or_nan(end.action.re.abs());
         let rounded = terms.max_or_nan(self.momenta()? * y.q0.max_abs_or_nan().max_or_nan(y.q1.max_abs_or_nan()));
         let along = apart(end.action.re, action, terms.max_or_nan(self.momenta()? * h));
@@ -365,8 +368,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(p0.max_or_nan(legendre(self.system, self.t + self.h, &end).p.max_abs_or_nan()))
     }
 
-    /// Statement 34: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, against the derivatives by duals; the second
-    /// derivatives from the variational equation likewise.
+    /// Statement 34: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, against the derivatives by duals; the
+    /// second derivatives from the variational equation likewise.
     fn derivatives(&self) -> Result<f64, ExactError<N>> {
         let (exact, y) = self.exact()?;
         let of = |jet: DiscreteJet<N>| ChartVector { x: jet.d1, y: jet.d2, z: jet.dz };
@@ -414,8 +417,8 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
         Ok(relative(minus, start).max_or_nan(relative(plus, end)) / self.growth()?)
     }
 
-    /// Statement 36: `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and one step of the discrete flow by the discrete
-    /// Herglotz equations is the motion; [`follows_motion`] has the many steps of item 3.
+    /// Statement 36: `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and one step of the discrete flow by the
+    /// discrete Herglotz equations is the motion; [`follows_motion`] checks the many steps of item 3.
     fn regular_and_exact(&self) -> Result<f64, ExactError<N>> {
         let Sample { t, h, .. } = *self;
         let (minus, plus, y) = self.transforms()?;
@@ -432,9 +435,9 @@ impl<S: System<N>, const N: usize> Sample<'_, S, N> {
     }
 }
 
-/// Composition: `L_{h1+h2}^e(q0, q2, z0) = L_{h1}^e(q0, q1, z0) + L_{h2}^e(q1, q2, z1)` at the critical `q1`, which is where the
-/// motion passes, and only there: the residual of the equality, of the point and of the slope, infinite if the sum through another
-/// point is as near to critical.
+/// Composition: `L_{h1+h2}^e(q0, q2, z0) = L_{h1}^e(q0, q1, z0) + L_{h2}^e(q1, q2, z1)` at the critical `q1`, which is
+/// the position of the motion, and only there. The residual is that of the equality and of the point; it is infinite if
+/// another point is as near to critical or has the same sum.
 ///
 /// # Errors
 /// Those of the motion over `h1 + h2` and of the steps.
@@ -462,7 +465,7 @@ pub fn composition<const N: usize>(
         return Ok(f64::INFINITY);
     }
     let size = x.q.max_abs_or_nan().max_or_nan(whole.end.q.max_abs_or_nan()).max_or_nan(middle.q.max_abs_or_nan());
-    // The rounding of the ends moves the value by p times it.
+    // The rounding of the ends changes the value by p times itself.
     let value = apart(found.value, whole.action, whole.action.abs() + p * size);
     Ok(value.max_or_nan((found.q1 - middle.q).max_abs_or_nan() / size))
 }

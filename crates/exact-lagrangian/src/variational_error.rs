@@ -1,4 +1,4 @@
-//! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
+//! Variational error analysis: the error of a discrete Lagrangian against the exact one, and the order of its flow.
 
 use crate::{ExactError, herglotz_flow};
 use contact_geom::{
@@ -10,19 +10,19 @@ use discrete_herglotz::{
     theory::{legendre_minus, legendre_plus},
 };
 
-/// What the errors at all time steps say of an order.
+/// An order, as far as the errors at all time steps determine it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
-    /// The least-squares slope of the error against the time step, both logarithmic.
+    /// The least-squares slope of the error against the time step, both on a logarithmic scale.
     Measured(f64),
-    /// The error is round-off at every step: nothing is left to measure.
+    /// The error is round-off at every step.
     Exact,
-    /// Fewer than three steps have an error clear of the round-off plateau, so that no order can be measured.
+    /// Fewer than three steps have an error above the round-off plateau, so that no order can be measured.
     Unclear,
 }
 
 impl Order {
-    /// Whether it is measured, and within a band around an expected one.
+    /// Whether it is measured and within a band around an expected order.
     pub fn is(self, expected: f64, band: f64) -> bool {
         matches!(self, Order::Measured(found) if (found - expected).abs() < band)
     }
@@ -38,50 +38,51 @@ impl std::fmt::Display for Order {
     }
 }
 
-/// An order measured as the slope of an error against the time step, both logarithmic.
+/// An order measured as the slope of an error against the time step, both on a logarithmic scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredOrder {
     /// The order.
     pub order: Order,
     /// All time steps with their errors, from the largest.
     pub errors: Vec<(f64, f64)>,
-    /// The steps that the slope was fitted over: the smallest that stay clear of the round-off plateau.
+    /// The steps that were fitted: the smallest whose errors are above the round-off plateau.
     pub fitted: Vec<(f64, f64)>,
 }
 
 /// The orders of a discrete Lagrangian against the exact one at a point.
 ///
-/// For a method whose flow has order r: `value` and `flow` are `r + 1`, `legendre_minus` and `legendre_plus` at least r. In the
-/// textbooks' theorem all of them are `r + 1` (Marsden and West, Acta Numerica 10 (2001), theorem 2.3.1); but
-/// `L_d - L_h^e = h^(r+1) C(q0, u, z0)` is smooth in the mean velocity `u = (q1 - q0)/h`, so that its derivatives in `q0` and `q1`
-/// have a factor `1/h`, and the momenta match to order r only. The flow gains it back: `F-` is inverted by a change of `q1` of h
-/// times that error, and in `F+ o (F-)^-1` the errors of the two momenta cancel to leading order. Patrick and Cuell, "Error
-/// analysis of variational integrators of unconstrained Lagrangian systems", Numer. Math. 113 (2009), prove it so.
+/// For a method whose flow has order r, `value` and `flow` are `r + 1`, and `legendre_minus` and `legendre_plus` at
+/// least r. By the theorem in the literature all of them are `r + 1` (Marsden and West, Acta Numerica 10 (2001),
+/// theorem 2.3.1); but `L_d - L_h^e = h^(r+1) C(q0, u, z0)` is smooth in the mean velocity `u = (q1 - q0)/h`, so that
+/// its derivatives in `q0` and `q1` have a factor `1/h`, and the momenta agree to order r only. The flow has the full
+/// order: the inverse of `F-` changes `q1` by h times that error, and in `F+ o (F-)^-1` the errors of the two momenta
+/// cancel to leading order. This is proved in Patrick and Cuell, "Error analysis of variational integrators of
+/// unconstrained Lagrangian systems", Numer. Math. 113 (2009).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorOrders {
-    /// Of `|L_d - L_h^e|`.
+    /// The order of `|L_d - L_h^e|`.
     pub value: MeasuredOrder,
-    /// Of `|F-L_d - F-L_h^e|`.
+    /// The order of `|F-L_d - F-L_h^e|`.
     pub legendre_minus: MeasuredOrder,
-    /// Of `|F+L_d - F+L_h^e|`.
+    /// The order of `|F+L_d - F+L_h^e|`.
     pub legendre_plus: MeasuredOrder,
-    /// Of one step of the flow on T\*Q x R from the same state.
+    /// The order of the error of one step of the flow on T\*Q x R from the same state.
     pub flow: MeasuredOrder,
 }
 
-/// The time steps tried: from the largest by factors of the square root of two.
+/// The number of time steps, from the largest by factors of the square root of two.
 const STEPS: usize = 44;
 
-/// The steps that a slope is fitted over, if so many are clear of the plateau.
+/// The number of steps that are fitted, if so many are above the plateau.
 const FIT: usize = 8;
 
-/// How far an error must be above its round-off to count: the slope of a fit over a factor of ten in h then errs by less than
-/// 0.01.
+/// The factor by which an error must exceed its round-off to be used. The slope of a fit over a factor of ten in h then
+/// has an error of less than 0.01.
 const CLEAR: f64 = 200.0;
 
-/// Measures the orders of a discrete Lagrangian, given as a function of the time step, along the motion from a start at time t.
-/// `max_abs_or_nan` is the largest step tried; the others are smaller by factors of the square root of two. For an author of a
-/// method: the documented order plus one is what `value` and `flow` should show, on a problem nonlinear in q and z.
+/// Measures the orders of a discrete Lagrangian, given as a function of the time step, along the motion from a start at
+/// time t. `largest` is the largest step tried; the others are smaller by factors of the square root of two. For a
+/// method of documented order r, `value` and `flow` should show `r + 1` on a problem that is nonlinear in q and z.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::QuadraticInZ};
@@ -96,8 +97,8 @@ const CLEAR: f64 = 200.0;
 /// ```
 ///
 /// # Errors
-/// [`ExactError::Input`] for bad arguments or a method that refuses a step, and those of the motion; steps at which the method
-/// itself fails are left out.
+/// [`ExactError::Input`] for bad arguments or a method that refuses a step, and those of the motion; steps at which the
+/// method itself fails are omitted.
 pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     method: impl Fn(f64) -> Result<D, InputError>,
@@ -123,7 +124,7 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
         };
         let end = PhasePoint { q: motion.end.q, p: lagrangian.gradient(t + h, &motion.end).y, z: motion.end.z };
         let point = DiscretePoint { q0: x.q, q1: end.q, z0: x.z };
-        // Round-off: of the positions, which p feels through W/h, and of the terms of z.
+        // The round-off of the positions, which enters p through W/h, and of the terms of z.
         let position = f64::EPSILON * x.q.amax().max(end.q.amax());
         let momentum = f64::EPSILON * p0.amax().max(end.p.amax()) + position * slope(lagrangian, t, x) / h;
         let action = p0.amax().max(end.p.amax()) * position + f64::EPSILON * motion.action.abs();
@@ -144,26 +145,26 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     Ok(ErrorOrders { value, legendre_minus, legendre_plus, flow })
 }
 
-/// The size of W, by which a momentum depends on a velocity.
+/// The size of W, the derivative of the momentum with respect to the velocity.
 fn slope<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> f64 {
     lagrangian.hessian(t, x).vv.amax()
 }
 
-/// An error at a time step, and the round-off that it would have at least.
+/// An error at a time step, with a lower bound of its round-off.
 struct Row {
     h: f64,
     error: f64,
     floor: f64,
 }
 
-/// The steps at the small end that show the round-off plateau, if their errors do not fall.
+/// The number of smallest steps that show the round-off plateau if their errors do not decrease.
 const PLATEAU: usize = 8;
 
-/// The largest slope of a plateau: half of the lowest order there is.
+/// The largest slope of a plateau: half of the lowest possible order.
 const FLAT: f64 = 0.5;
 
-/// Raises the floors, if they are too low, to the round-off plateau that the smallest steps show: constant, or growing by at most `1/h` as it does where
-/// momenta are differences of positions divided by h.
+/// Raises the round-off of the errors, if it is too low, to the plateau of the smallest steps. The plateau is constant
+/// or grows by at most `1/h`, as it does where momenta are differences of positions divided by h.
 fn raise_floors(rows: &mut [Row]) {
     let smallest = &rows[rows.len().saturating_sub(PLATEAU)..];
     let seen: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
@@ -208,7 +209,7 @@ mod tests {
     use contact_geom::systems::CoupledInZ;
     use discrete_herglotz::{StepError, rules::Midpoint};
 
-    /// The midpoint rule by its value alone: its momenta and steps are differences that lose digits like `1/h`.
+    /// The midpoint rule, given by its value alone: its momenta and steps are differences that lose digits like `1/h`.
     struct WithoutClosedDerivatives<'a>(Midpoint<&'a CoupledInZ>);
     impl DiscreteLagrangian<1> for WithoutClosedDerivatives<'_> {
         fn step_size(&self) -> f64 {
@@ -219,8 +220,8 @@ mod tests {
         }
     }
 
-    /// The plateau of a discrete Lagrangian that has only a value is not fitted, from whatever largest step; where no step is above
-    /// it, no order is told.
+    /// The plateau of a discrete Lagrangian that is given by its value alone is not fitted, whatever the largest step;
+    /// where no step is above it, no order is reported.
     #[test]
     fn a_plateau_is_no_order() {
         let system = CoupledInZ::default();
@@ -247,7 +248,8 @@ mod tests {
         }
     }
 
-    /// Two steps above the plateau give no slope, none an exact method, and no steps nothing.
+    /// Two steps above the plateau give no slope. With no step above it the method is exact; without any steps nothing
+    /// is known.
     #[test]
     fn what_can_be_told_of_an_order() {
         let of = |errors: &[f64]| {

@@ -1,6 +1,7 @@
-//! The exact discrete Lagrangian in the discrete Herglotz principle: the points of a critical path lie on one exact motion.
+//! The exact discrete Lagrangian in the discrete Herglotz principle: the points of a critical path lie on one exact
+//! motion.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::systems::{CoupledInZ, CoupledPlane, QuadraticInZ};
@@ -14,8 +15,8 @@ use exact_lagrangian::{ExactLagrangian, Motion, herglotz_flow};
 
 const EPS: f64 = f64::EPSILON;
 
-/// Paths between the ends of an exact motion, with its position or its momentum given at each end, are that motion: positions,
-/// actions and conformal factor, at each point.
+/// Critical paths between the ends of an exact motion, with its position or its momentum given at each end, are that
+/// motion: their positions and actions at each point, and the conformal factor.
 fn returns_the_motion<const N: usize>(
     system: &impl Lagrangian<N>,
     t0: f64,
@@ -29,8 +30,9 @@ fn returns_the_motion<const N: usize>(
     let last = &truth[steps - 1];
     let (p0, p1) = (legendre(system, t0, start).p, legendre(system, t0 + span, &last.end).p);
     let largest_position = truth.iter().map(|m| m.end.q.amax()).fold(start.q.amax(), f64::max);
-    // A momentum is known to eps of itself and of `W q/h`, which the rounding of a position makes of it; the residuals of all
-    // points gather over the span, each as an impulse that moves the points after it by up to the span. W is about one here.
+    // A momentum is accurate to eps times itself and eps times `W q/h`, the effect of the rounding of a position. The
+    // residuals of all points accumulate over the span, each as an impulse that displaces the points after it by up to
+    // the span. W is about one here.
     let momentum = largest_position / h + p0.amax() + p1.amax();
     let bound = 4.0 * EPS * momentum * steps as f64 * span;
 
@@ -40,7 +42,8 @@ fn returns_the_motion<const N: usize>(
     for ends in [position, mixed[0], mixed[1]] {
         let mut problem = BoundaryPath::new(&ld, steps, ends).unwrap().starting_at(t0, start.z).unwrap();
         if ends != position {
-            // With a momentum given there are other paths as well: this one from a disturbed motion, the others from the straight line.
+            // With a given momentum there are other paths as well: this one is found from a perturbed motion, others
+            // from the straight line.
             let points = std::iter::once(&start.q).chain(truth.iter().map(|m| &m.end.q));
             let disturbed = points.enumerate().map(|(k, q)| q.map(|c| c + 1e-2 * (k as f64).cos())).collect();
             problem = problem.from_path(DiscretePath::new(disturbed).unwrap()).unwrap();
@@ -51,7 +54,7 @@ fn returns_the_motion<const N: usize>(
         for (k, m) in truth.iter().enumerate() {
             let off = (found.points[k + 1] - m.end.q).amax();
             assert!(off <= bound, "{ends:?}, point {}: {off:e} of {bound:e}", k + 1);
-            // Along the path the action varies by `p dq` at its ends, and by what the drag makes of it: factors of about one.
+            // The action varies by `p dq` at the ends of the path, up to factors of about one by the drag.
             let off = (found.actions[k + 1] - m.end.z).abs();
             assert!(off <= bound * momentum.max(1.0), "{ends:?}, action {}: {off:e} of {bound:e}", k + 1);
         }
@@ -69,7 +72,8 @@ fn returns_the_motion<const N: usize>(
     }
 }
 
-/// Nonlinear in q and in z: an inertia that depends on all of `(q, v, z)`; a drag by the square of the action; two coordinates.
+/// Systems that are nonlinear in q and z: an inertia that depends on all of `(q, v, z)`, a term quadratic in the
+/// action, and two coordinates.
 #[test]
 fn paths_of_the_exact_lagrangian_are_exact_motions() {
     let (coupled, quadratic, plane) = (CoupledInZ::default(), QuadraticInZ { c: 0.7 }, CoupledPlane::default());
@@ -80,7 +84,7 @@ fn paths_of_the_exact_lagrangian_are_exact_motions() {
     }
 }
 
-/// The points do not depend on their number: each path is a part of every finer one.
+/// The points of a path do not depend on their number: the points of each path are among those of every finer one.
 #[test]
 fn a_finer_path_has_the_same_points() {
     let (system, ends) = (CoupledInZ::default(), [End::Position([0.3].into()), End::Position([1.1].into())]);

@@ -73,7 +73,7 @@ fn taken(integrator: &AnyIntegrator) -> usize {
 
 /// The text of the README between `<!-- name -->` and `<!-- end name -->`.
 fn part(name: &str) -> &'static str {
-    let readme = include_str!("../../../README.md");
+    let readme = include_str!("../../../docs/guide.md");
     let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
     rest.split_once(&format!("<!-- end {name} -->")).unwrap_or_default().0
 }

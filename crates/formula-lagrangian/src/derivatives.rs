@@ -1,18 +1,19 @@
-//! Symbolic derivatives.
+//! Symbolic differentiation by reverse accumulation.
 
 use crate::{Function, Graph, Id, Node, Operation};
 
-/// A part of a derivative by a node, with where it counts: `part` where `live` is 1, and 0 where that is 0, whatever `part` is there.
+/// A contribution to the adjoint of a node: it is `part` where `live` is 1, and 0 where `live` is 0, whatever the value
+/// of `part` there.
 ///
-/// So a branch that is not taken leaves no trace, though a slope in it is no number: `part` is multiplied on as it is, and the
-/// choice is made last.
+/// A branch that is not taken therefore contributes nothing, even if its derivative is NaN: `part` is propagated
+/// unconditionally, and the selection is made at the end.
 #[derive(Clone, Copy)]
 struct Adjoint {
     part: Id,
     live: Id,
 }
 
-/// The choices within choices up to which each is written by itself; those further in by their `live`.
+/// The nesting depth of conditionals up to which each is written out; deeper ones are selected by the value of `live`.
 const DEEP: usize = 8;
 
 impl Graph {
@@ -40,7 +41,7 @@ impl Graph {
         if first.live == second.live {
             return Adjoint { part: self.add(first.part, second.part), live: first.live };
         }
-        // The two branches of one choice.
+        // The two adjoints belong to the two branches of one conditional.
         if let (Node::Select([a, b, x, y]), Node::Select([c, d, z, w])) =
             (self.node(first.live), self.node(second.live))
             && (a, b) == (c, d)
@@ -61,10 +62,11 @@ impl Graph {
         Adjoint { part: self.add(left, right), live }
     }
 
-    /// The partial derivatives of a node by others, all in one pass from the node back to what it is made of, so that they share
-    /// their subexpressions with it and among themselves. `None` where the graph would get more than `limit` nodes.
+    /// The partial derivatives of a node with respect to others, all in one pass backward through the graph, so that
+    /// they share their subexpressions with the node and among themselves. `None` if the graph would exceed `limit`
+    /// nodes.
     ///
-    /// The derivative of a jump is 0, as that of a kink in it.
+    /// The derivative of a jump is taken to be 0, and so is that of `abs` at 0.
     ///
     /// ```
     /// use formula_lagrangian::{Graph, Operation};
@@ -104,7 +106,7 @@ impl Graph {
         Some(by.iter().map(value).collect())
     }
 
-    /// Which nodes up to `of` depend on one of `by`.
+    /// For each node up to `of`, whether it depends on one of `by`.
     fn leads_to(&self, of: Id, by: &[Id]) -> Vec<bool> {
         let mut leads = vec![false; of.index() + 1];
         for i in 0..=of.index() {
@@ -114,7 +116,8 @@ impl Graph {
         leads
     }
 
-    /// Gives each operand of a node its part of the derivative: the node's own, `adjoint`, times the slope.
+    /// Passes to each operand of a node its contribution: the adjoint of the node, `adjoint`, times the partial
+    /// derivative.
     fn pass_back(&mut self, id: Id, of: Adjoint, leads: &[bool], give: &mut impl FnMut(&mut Graph, Id, Adjoint)) {
         let asked = |a: Id| leads.get(a.index()).copied().unwrap_or(false);
         let Adjoint { part: adjoint, live } = of;
@@ -129,14 +132,15 @@ impl Graph {
         };
         match self.node(id) {
             Node::Select(all) => return choose(self, all),
-            // The second is taken where it is less, or where the first is.
+            // The second operand is selected where it is strictly smaller, or for `Max` strictly larger.
             Node::Binary(Operation::Min, a, b) => return choose(self, [b, a, b, a]),
             Node::Binary(Operation::Max, a, b) => return choose(self, [a, b, b, a]),
             _ => {}
         }
         let mut give = |graph: &mut Graph, operand: Id, part: Id| give(graph, operand, Adjoint { part, live });
         match self.node(id) {
-            // Powers of roots and of lengths by themselves: they have derivatives where the root has none.
+            // Powers of roots and of lengths are differentiated as a whole, since they have derivatives where the root
+            // has none.
             Node::Powi(a, n) if n > 2 && matches!(self.node(a), Node::Unary(Function::Sqrt, _)) => {
                 for square in self.node(a).operands() {
                     let (below, factor) = (self.powi(a, n - 2), self.number(0.5 * f64::from(n)));
@@ -190,7 +194,7 @@ impl Graph {
                         }
                     }
                 }
-                // By a number or a parameter: no inverse, whose rounding would come on top.
+                // For a number or a parameter as divisor the inverse is avoided, since it would add a rounding error.
                 Operation::Div if !asked(b) && self.is_constant(b) => {
                     let part = self.div(adjoint, b);
                     give(self, a, part);
@@ -200,7 +204,7 @@ impl Graph {
                     let part = self.mul(adjoint, inverse);
                     give(self, a, part);
                     if asked(b) {
-                        // The sign goes to a constant, where it costs nothing.
+                        // The sign is applied to the numerator, since it costs nothing for a constant.
                         let minus = self.neg(a);
                         let steep = self.mul(part, minus);
                         let steep = self.mul(steep, inverse);
@@ -230,16 +234,16 @@ impl Graph {
                     let part = self.mul(part, b);
                     give(self, a, part);
                 }
-                // Chosen above.
+                // Handled above.
                 Operation::Min | Operation::Max => {}
             },
             _ => {}
         }
     }
 
-    /// The slope of a power with an exponent between 1 and 2, where its base may be a sum of squares: a choice that says that the second
-    /// derivatives of the power vanish where the sum does. `|grad s|^2` is at most of the size of s, so that
-    /// `s^(b-2) (grad s)^2` goes to 0.
+    /// The derivative of a power with an exponent between 1 and 2, where its base may be a sum of squares s. The
+    /// conditional makes the second derivatives of the power vanish where s vanishes: `|grad s|^2` is at most of the
+    /// size of s, so that `s^(b-2) (grad s)^2` goes to 0.
     fn slope_of_squares(&mut self, base: Id, slope: Id) -> Id {
         if !self.shape(base).flat {
             return slope;
@@ -248,13 +252,13 @@ impl Graph {
         self.select([zero, base, slope, zero])
     }
 
-    /// `a^(b-1)`, which times b is the slope of `a^b` for a constant b.
+    /// `a^(b-1)`, which multiplied by b is the derivative of `a^b` for a constant b.
     fn slope_of_power(&mut self, a: Id, b: Id) -> Id {
         let (zero, one) = (self.number(0.0), self.number(1.0));
         let exponent = self.sub(b, one);
         let slope = self.binary(Operation::Power, a, exponent);
         let Some(x) = self.as_number(b) else {
-            // A power of 0 has no slope, not even at 0.
+            // If the exponent is 0, the derivative is 0, even where the base is 0.
             let size = self.unary(Function::Abs, b);
             let slope = self.select([zero, size, slope, zero]);
             if !self.shape(a).flat {
@@ -265,7 +269,8 @@ impl Graph {
         };
         match x {
             _ if x > 1.0 && x < 2.0 => self.slope_of_squares(a, slope),
-            // The gradient vanishes with the squares. Its own derivatives do not exist there: nor do those of this 0, by any rule.
+            // The gradient vanishes where the squares do, but its derivatives do not exist there. The quotient
+            // `2/(1/a)` is 0 there as well, and its derivatives are NaN by any method of differentiation.
             _ if x > 0.5 && x < 1.0 && self.shape(a).flat => {
                 let (inverse, two) = (self.recip(a), self.number(2.0));
                 let none = self.div(two, inverse);

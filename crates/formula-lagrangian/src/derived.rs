@@ -1,4 +1,5 @@
-//! What is derived of a formula, for any number of coordinates: compiled once, with this crate.
+//! The derivatives of a formula for any number of coordinates. This code does not depend on the dimension at compile
+//! time, so that it is compiled once, with this crate.
 
 use crate::formula::index;
 use crate::parser::MOST_NODES;
@@ -7,15 +8,15 @@ use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Structure;
 
-/// The most nodes that a formula has with its gradient, and with its second derivatives.
+/// The maximum numbers of nodes of a formula with its gradient, and with its second derivatives.
 const WITH_GRADIENT: usize = 10 * MOST_NODES;
 const WITH_HESSIAN: usize = 20 * MOST_NODES;
 
-/// A formula with its derivatives on tapes, and what is proved of it.
+/// A formula with its derivatives as tapes, and its proved properties.
 #[derive(Clone, Debug)]
 pub(crate) struct Derived {
     pub formula: Formula,
-    /// Proved for all values of the parameters, but for `z_free`, which is so for a rate of zero.
+    /// Proved for all values of the parameters, except `z_free`, which refers to the present value of a constant rate.
     pub structure: Structure,
     pub smooth: bool,
     pub cyclic: Vec<bool>,
@@ -39,7 +40,8 @@ pub(crate) struct Derived {
 }
 
 impl Derived {
-    /// Of a formula, among `n` coordinates: those beyond its own are of free particles. `n` is not less than the formula has.
+    /// Derives a formula over `n` coordinates, at least as many as it has. The coordinates beyond its own are those of
+    /// free particles.
     ///
     /// # Errors
     /// [`FormulaError::TooLarge`].
@@ -140,7 +142,7 @@ fn variables(graph: &mut Graph, n: usize) -> Vec<Id> {
     variables
 }
 
-/// The matrix of second derivatives, by rows; the half of it is derived. `None` where it is too large.
+/// The symmetric matrix of second derivatives, by rows, of which one half is derived; `None` if it is too large.
 fn second_derivatives(graph: &mut Graph, partials: &[Id], variables: &[Id]) -> Option<Vec<Id>> {
     let size = variables.len();
     let mut second = vec![*partials.first()?; size * size];

@@ -1,10 +1,10 @@
-//! The functions of the language: their values over any number, and their derivatives.
+//! The functions of the language: their values for any scalar type, and their derivatives.
 
 use crate::{Function, Graph, Id, Operation};
 use contact_geom::Scalar;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The functions of one number by their names in a text. More than one name may mean the same.
+/// The functions of one number by their names in a text. Several names may denote the same function.
 pub(crate) const FUNCTIONS: [(&str, Function); 21] = [
     ("sqrt", Function::Sqrt),
     ("abs", Function::Abs),
@@ -39,7 +39,7 @@ pub(crate) const OPERATIONS: [(&str, Operation); 5] = [
 ];
 
 impl Function {
-    /// The value over any number.
+    /// The value, for any scalar type.
     #[inline(always)]
     pub(crate) fn value<T: Scalar>(self, x: T) -> T {
         match self {
@@ -66,13 +66,13 @@ impl Function {
         }
     }
 
-    /// Whether `f(-x) = -f(x)`, to the last digit.
+    /// Whether `f(-x) = -f(x)` exactly.
     pub(crate) fn is_odd(self) -> bool {
         use Function::{Asinh, Atan, Atanh, Recip, Sign, Sin, Sinh, Tan, Tanh};
         matches!(self, Recip | Sign | Sin | Tan | Atan | Sinh | Tanh | Asinh | Atanh)
     }
 
-    /// Whether it has a kink or a jump.
+    /// Whether it has neither kinks nor jumps.
     pub(crate) fn is_smooth(self) -> bool {
         !matches!(self, Function::Abs | Function::Sign)
     }
@@ -117,7 +117,7 @@ impl Function {
                 let size = graph.binary(Operation::Hypot, x, one);
                 graph.recip(size)
             }
-            // By factors: the difference of squares would cancel.
+            // A product of factors, since the difference of squares would suffer from cancellation.
             Function::Acosh => {
                 let (below, above) = (graph.sub(x, one), graph.add(x, one));
                 let [below, above] = [below, above].map(|factor| graph.unary(Function::Sqrt, factor));
@@ -158,11 +158,11 @@ impl Operation {
     }
 }
 
-/// The angle of the point `(x, y)`, in `[-pi, pi]`; not a number at the origin.
+/// The angle of the point `(x, y)`, in `[-pi, pi]`; NaN at the origin.
 #[inline(always)]
 pub(crate) fn atan2<T: Scalar>(y: T, x: T) -> T {
     let (zero, size_x, size_y) = (T::zero(), Scalar::abs(x), Scalar::abs(y));
-    // The quotient of the smaller by the larger.
+    // The coordinate of smaller size, divided by that of larger size.
     let steep = |then: T, otherwise: T| size_x.if_less(size_y, then, otherwise);
     let angle = (steep(-x, y) / steep(y, x)).atan();
     let quarter = y.if_less(zero, T::from(-FRAC_PI_2), T::from(FRAC_PI_2));
@@ -174,30 +174,30 @@ pub(crate) fn atan2<T: Scalar>(y: T, x: T) -> T {
 #[inline(always)]
 pub(crate) fn hypot<T: Scalar>(x: T, y: T) -> T {
     let (x, y) = (Scalar::abs(x), Scalar::abs(y));
-    // At a tie the one and the other.
+    // If both are equal, `large` is the one and `small` the other.
     let (large, small) = (Scalar::max(x, y), Scalar::min(y, x));
     let ratio = small / large;
     let length = large * (ratio * ratio + 1.0).sqrt();
     T::zero().if_less(large, length, large)
 }
 
-/// The inverse of the hyperbolic sine, without cancellation and without overflow: that of `|x|`, with the sign of x.
+/// The inverse hyperbolic sine, without cancellation or overflow: that of `|x|`, with the sign of x.
 #[inline(always)]
 pub(crate) fn asinh<T: Scalar>(x: T) -> T {
-    // Not the absolute value, whose derivative is 0 at 0.
+    // `abs` is not used, since its derivative is 0 at 0.
     let size = x.if_less(T::zero(), -x, x);
     let value = (size + size * (size / (hypot(size, T::one()) + 1.0))).ln_1p();
     x.if_less(T::zero(), -value, value)
 }
 
-/// The inverse of the hyperbolic cosine, without cancellation and without overflow.
+/// The inverse hyperbolic cosine, without cancellation or overflow.
 #[inline(always)]
 pub(crate) fn acosh<T: Scalar>(x: T) -> T {
     let above = x - 1.0;
     (above + above.sqrt() * (x + 1.0).sqrt()).ln_1p()
 }
 
-/// The inverse of the hyperbolic tangent: that of `|x|`, with the sign of x.
+/// The inverse hyperbolic tangent: that of `|x|`, with the sign of x.
 #[inline(always)]
 pub(crate) fn atanh<T: Scalar>(x: T) -> T {
     let size = x.if_less(T::zero(), -x, x);

@@ -1,11 +1,11 @@
-//! What to write in place of what other languages have.
+//! Corrections for the notation of other languages.
 
 use crate::names::Block;
 
-/// The remedy for a choice in another form.
+/// The correction for a conditional in another notation.
 pub(crate) const CHOICE: &str = "write `if(a < b, then, otherwise)`";
 
-/// What to write in place of a function of other languages.
+/// The correction for a function of other languages.
 pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
     Some(match name.to_lowercase().as_str() {
         "where" | "piecewise" | "ifelse" | "select" | "cond" => CHOICE,
@@ -33,7 +33,7 @@ pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
     })
 }
 
-/// What to write in place of a name of other languages.
+/// The correction for a name of other languages.
 pub(crate) fn instead_of_name(name: &str) -> Option<&'static str> {
     Some(match name {
         "e" | "E" | "euler" => "write `exp(x)` for a power of Euler's number, or `exp(1)`",
@@ -44,7 +44,8 @@ pub(crate) fn instead_of_name(name: &str) -> Option<&'static str> {
     })
 }
 
-/// The velocity, as it is written here, that another language names in this way: `xdot`, `x_dot`, `dx`, `vx`, `v_x` and the like.
+/// The velocity, in the notation of this language, for a name that other languages give to it: `xdot`, `x_dot`, `dx`,
+/// `vx`, `v_x` and similar ones.
 pub(crate) fn velocity_of(name: &str, blocks: &[Block]) -> Option<String> {
     const BEFORE: [&str; 6] = ["dot_", "v_", "d_", "v", "d", "D"];
     const AFTER: [&str; 8] = ["_dot", "dot", "_prime", "prime", "_t", "_p", "p", "d"];
@@ -54,7 +55,7 @@ pub(crate) fn velocity_of(name: &str, blocks: &[Block]) -> Option<String> {
     Some(if block.count.is_some() { format!("{}'[0]", block.name) } else { format!("{}'", block.name) })
 }
 
-/// What to do about a character that has no meaning.
+/// The correction for a character that has no meaning.
 pub(crate) fn instead_of_character(c: char) -> Option<&'static str> {
     Some(match c {
         '@' => "a product of vectors is written `sum(i, 0, n-1, q[i]*v[i])`",

@@ -1,9 +1,10 @@
-//! A Lagrangian as text, run by all integrators.
+//! Lagrangians that are given as text, for all integrators.
 //!
-//! A formula becomes a graph of expressions; its first and second derivatives are derived on the graph; both become straight code in
-//! registers, which works on numbers, on duals and on the vector lanes of the integrators alike. The structure of L (separable, affine in
-//! z, ...) is proved from the graph, so that no integrator probes it. A run takes 1.3 to 1.6 times as long as that of the Rust type of the
-//! same Lagrangian with a splitting, and 0.7 to 2.2 times with Gauss collocation; [`FormulaLagrangian::to_rust`] writes that type.
+//! A formula is parsed into an expression graph, on which its first and second derivatives are computed symbolically.
+//! Both are compiled to straight-line register code, which is evaluated on floating-point numbers, dual numbers and the
+//! vector lanes of the integrators alike. The structure of L (separable, affine in z, ...) is proved from the graph, so
+//! that integrators do not probe it. In units of the time for the Rust type of the same Lagrangian, a run takes 1.3 to
+//! 1.6 with a splitting, and 0.7 to 2.2 with Gauss collocation; [`FormulaLagrangian::to_rust`] writes that type.
 //!
 //! ```
 //! use contact_geom::VelocityPoint;
@@ -24,35 +25,36 @@
 //! | Written | Meaning |
 //! |---|---|
 //! | `x`, `x'` | a coordinate by its name, and its velocity |
-//! | `q[0]`, `v[0]` | the coordinate of index 0, and its velocity, whatever its name; indices begin with 0 |
+//! | `q[0]`, `v[0]` | the coordinate with the index 0 and its velocity, whatever its name; indices start from 0 |
 //! | `u[i]`, `u'[i]` | entries of an array, given as the coordinate `"u[3]"` |
 //! | `z`, `t`, `pi`, `n` | the action, the time, 3.14159..., the number of coordinates |
-//! | `r = sqrt(x^2 + y^2)` | a definition, on a line of its own or before a `;`. The last line is L, with `L =` or without; that of a column may have any name |
-//! | `+ - * /`, `^` or `**` | powers bind most, and to the right: `-x^2` is `-(x^2)`, `2^3^2` is `2^9` |
-//! | `sum(i, 1, n-1, (q[i] - q[i-1])^2)` | the sum over i from 1 to n - 1; an empty one is 0 |
-//! | `if(a < b, c, d)` | c where a < b, else d; also with `>` |
+//! | `r = sqrt(x^2 + y^2)` | a definition, on its own line or followed by `;`. The last line is the value L, with or without `L =`; the value of an output column may have any name |
+//! | `+ - * /`, `^` or `**` | powers have the highest precedence and are right-associative: `-x^2` is `-(x^2)`, `2^3^2` is `2^9` |
+//! | `sum(i, 1, n-1, (q[i] - q[i-1])^2)` | the sum over i from 1 to n - 1; an empty sum is 0 |
+//! | `if(a < b, c, d)` | c if a < b, else d; also with `>` |
 //! | `sqrt exp expm1 ln log log1p ln1p recip` | roots, exponentials, natural logarithms, `1/x` |
 //! | `sin cos tan asin acos atan versine sinh cosh tanh asinh acosh atanh` | `versine` is `1 - cos`, without cancellation |
-//! | `atan2(y, x)`, `hypot(x, y)`, `pow(x, a)` | of two numbers |
+//! | `atan2(y, x)`, `hypot(x, y)`, `pow(x, a)` | functions of two numbers |
 //! | `abs sign`, `min(a, b, ...)`, `max(a, b, ...)` | with kinks or jumps, as `if`, `atan2` and `hypot` |
 //! | `# ...` | a comment |
 //!
-//! A line goes on after an operator and inside of brackets. A name that is given to a coordinate or a parameter is that, though it be
-//! `n`, `q`, `v` or `pi`.
+//! A line continues after an operator and within brackets. The names `n`, `q`, `v` and `pi` may also be given to
+//! coordinates and parameters, which then take precedence.
 //!
-//! `x^a` is a product for an integer a, a power of the root for half of one, and `e^(a ln x)` where a depends on the state. A `0*x` is 0,
-//! also where x is infinite; that and the gathering of powers of two is all that is rearranged. [`Graph`] says it exactly.
+//! `x^a` is a product for an integer a, a power of the square root for half of an odd integer, and `e^(a ln x)` if a
+//! depends on the state. `0*x` is 0, even if x is infinite. This and the collection of powers of two are the only
+//! rearrangements; [`Graph`] gives the exact rules.
 //!
-//! # What is not smooth
+//! # Kinks and jumps
 //!
-//! [`FormulaLagrangian::is_smooth`] tells; and nothing is claimed of the structure in coordinates on which a kink or a jump depends. The
-//! derivative of a jump is taken to be 0.
+//! [`FormulaLagrangian::is_smooth`] returns whether there are any. No structure is claimed in coordinates on which a
+//! kink or a jump depends. The derivative of a jump is taken to be 0.
 //!
 //! # Bounds
 //!
-//! A text has at most [`LONGEST_TEXT`] bytes, is nested at most [`DEEPEST_NESTING`] deep and gives at most [`MOST_NODES`] nodes; there are
-//! at most [`MOST_COORDINATES`] coordinates. Steps allocate nothing where a formula needs at most 256 registers, its `2 n + 2` inputs
-//! among them.
+//! A text has at most [`LONGEST_TEXT`] bytes, a nesting depth of at most [`DEEPEST_NESTING`], and at most
+//! [`MOST_NODES`] nodes. There are at most [`MOST_COORDINATES`] coordinates. Steps do not allocate if a formula needs
+//! at most 256 registers, including its `2 n + 2` inputs.
 
 mod derivatives;
 mod derived;

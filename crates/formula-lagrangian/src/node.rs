@@ -1,6 +1,6 @@
-//! What expressions are made of.
+//! The nodes of expressions.
 
-/// A node of a [`Graph`](crate::Graph). The nodes that it is made of have smaller numbers.
+/// The identifier of a node of a [`Graph`](crate::Graph). The operands of a node have smaller identifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Id(pub(crate) u32);
 
@@ -39,11 +39,11 @@ pub enum Function {
     Cosh,
     /// The hyperbolic tangent.
     Tanh,
-    /// The inverse of the hyperbolic sine.
+    /// The inverse hyperbolic sine.
     Asinh,
-    /// The inverse of the hyperbolic cosine, of numbers from 1 on.
+    /// The inverse hyperbolic cosine, for numbers not less than 1.
     Acosh,
-    /// The inverse of the hyperbolic tangent.
+    /// The inverse hyperbolic tangent.
     Atanh,
     /// `e^x`.
     Exp,
@@ -66,9 +66,9 @@ pub enum Operation {
     Mul,
     /// `a / b`.
     Div,
-    /// The smaller; at a tie the first.
+    /// The smaller; if both are equal, the first.
     Min,
-    /// The larger; at a tie the first.
+    /// The larger; if both are equal, the first.
     Max,
     /// The angle of the point `(b, a)`.
     Atan2,
@@ -78,16 +78,16 @@ pub enum Operation {
     Power,
 }
 
-/// What a node is.
+/// The content of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
     /// A number, by its bits.
     Number(u64),
-    /// The parameter of this index.
+    /// The parameter with this index.
     Parameter(u32),
-    /// The coordinate of this index.
+    /// The coordinate with this index.
     Position(u32),
-    /// The velocity of the coordinate of this index.
+    /// The velocity of the coordinate with this index.
     Velocity(u32),
     /// The action z.
     Action,
@@ -97,14 +97,14 @@ pub enum Node {
     Unary(Function, Id),
     /// A function of two nodes.
     Binary(Operation, Id, Id),
-    /// An integer power; its exponent is none of 0, 1, 2 and -1.
+    /// An integer power with an exponent other than 0, 1, 2 and -1.
     Powi(Id, i32),
-    /// `c` where `a < b`, else `d`, in the order `[a, b, c, d]`.
+    /// `c` if `a < b`, else `d`, in the order `[a, b, c, d]`.
     Select([Id; 4]),
 }
 
 impl Node {
-    /// The nodes that it is made of.
+    /// The operands of the node.
     pub fn operands(&self) -> impl Iterator<Item = Id> + use<> {
         let (operands, count) = match *self {
             Node::Unary(_, a) | Node::Powi(a, _) => ([a; 4], 1),
@@ -116,7 +116,7 @@ impl Node {
     }
 }
 
-/// What a node depends on, as a set.
+/// The set of inputs on which a node depends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inputs(u8);
 
@@ -130,11 +130,11 @@ impl Inputs {
     pub const fn and(self, other: Inputs) -> Inputs {
         Inputs(self.0 | other.0)
     }
-    /// Whether they have an input in common.
+    /// Whether the two sets have an input in common.
     pub fn meets(self, others: Inputs) -> bool {
         self.0 & others.0 != 0
     }
-    /// Whether it holds no input but these.
+    /// Whether the set is contained in the other.
     pub fn within(self, others: Inputs) -> bool {
         self.0 & !others.0 == 0
     }

@@ -1,25 +1,26 @@
-//! What a graph proves of a Lagrangian.
+//! Proofs of structural properties of a Lagrangian from its graph.
 
 use crate::node::Inputs;
 use crate::{Graph, Id, Node, Operation};
 use contact_geom::Structure;
 
-/// The derivatives of L that proofs look at, each in the order of coordinates.
+/// The derivatives of L that the proofs use, in the order of the coordinates.
 pub(crate) struct Partials<'a> {
     pub value: Id,
     pub q: &'a [Id],
     pub v: &'a [Id],
     pub z: Id,
-    /// Second derivatives by any two of q and v.
+    /// Second derivatives with respect to all pairs of q and v.
     pub second: &'a [Id],
-    /// Second derivatives by two velocities.
+    /// Second derivatives with respect to pairs of velocities.
     pub mass: &'a [Id],
 }
 
-/// The claims that hold for all values of the parameters, and those that the present value of `L_z` gives.
+/// The properties that hold for all values of the parameters, and those that follow from the present value of `L_z`.
 ///
-/// Each is read off what derivatives depend on, as they are written: what is not seen is not claimed. A derivative hides a jump, so
-/// nothing is claimed of coordinates on which one depends.
+/// Each follows from the inputs on which the derivatives depend as they are written, so that a property may hold
+/// without being claimed. Derivatives do not show jumps, so that nothing is claimed in coordinates on which a jump
+/// depends.
 pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> Structure {
     use Inputs as In;
     let on = |ids: &[Id]| ids.iter().fold(In::NONE, |all, id| all.and(graph.inputs(*id)));
@@ -59,22 +60,23 @@ fn value(graph: &Graph, id: Id, constants: &[f64]) -> Option<f64> {
     graph.as_number(id).or_else(|| constants.get(id.index()).copied())
 }
 
-/// The inputs of all kinks and jumps of a node.
+/// The inputs on which the kinks and jumps of a node depend.
 pub(crate) fn kinks(graph: &Graph, of: Id) -> Inputs {
     let needed = graph.needed(of);
     let all = (0..=of.index()).filter(|i| needed[*i]).map(|i| Id(i as u32));
     all.fold(Inputs::NONE, |kinks, id| match graph.node(id) {
         Node::Unary(f, a) if !f.is_smooth() => kinks.and(graph.inputs(a)),
         Node::Binary(Operation::Min | Operation::Max, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
-        // It jumps on half an axis, and has no derivative at the origin.
+        // `atan2` jumps on a half-axis, and neither has a derivative at the origin.
         Node::Binary(Operation::Atan2 | Operation::Hypot, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
         Node::Select([a, b, ..]) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
         _ => kinks,
     })
 }
 
-/// The functions at whose zeros a node has a kink or a jump: the arguments of `abs` and `sign`, and the differences that `min`, `max` and `if`
-/// choose by. Each once, whatever its sign; what is constant never changes its sign.
+/// The functions at whose zeros a node has a kink or a jump: the arguments of `abs` and `sign`, and the differences
+/// whose sign decides `min`, `max` and `if`. Each is listed once, also if it occurs with both signs; constants are
+/// omitted, since they do not change sign.
 pub(crate) fn switching_functions(graph: &mut Graph, of: Id) -> Vec<Id> {
     let needed = graph.needed(of);
     let mut functions: Vec<Id> = Vec::new();
@@ -93,7 +95,7 @@ pub(crate) fn switching_functions(graph: &mut Graph, of: Id) -> Vec<Id> {
 }
 
 impl Graph {
-    /// Which nodes up to `of` it is made of.
+    /// For each node up to `of`, whether `of` contains it.
     pub(crate) fn needed(&self, of: Id) -> Vec<bool> {
         let mut needed = vec![false; of.index() + 1];
         if let Some(last) = needed.last_mut() {
@@ -107,7 +109,7 @@ impl Graph {
         needed
     }
 
-    /// The node with all velocities 0, simplified.
+    /// The node with all velocities set to 0, simplified.
     pub(crate) fn at_rest(&mut self, of: Id) -> Id {
         let needed = self.needed(of);
         let mut images: Vec<Id> = Vec::with_capacity(needed.len());

@@ -1,4 +1,4 @@
-//! Formulas that a program builds, with the operators of numbers.
+//! Formulas that are built by a program with the operators of numbers.
 
 use crate::names::Names;
 use crate::{Formula, FormulaError, Function, Graph, Id, Operation};
@@ -10,11 +10,11 @@ use std::rc::Rc;
 #[derive(Debug, Default)]
 struct Shared {
     graph: Graph,
-    /// Whether an operation had a symbol of another graph.
+    /// Whether an operation combined symbols of different graphs.
     mixed: bool,
 }
 
-/// The coordinates, velocities and parameters of a formula that a program builds.
+/// The coordinates, velocities and parameters of a formula that is built by a program.
 ///
 /// ```
 /// use formula_lagrangian::Symbols;
@@ -40,7 +40,7 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// The symbols of a formula over coordinates and parameters, which are given as to [`Formula::parse`].
+    /// The symbols of a formula over coordinates and parameters, given as for [`Formula::parse`].
     ///
     /// # Errors
     /// [`FormulaError::Name`], [`FormulaError::Dimension`], [`FormulaError::ParameterValue`].
@@ -54,7 +54,7 @@ impl Symbols {
         Symbol { shared: self.shared.clone(), id }
     }
 
-    /// The coordinate of an index. One that is not there is an error of [`formula`](Self::formula).
+    /// The coordinate with this index. An index out of range is an error of [`formula`](Self::formula).
     pub fn position(&self, index: u32) -> Symbol {
         self.symbol(|graph| graph.position(index))
     }
@@ -88,11 +88,11 @@ impl Symbols {
         Ok(self.symbol(|graph| graph.parameter(index as u32)))
     }
 
-    /// The formula whose Lagrangian is a symbol.
+    /// The formula whose Lagrangian is the given symbol.
     ///
     /// # Errors
-    /// [`FormulaError::Mixed`] where the symbol, or one that it was made of, is of other [`Symbols`]; [`FormulaError::TooLarge`];
-    /// [`FormulaError::Unknown`] where a coordinate is not there.
+    /// [`FormulaError::Mixed`] if the symbol, or an operand of it, belongs to other [`Symbols`];
+    /// [`FormulaError::TooLarge`]; [`FormulaError::Unknown`] if the index of a coordinate is out of range.
     pub fn formula(&self, lagrangian: &Symbol) -> Result<Formula, FormulaError> {
         let shared = self.shared.borrow();
         if shared.mixed || !Rc::ptr_eq(&self.shared, &lagrangian.shared) {
@@ -102,16 +102,16 @@ impl Symbols {
     }
 }
 
-/// An expression of [`Symbols`], on which operators and functions work as on a number; cloning is cheap.
+/// An expression of [`Symbols`], with the operators and functions of numbers. Cloning is inexpensive.
 #[derive(Clone, Debug)]
 pub struct Symbol {
     shared: Rc<RefCell<Shared>>,
     id: Id,
 }
 
-/// What can stand beside a symbol: another one, or a number.
+/// An operand of an operation with a symbol: another symbol, or a number.
 pub trait Operand {
-    /// The node of the operand in the graph of a symbol.
+    /// The node of the operand in the graph of the symbol `beside`.
     #[doc(hidden)]
     fn node(&self, beside: &Symbol) -> Id;
 }
@@ -119,7 +119,7 @@ pub trait Operand {
 impl Operand for Symbol {
     fn node(&self, beside: &Symbol) -> Id {
         if !Rc::ptr_eq(&self.shared, &beside.shared) {
-            // Said where the formula is made: operators cannot fail.
+            // Reported when the formula is made, since operators cannot return errors.
             self.shared.borrow_mut().mixed = true;
             beside.shared.borrow_mut().mixed = true;
             return beside.id;
@@ -158,7 +158,7 @@ impl Symbol {
         })
     }
 
-    /// A function of it.
+    /// Applies a function.
     pub fn apply(&self, function: Function) -> Symbol {
         self.with(|graph| graph.unary(function, self.id))
     }
@@ -168,17 +168,17 @@ impl Symbol {
         self.with(|graph| graph.powi(self.id, n))
     }
 
-    /// A power; `e^(b ln a)` where the exponent b depends on the state.
+    /// A power; `e^(b ln a)` if the exponent b depends on the state.
     pub fn pow(&self, exponent: impl Operand) -> Symbol {
         self.operate(Operation::Power, &exponent)
     }
 
-    /// The smaller of two.
+    /// The smaller of two values.
     pub fn min(&self, other: impl Operand) -> Symbol {
         self.operate(Operation::Min, &other)
     }
 
-    /// The larger of two.
+    /// The larger of two values.
     pub fn max(&self, other: impl Operand) -> Symbol {
         self.operate(Operation::Max, &other)
     }
@@ -193,7 +193,7 @@ impl Symbol {
         self.operate(Operation::Hypot, &other)
     }
 
-    /// `then` where it is less than another, else `otherwise`.
+    /// `then` if the symbol is less than `than`, else `otherwise`.
     pub fn if_less(&self, than: impl Operand, then: impl Operand, otherwise: impl Operand) -> Symbol {
         let [than, then, otherwise] = [than.node(self), then.node(self), otherwise.node(self)];
         self.with(|graph| graph.select([self.id, than, then, otherwise]))
@@ -218,7 +218,7 @@ functions! {
     asinh Asinh acosh Acosh atanh Atanh exp Exp exp_m1 ExpM1 ln Ln ln_1p Ln1p
 }
 
-/// The operators between symbols and numbers, owned or not.
+/// The operators between symbols and numbers, by value or by reference.
 macro_rules! operators {
     ($($trait:ident $method:ident;)*) => {
         $(

@@ -1,10 +1,11 @@
-//! Straight code in registers, made of a graph.
+//! Straight-line register code, compiled from a graph.
 
 use crate::node::Inputs;
 use crate::{Function, Graph, Id, Node, Operation};
 
-/// One instruction: what is written to the register `to`, of the registers `a` and `b` and of what is in `extra`: a constant by its
-/// bits, an exponent, or two registers more. In two words, so that a program is read as fast as it runs.
+/// One instruction: it writes to the register `to` a function of the registers `a` and `b` and of `extra`, which holds
+/// a constant by its bits, an exponent, or two more registers. An instruction has two machine words, so that reading
+/// the program does not limit its speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Instruction {
     pub code: Code,
@@ -14,19 +15,19 @@ pub(crate) struct Instruction {
     pub extra: u64,
 }
 
-/// The operand that is the result of the instruction before: it does not have to come from memory.
+/// The operand that stands for the result of the previous instruction, which need not be loaded from memory.
 pub(crate) const PREVIOUS: u16 = u16::MAX;
 
-/// What an instruction does, with `k` the constant and `c`, `d` the registers in `extra`.
+/// The operation of an instruction, with `k` the constant and `c`, `d` the registers in `extra`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Code {
     Add,
     Sub,
     Mul,
     Div,
-    /// `a b + c`, each rounded, as Rust code is.
+    /// `a b + c`, with the product and the sum rounded separately, as in Rust code.
     MulAdd,
-    /// `c - a b`, likewise.
+    /// `c - a b`, rounded in the same way.
     MulSub,
     /// `a + k`.
     AddConstant,
@@ -38,11 +39,11 @@ pub(crate) enum Code {
     DivConstant,
     /// `k / a`.
     ConstantDiv,
-    /// `a k + b`, each rounded.
+    /// `a k + b`, with the product and the sum rounded separately.
     MulConstantAdd,
-    /// `b - a k`, likewise.
+    /// `b - a k`, rounded in the same way.
     MulConstantSub,
-    /// `a b k`, from the left.
+    /// `a b k`, evaluated from the left.
     ScaledProduct,
     Function(Function),
     Min,
@@ -51,7 +52,7 @@ pub(crate) enum Code {
     Hypot,
     /// `a^k`.
     Power,
-    /// `a^n`, n in `extra`.
+    /// `a^n`, with n in `extra`.
     Powi,
     Select,
     /// The constant itself.
@@ -71,7 +72,7 @@ impl Instruction {
         f64::from_bits(self.extra)
     }
 
-    /// Reads what was last written to a register where that is an operand.
+    /// Replaces operands by [`PREVIOUS`] if they are the register that the previous instruction has written.
     fn follow(&mut self, written: u16) {
         let [c, d] = self.third_and_fourth();
         let follow = |operand: u16| if operand == written { PREVIOUS } else { operand };
@@ -86,15 +87,15 @@ impl Instruction {
     }
 }
 
-/// Where a result is.
+/// The location of a result.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub register: u16,
-    /// Whether it is the negative of what is there: as most forces are, of slopes.
+    /// Whether the result is the negative of the register, as for most forces, which are negative slopes.
     pub negative: bool,
 }
 
-/// The first registers of the inputs of each kind; `None` of those that are not read.
+/// The first registers of the inputs of each kind; `None` for inputs that are not read.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct InputRegisters {
     pub q: Option<u16>,
@@ -103,37 +104,37 @@ pub(crate) struct InputRegisters {
     pub t: Option<u16>,
 }
 
-/// Straight code that computes some nodes of a graph: the inputs that it reads are in the first registers.
+/// Straight-line code that computes nodes of a graph. The inputs that it reads are in the first registers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
     pub code: Vec<Instruction>,
     pub results: Vec<Place>,
-    /// How many registers there are.
+    /// The number of registers.
     pub registers: usize,
     pub inputs: InputRegisters,
-    /// The instructions with a constant, and the nodes of these.
+    /// The indices of the instructions with a constant, and the nodes of these constants.
     constants: Vec<(usize, Id)>,
 }
 
-/// How nodes are placed in registers.
+/// The state of the compilation: the assignment of nodes to registers.
 struct Builder<'g> {
     graph: &'g Graph,
     tape: Tape,
-    /// The register of each node that is in one.
+    /// The register of each node that has one.
     place: Vec<Option<u16>>,
-    /// How often each node is still read.
+    /// The number of remaining reads of each node.
     uses: Vec<u32>,
     free: Vec<u16>,
 }
 
 impl Tape {
-    /// The code for nodes of a graph over `dimension` coordinates; `None` where it needs more registers or constants than can be
-    /// numbered.
+    /// The code for nodes of a graph over `dimension` coordinates; `None` if it needs more registers or constants than
+    /// can be numbered.
     pub fn new(graph: &Graph, nodes: &[Id], dimension: usize) -> Option<Self> {
         let last = nodes.iter().map(|id| id.index() + 1).max().unwrap_or(0);
         let mut uses = vec![0_u32; last];
         for id in nodes {
-            // One more than all readers: results stay.
+            // One more than the number of readers, so that the registers of results are not reused.
             uses[id.index()] += 1;
         }
         for i in (0..last).rev() {
@@ -171,7 +172,7 @@ impl Tape {
         Some(tape)
     }
 
-    /// Takes the constants for other values of the parameters: those of all nodes of the graph.
+    /// Sets the constants for other values of the parameters, from the values of all nodes of the graph.
     pub fn set_constants(&mut self, values: &[f64]) {
         for (instruction, source) in &self.constants {
             if let Some(instruction) = self.code.get_mut(*instruction) {
@@ -182,8 +183,8 @@ impl Tape {
 }
 
 impl Builder<'_> {
-    /// Writes the code for a node and for all that it is made of, without recursion: operands first, the one with more of them
-    /// foremost in time.
+    /// Emits the code for a node and for all nodes on which it depends, without recursion. Operands come before the
+    /// nodes that read them.
     fn compute(&mut self, root: Id) -> Option<()> {
         let mut stack = vec![(root, false)];
         while let Some((id, ready)) = stack.pop() {
@@ -195,7 +196,8 @@ impl Builder<'_> {
                 continue;
             }
             stack.push((id, true));
-            // What was built last is deepest as a rule: it is written last, next to its reader.
+            // The operand that was built last usually has the deepest subexpression. It is computed last, directly
+            // before its reader.
             let mut operands: Vec<Id> = self.parts(id).into_iter().flatten().collect();
             operands.sort_unstable_by(|a, b| b.cmp(a));
             stack.extend(operands.into_iter().map(|a| (a, false)));
@@ -203,11 +205,11 @@ impl Builder<'_> {
         Some(())
     }
 
-    /// A result without its sign, and whether it has one. As a constant it has none.
+    /// A result without a change of sign, and whether there is one. A constant keeps its sign.
     fn without_sign(&mut self, id: Id) -> (Id, bool) {
         match self.graph.node(id) {
             Node::Unary(Function::Neg, a) if !self.graph.is_constant(id) => {
-                // One reader more, for good: its register is kept.
+                // One more reader, which is never released, so that the register is kept.
                 self.uses[a.index()] += 1;
                 (a, true)
             }
@@ -215,7 +217,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The factors of a node that becomes a part of the sum that it is read by alone.
+    /// The factors of a product that has only one reader, so that it can be fused with this reader.
     fn product(&self, id: Id) -> Option<(Id, Id)> {
         match self.graph.node(id) {
             Node::Binary(Operation::Mul, a, b)
@@ -227,7 +229,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The operands that are registers when a node is written.
+    /// The operands of a node that must be in registers when its instruction is emitted.
     fn parts(&self, id: Id) -> [Option<Id>; 4] {
         let node = self.graph.node(id);
         if let Some(([x, y], c)) = self.fused(node) {
@@ -240,7 +242,7 @@ impl Builder<'_> {
         std::array::from_fn(|_| operands.next())
     }
 
-    /// A sum with a product, or a number less a product, as the factors and the other term.
+    /// For a sum with a product, or a difference that subtracts a product: its factors, and the other term.
     fn fused(&self, node: Node) -> Option<([Id; 2], Id)> {
         let of = |product: Id, other: Id| {
             let (x, y) = self.product(product).filter(|_| product != other && !self.graph.is_constant(other))?;
@@ -253,7 +255,7 @@ impl Builder<'_> {
         }
     }
 
-    /// A product of two registers times a constant, as the factors and that.
+    /// For the product of two registers and a constant: the two factors, and the constant.
     fn scaled(&self, node: Node) -> Option<([Id; 2], Id)> {
         let constant = |id: Id| self.graph.is_constant(id);
         let (product, k) = match node {
@@ -278,12 +280,13 @@ impl Builder<'_> {
         self.tape.code.push(Instruction { code, to, a, b, extra });
     }
 
-    /// The next instruction has the value of a constant node in it.
+    /// Records that the next instruction contains the value of a constant node.
     fn note_constant(&mut self, id: Id) {
         self.tape.constants.push((self.tape.code.len(), id));
     }
 
-    /// The register of a node that is an input, is computed, or is a constant, which is put there.
+    /// The register of a node that is an input, is computed, or is a constant. A constant is first loaded into a
+    /// register.
     fn register(&mut self, id: Id) -> Option<u16> {
         let InputRegisters { q, v, z, t } = self.tape.inputs;
         let input = match self.graph.node(id) {
@@ -306,12 +309,12 @@ impl Builder<'_> {
         Some(to)
     }
 
-    /// The bits of a node that is a number; those of a parameter are set later.
+    /// The bits of a node that is a number; the bits of parameters are set later.
     fn number(&self, id: Id) -> u64 {
         self.graph.as_number(id).unwrap_or(f64::NAN).to_bits()
     }
 
-    /// Says that a node was read once; its register is free after the last time.
+    /// Records one read of a node; its register is free after the last read.
     fn release(&mut self, id: Id) {
         let uses = &mut self.uses[id.index()];
         *uses = uses.saturating_sub(1);
@@ -324,7 +327,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Writes the instruction of a node whose operands are there.
+    /// Emits the instruction of a node whose operands are available.
     fn write(&mut self, id: Id) -> Option<()> {
         let node = self.graph.node(id);
         if matches!(node, Node::Position(_) | Node::Velocity(_) | Node::Action | Node::Time) {
@@ -369,7 +372,7 @@ impl Builder<'_> {
                 }
                 Node::Unary(f, a) => (Code::Function(f), vec![a], None),
                 Node::Powi(a, 3) => {
-                    // The square has a register of its own, then the cube.
+                    // The square is computed in a register of its own, then the cube.
                     let from = self.register(a)?;
                     let square = self.allocate()?;
                     self.emit(Code::Mul, square, [from, from], 0);

@@ -4,7 +4,7 @@
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use differential_equations::traits::State;
-use runtime_herglotz::{FirstOrder, Peer, PeerEnd};
+use herglotz::runtime::{FirstOrder, Peer, PeerEnd};
 
 /// The maximal number of steps of a run; runs that need more are left out of the comparison.
 const MOST_STEPS: usize = 100_000;

@@ -1,8 +1,8 @@
 //! Figures of rows: columns against time, and phase portraits.
 
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid, fold, folded};
+use herglotz::runtime::{Column, Comparison, Work, velocity_name};
 use herglotz::{EndsScene, LatticeScene, Scene};
-use runtime_herglotz::{Column, Comparison, Work, velocity_name};
 use std::collections::BTreeSet;
 
 /// The maximal number of points of a curve; more points are not visible.

@@ -5,9 +5,9 @@
 #[path = "../../formula-lagrangian/tests/random/mod.rs"]
 mod random;
 
+use herglotz::runtime::{InitialVelocity, OutputTimes};
 use herglotz::{Scene, SceneError};
 use random::Random;
-use runtime_herglotz::{InitialVelocity, OutputTimes};
 
 const GOOD: &str = r#"[system]
 coordinates = ["theta"]

@@ -5,7 +5,7 @@ use crate::run::{Kept, Record, record};
 use crate::signals::Signals;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use runtime_herglotz::{
+use herglotz::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError,
     Start, Steps,
 };

@@ -5,7 +5,7 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, Darboux, Dual, support::conformality_with_jacobian};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::Formula;
+use herglotz::runtime::Formula;
 
 /// The conformal factor, the defect, the image and the Jacobian.
 type Found = (f64, f64, Py<PyArray1<f64>>, Py<PyArray2<f64>>);

@@ -5,7 +5,7 @@ use crate::motion::{Motion, columns};
 use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
+use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
 use std::ops::ControlFlow;
 
 /// The ends of a motion's steps.
@@ -48,7 +48,7 @@ impl RunMonitor for Keeps {
 /// Dense output of a motion: a state is computed by a step from the node before it.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Dense {
-    system: runtime_herglotz::System,
+    system: herglotz::runtime::System,
     by: AnyIntegrator,
     nodes: Nodes,
     /// The end of the motion, which may lie within a step that could not be completed.
@@ -71,7 +71,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
         };
         let Ok(by) = by else { return Ok(None) };
-        let again = runtime_herglotz::Motion {
+        let again = herglotz::runtime::Motion {
             // A motion whose end is its start has no step.
             way: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
@@ -87,7 +87,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }
-    let by = by.map_err(|error: runtime_herglotz::RuntimeError| value_error(error))?;
+    let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
     let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
     Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes, until })
 }
@@ -105,10 +105,10 @@ impl Dense {
             z: at(z, k),
         };
         let way = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
-        let motion = runtime_herglotz::Motion {
+        let motion = herglotz::runtime::Motion {
             rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
-            ..runtime_herglotz::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), way)
+            ..herglotz::runtime::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), way)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)
     }

@@ -6,7 +6,7 @@ use crate::signals::heard;
 use crate::system::System;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{
+use herglotz::runtime::{
     Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
     Start, Status, Tally, Varied, in_words,
 };

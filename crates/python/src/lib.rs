@@ -18,7 +18,7 @@ mod system;
 mod text;
 
 use pyo3::prelude::*;
-use runtime_herglotz::{AnyIntegrator, CATALOGUE};
+use herglotz::runtime::{AnyIntegrator, CATALOGUE};
 
 /// The extension module.
 #[pymodule]
@@ -66,7 +66,7 @@ type Entry =
 /// The systems of the catalogue.
 #[pyfunction]
 fn catalogue() -> Vec<Entry> {
-    let entry = |e: &runtime_herglotz::CatalogueEntry| {
+    let entry = |e: &herglotz::runtime::CatalogueEntry| {
         (e.name, e.about, e.coordinates.to_vec(), e.lagrangian, e.parameters.to_vec(), e.q.to_vec(), e.v.to_vec())
     };
     CATALOGUE.iter().map(entry).collect()

@@ -6,7 +6,7 @@ use crate::signals::heard;
 use crate::system::System;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use runtime_herglotz::{Interrupt, Start};
+use herglotz::runtime::{Interrupt, Start};
 use std::sync::atomic::Ordering;
 
 /// The contact geometry of a Lagrangian at a time and a point, by name.
@@ -48,7 +48,7 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     let (found, raised) = heard(py, |ended| {
         let ended = ended.clone();
         let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
-        let asked = runtime_herglotz::Motion { interrupt, ..motion.motion.clone() };
+        let asked = herglotz::runtime::Motion { interrupt, ..motion.motion.clone() };
         motion.system.check(&asked, places)
     })?;
     if let Some(raised) = raised {
@@ -56,12 +56,12 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     }
     let found = found.map_err(value_error)?;
     let is_contact = found.is_contact();
-    let place = |place: runtime_herglotz::Place| {
+    let place = |place: herglotz::runtime::Place| {
         let momenta = place.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
         (place.t, place.sigma, place.log_factor, place.contact_defect, place.herglotz_defect, momenta)
     };
     let places = found.places.into_iter().map(place).collect();
-    let stated = |s: runtime_herglotz::StatementResidual| (s.statement.to_string(), s.method, s.residual);
+    let stated = |s: herglotz::runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
     Ok((found.integrator, found.step_size, places, statements, is_contact))
 }
@@ -82,6 +82,6 @@ pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
     }
     let found = found.map_err(value_error)?;
     let row =
-        |w: runtime_herglotz::Work| (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds);
+        |w: herglotz::runtime::Work| (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds);
     Ok((found.rows.into_iter().map(row).collect(), found.reference, found.left_out))
 }

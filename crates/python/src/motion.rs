@@ -4,15 +4,15 @@ use crate::arrays::{number, numbers, shown, value_error, whole, word};
 use crate::signals::Signals;
 use crate::system::System;
 use pyo3::prelude::*;
-use runtime_herglotz::{
+use herglotz::runtime::{
     AnyIntegrator, Column, Direction, Event, Formula, InitialVelocity, OutputTimes, Start, StepControl, Steps,
 };
 
 /// A request for a motion, from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Motion {
-    pub system: runtime_herglotz::System,
-    pub motion: runtime_herglotz::Motion,
+    pub system: herglotz::runtime::System,
+    pub motion: herglotz::runtime::Motion,
     /// Whether the rows have the conformal factor.
     pub conformal_factor: bool,
     /// The signals that interrupt its plan and its runs.
@@ -82,7 +82,7 @@ fn no_times() -> PyErr {
 }
 
 /// The error of a column or an event, with its text.
-fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeError>) -> PyResult<T> {
+fn named<T>(what: &str, text: &str, read: Result<T, herglotz::runtime::RuntimeError>) -> PyResult<T> {
     read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
 }
 
@@ -180,7 +180,7 @@ impl Motion {
         let start = Start { t: first, q, rate, z: number("z0", &z)? };
         let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();
-        let motion = runtime_herglotz::Motion {
+        let motion = herglotz::runtime::Motion {
             rows,
             columns: all,
             events,
@@ -188,7 +188,7 @@ impl Motion {
             estimate,
             scales,
             interrupt: Some(signals.interrupt()),
-            ..runtime_herglotz::Motion::new(start, end, way)
+            ..herglotz::runtime::Motion::new(start, end, way)
         };
         Ok(Motion { system: system.inner.clone(), motion, conformal_factor, signals })
     }

@@ -5,7 +5,7 @@ use crate::signals::heard_at_once;
 use crate::system::System;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{BoundaryProblem, FoundPath, PathStatus};
+use herglotz::runtime::{BoundaryProblem, FoundPath, PathStatus};
 
 /// A path of k steps between two positions: k + 1 points with momenta and actions.
 #[pyclass(frozen, get_all, module = "herglotz._core")]

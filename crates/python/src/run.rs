@@ -5,7 +5,7 @@ use crate::motion::Motion;
 use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{
+use herglotz::runtime::{
     Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor, RuntimeError,
     Status,
 };

@@ -3,12 +3,12 @@
 use crate::arrays::value_error;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
-use runtime_herglotz::SeenSymmetry;
+use herglotz::runtime::SeenSymmetry;
 
 /// A Lagrangian with all that integrators need.
 #[pyclass(frozen, module = "herglotz")]
 pub struct System {
-    pub inner: runtime_herglotz::System,
+    pub inner: herglotz::runtime::System,
     /// The text of the formula.
     #[pyo3(get)]
     lagrangian: String,
@@ -43,7 +43,7 @@ impl System {
     fn new(lagrangian: String, coordinates: Vec<String>, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-        let inner = runtime_herglotz::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
+        let inner = herglotz::runtime::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
         Ok(System { inner, lagrangian, given_coordinates: coordinates })
     }
 
@@ -131,8 +131,8 @@ impl System {
 #[pyfunction]
 pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<String>)> {
     // The names are expanded by parsing a formula.
-    let formula = runtime_herglotz::Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
+    let formula = herglotz::runtime::Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
     let names = formula.coordinates();
-    let velocities = names.iter().map(|name| runtime_herglotz::velocity_name(name)).collect();
+    let velocities = names.iter().map(|name| herglotz::runtime::velocity_name(name)).collect();
     Ok((names, velocities))
 }

@@ -1,13 +1,18 @@
-//! Attacks on the paths between given ends.
+//! Invalid input to paths between given ends.
 
-use crate::Attack;
-use crate::numbers::{Everything, HOSTILE, Report};
+use crate::InputTest;
+use crate::numbers::{EXTREME, Everything, Report};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{BoundaryPath, CriticalPath, DiscretePath, End, InputError, Midpoint, branch, continuation};
+use discrete_herglotz::{
+    InputError,
+    boundary::{BoundaryPath, CriticalPath, End, branch, continuation},
+    rules::Midpoint,
+    theory::DiscretePath,
+};
 
-pub const ATTACKS: &[Attack] = &[Attack {
-    on: &[
+pub const TESTS: &[InputTest] = &[InputTest {
+    entries: &[
         "BoundaryPath::new",
         "BoundaryPath::periodic",
         "BoundaryPath::starting_at",
@@ -25,7 +30,8 @@ pub const ATTACKS: &[Attack] = &[Attack {
     run: paths,
 }];
 
-/// What is not finite is refused; of the rest a search ends, and calls found only what is finite and has a small residual.
+/// Input that is not finite is refused; otherwise a search ends, and a path is found only if it is finite and has a
+/// small residual.
 fn paths(report: &mut Report) {
     fn judge(
         report: &mut Report,
@@ -49,7 +55,7 @@ fn paths(report: &mut Report) {
     }
     let ld = Midpoint::new(Everything, 0.1).unwrap();
     let at = |q: f64| End::Position(SVector::from([q]));
-    for value in HOSTILE {
+    for value in EXTREME {
         let good = value.is_finite();
         for ends in [
             [at(value), at(0.4)],
@@ -80,10 +86,10 @@ fn paths(report: &mut Report) {
         let refused = BoundaryPath::new(&ld, steps, [at(0.3), at(0.4)]).is_err();
         report.check(refused && BoundaryPath::periodic(&ld, steps, [0.0].into()).is_err(), || format!("{steps} steps"));
     }
-    // Along the end of a pendulum's path.
+    // Values at the end of a path of the pendulum.
     let pendulum = Midpoint::new(Pendulum::default(), 0.1).unwrap();
     let problem = |q: f64| BoundaryPath::new(&pendulum, 4, [at(0.0), at(q)]);
-    for value in HOSTILE {
+    for value in EXTREME {
         for range in [[value, 0.4], [0.1, value]] {
             let found = branch(problem, range, 0.1, 8);
             let good = |paths: &Vec<(f64, CriticalPath<1>)>| {

@@ -1,14 +1,17 @@
-//! Attacks on ensembles.
+//! Invalid input to ensembles.
 
 use super::runs::BY;
-use crate::Attack;
-use crate::numbers::{Claiming, HOSTILE, Report, places, triples};
+use crate::InputTest;
+use crate::numbers::{Claiming, EXTREME, Report, places, triples};
 use contact_geom::VelocityPoint;
-use discrete_herglotz::{Ensemble, EnsembleError, Member, Problem, Rows, Status, Steps, Tally, Until};
+use discrete_herglotz::{
+    Ensemble, Problem, Rows, Status, Steps, Until,
+    ensemble::{EnsembleError, Member, Tally},
+};
 
-pub const ATTACKS: &[Attack] = &[
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &[
             "Ensemble::new",
             "Ensemble::of",
             "Ensemble::by",
@@ -28,8 +31,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: ensembles,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Ensemble::in_shards",
             "Ensemble::merge",
             "ShardedEnsemble::compute",
@@ -54,7 +57,7 @@ fn ends(ensemble: &Ensemble<'_, Claiming, 1>, until: Until) -> Result<(Tally, Ve
     Ok((tally, all))
 }
 
-/// Whether members have ended, with finite states, or say why not.
+/// Whether members end with finite states or an error.
 fn good(ended: &Result<(Tally, Vec<Member<1>>), EnsembleError>, count: usize) -> bool {
     let Ok((tally, all)) = ended else { return true };
     let finite = all.iter().all(|m| m.ending.is_ok_and(|e| e.state.check().is_ok()) || m.ending.is_err());
@@ -65,7 +68,7 @@ fn ensembles(report: &mut Report) {
     let tame = VelocityPoint::from(triples()[0]);
     for by in BY.into_iter().flatten() {
         for (t, x) in places() {
-            // One that no one means among good ones.
+            // A member with an invalid start among others.
             let start = |i: usize| if i == 1 { VelocityPoint::from(x) } else { tame };
             let of = Ensemble::new(&Claiming, t, 3, start).by(by).steps(Steps::Count(5)).threads(1);
             let ended = ends(&of, Until::Time(t + 0.5));
@@ -76,7 +79,7 @@ fn ensembles(report: &mut Report) {
             report.check(others, || format!("{by}, beside {x:?} at {t}: {ended:?}"));
             report.check(ended.is_ok() || !(t + 0.5).is_finite() || t + 0.5 == t, || format!("{by} at {t}: {ended:?}"));
         }
-        for number in HOSTILE {
+        for number in EXTREME {
             let of = |steps| Ensemble::of(0.4, 2, |_| (&Claiming, tame)).by(by).steps(steps).without_action();
             if !(number > 0.0 && number < 1e-3) {
                 let ended = ends(&of(Steps::Size(number)), Until::Time(0.9));
@@ -96,8 +99,8 @@ fn ensembles(report: &mut Report) {
     report.check(matches!(ends(&of(1).threads(0), until), Err(EnsembleError::Threads)), || "no thread".into());
     report.check(ends(&of(1).rows_every(0), until).is_err(), || "rows every 0 steps".into());
     report.check(ends(&of(1).rows_every(usize::MAX).unwatched(), until).is_ok(), || "rows of the ends alone".into());
-    for wanted in HOSTILE {
-        // An error that cannot be had is refused; one above that of any steps may be had.
+    for wanted in EXTREME {
+        // An error that cannot be reached is refused; a requested error above that of any steps may be reached.
         let ended = ends(&of(2).accuracy(wanted), until);
         report.check(good(&ended, 2), || format!("accuracy {wanted}: {ended:?}"));
         report.check(wanted > 0.0 || ended.is_err(), || format!("accuracy {wanted}: {ended:?}"));
@@ -116,12 +119,12 @@ fn ensembles(report: &mut Report) {
     report.check(ends(&of(1).progress(|part| assert!(part == 1.0)), until).is_ok(), || "progress".into());
 }
 
-/// Shards that the ensemble does not have, and words that are none of its shards.
+/// Shards that the ensemble does not have, and data that belong to no shard.
 fn shards(report: &mut Report) {
     let tame = VelocityPoint::from(triples()[0]);
-    let Some(by) = BY.into_iter().flatten().next() else { return };
+    let by = BY.into_iter().flatten().next().unwrap();
     let of = |t, count| Ensemble::new(&Claiming, t, count, |_| tame).by(by).steps(Steps::Count(3));
-    for number in HOSTILE {
+    for number in EXTREME {
         let ensemble = of(number, 400);
         let sharded = ensemble.in_shards(Until::After(0.5));
         report.check(sharded.is_err() || number.is_finite(), || format!("shards from the time {number}"));
@@ -147,14 +150,14 @@ fn shards(report: &mut Report) {
             for value in [u64::MAX, 1 << 40, words[place] + 1] {
                 let mut changed = words.clone();
                 changed[place] = value;
-                // A number of members in lanes is what it says.
+                // The number of members in lanes may be any number.
                 if place != 1 {
                     bad.push(changed);
                 }
             }
         }
     }
-    // The words of one shard with the number of the other are refused by their length.
+    // The data of one shard with the number of the other are refused because of their length.
     for words in &bad {
         let refused = matches!(merge.add(words, &mut fold), Err(EnsembleError::ForeignShard));
         report.check(refused, || format!("{:?}.. of {} words", words.iter().take(3).collect::<Vec<_>>(), words.len()));

@@ -1,25 +1,30 @@
-//! Attacks on integrators, on what makes them, and on runs that are saved and resumed.
+//! Invalid input to integrators and their constructors, and to runs that are saved and resumed.
 
 use super::runs::{BY, seven, tame};
 use super::{STEPS, starts};
-use crate::Attack;
-use crate::numbers::{Claiming, HOSTILE, Report};
+use crate::InputTest;
+use crate::numbers::{Claiming, EXTREME, Report};
 use contact_geom::{PhasePoint, VelocityPoint};
-use discrete_herglotz::MidpointRule;
+use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, CheckpointError, CompositionMethod, CustomMethod, DiscreteLagrangian,
-    DiscretizationMethod, InputError, Integrator, Method, MethodInfo, Midpoint, PlanEntry, Problem, QuadratureMethod,
-    ResumeState, SplittingScheme, Status, StepView, Stepper, StepperOptions, Steps, Until,
+    AnyIntegrator, Checkpoint, CheckpointError, CustomMethod, DiscreteLagrangian, InputError, Integrator, MethodInfo,
+    PlanEntry, Problem, ResumeState, SplittingScheme, Status, StepView, Stepper, StepperOptions, Steps, Until,
+    rules::{CompositionMethod, DiscretizationMethod, Method, Midpoint, QuadratureMethod},
 };
 use std::ops::ControlFlow;
 
-pub const ATTACKS: &[Attack] = &[
-    Attack {
-        on: &["Discretisation::check", "Discretisation::discretise", "Discretisation::info", "CustomMethod::symmetric"],
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &[
+            "Discretisation::check",
+            "Discretisation::discretise",
+            "Discretisation::info",
+            "CustomMethod::symmetric",
+        ],
         run: discretisations,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Integrator::check",
             "Integrator::info",
             "Integrator::stepper",
@@ -31,10 +36,10 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: integrators,
     },
-    Attack { on: &["CustomMethod::new", "MethodInfo::of_discrete", "Run::accuracy"], run: orders },
-    Attack { on: &["Stepper::save", "Stepper::restore"], run: saved },
-    Attack {
-        on: &[
+    InputTest { entries: &["CustomMethod::new", "MethodInfo::of_discrete", "Run::accuracy"], run: orders },
+    InputTest { entries: &["Stepper::save", "Stepper::restore"], run: saved },
+    InputTest {
+        entries: &[
             "Checkpoint::every",
             "StepView::resume_state",
             "ResumeState::read",
@@ -47,12 +52,12 @@ pub const ATTACKS: &[Attack] = &[
     },
 ];
 
-/// A discrete Lagrangian is made of each step that is one.
+/// A discrete Lagrangian is made for every valid step.
 fn discretisations(report: &mut Report) {
     fn one(report: &mut Report, rule: &impl DiscretizationMethod<'static, Claiming, 1>) {
         let info = rule.info();
         report.check(rule.check(&Claiming).is_ok() && info.symmetric && info.order == 2, || format!("{info:?}"));
-        for h in HOSTILE.into_iter().chain(STEPS) {
+        for h in EXTREME.into_iter().chain(STEPS) {
             let made = rule.discretise(&tame(), h).map(|ld| ld.step_size());
             let good = h != 0.0 && h.is_finite();
             report.check(if good { made == Ok(h) } else { made.is_err() }, || format!("{}: {made:?}", info.name));
@@ -63,7 +68,7 @@ fn discretisations(report: &mut Report) {
     one(report, &CustomMethod::new("mine", 2, |h| Midpoint::new(Claiming, h)).symmetric());
 }
 
-/// A stepper starts at a finite state by a step that is one, and its states are finite.
+/// A stepper starts at a finite state with a valid step, and its states are finite.
 fn integrators(report: &mut Report) {
     fn one(report: &mut Report, by: &dyn Integrator<'static, Claiming, 1>, wants: StepperOptions) {
         let info = by.info();
@@ -75,20 +80,20 @@ fn integrators(report: &mut Report) {
         };
         for (t, x) in starts() {
             let made = Problem::new(&Claiming, t, x).and_then(|problem| by.stepper(&problem, 0.1, wants));
-            report.door(&(t, x), made.map(driven));
+            report.entry_point(&(t, x), made.map(driven));
         }
-        for h in HOSTILE.into_iter().chain(STEPS) {
+        for h in EXTREME.into_iter().chain(STEPS) {
             let made = by.stepper(&tame(), h, wants);
             let refused = h == 0.0 || !h.is_finite();
             report.check(!refused || made.is_err(), || format!("{}: the step {h} is taken", info.name));
-            report.door(&h, made.map(driven));
+            report.entry_point(&h, made.map(driven));
         }
         let mut stepper = by.stepper(&tame(), 0.1, wants).unwrap();
         let work_summary = stepper.work_summary();
         report.check(!work_summary.is_empty() && work_summary.iter().all(|i| !i.why.is_empty()), || {
             format!("{work_summary:?}")
         });
-        // What says that its rate is constant has the same in all steps.
+        // An integrator that reports a constant rate has the same rate in all steps.
         let mut rate = || stepper.advance(1).map(|()| stepper.sigma());
         let same = rate() == rate();
         report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
@@ -108,7 +113,7 @@ fn integrators(report: &mut Report) {
     report.check(items.map(|item| item.computed) == [true, false], || "items".into());
 }
 
-/// The order is what a user says; a false one costs evaluations, or the run.
+/// The order is given by the user; a false one costs evaluations, or fails the run.
 fn orders(report: &mut Report) {
     let problem = tame();
     for order in [0, 1, 2, 1000, u32::MAX] {
@@ -118,14 +123,14 @@ fn orders(report: &mut Report) {
         report.check(given.is_ok() == (order > 0), || format!("order {order}: {given:?}"));
         for error in [1e-4, 0.0, f64::NAN, -1.0] {
             let found = problem.by(by()).accuracy(error).run(Until::Time(0.5)).map(|o| (o.q, o.p));
-            let told = matches!(found, Ok(_) | Err(InputError::Accuracy { .. }));
-            let good = if order > 0 && error > 0.0 { told } else { found.is_err() };
+            let reported = matches!(found, Ok(_) | Err(InputError::Accuracy { .. }));
+            let good = if order > 0 && error > 0.0 { reported } else { found.is_err() };
             report.check(good, || format!("order {order} to an error of {error}: {found:?}"));
         }
     }
 }
 
-/// Words that are too few, or too many, are none of a stepper.
+/// Data that are too short or too long for the state of a stepper.
 fn saved(report: &mut Report) {
     let start: PhasePoint<1> = *tame().state();
     for by in BY.into_iter().flatten() {
@@ -147,12 +152,12 @@ fn saved(report: &mut Report) {
     }
 }
 
-/// What is no checkpoint is refused, and so is one of another run.
+/// Data that are no checkpoint are refused, and so is the checkpoint of another run.
 fn resumed(report: &mut Report) {
-    let path = std::env::temp_dir().join(format!("hostile_checkpoint_{}", std::process::id()));
+    let path = std::env::temp_dir().join(format!("invalid_input_checkpoint_{}", std::process::id()));
     report.check(Checkpoint::every(0, &path).is_err(), || "a checkpoint every 0 steps".into());
     for count in 0..6 {
-        for value in HOSTILE {
+        for value in EXTREME {
             std::fs::write(&path, value.to_le_bytes().repeat(count)).unwrap();
             let read = ResumeState::read(&path);
             report.check(matches!(read, Err(CheckpointError::Foreign)), || format!("{count} of {value}: {read:?}"));
@@ -166,7 +171,7 @@ fn resumed(report: &mut Report) {
             let mut last = Checkpoint::every(stride, &path).unwrap();
             let outcome = seven(&problem, by).observe(&mut last).run(until).unwrap();
             report.check(outcome == whole && last.error.is_none(), || format!("{:?}: {outcome:?}", last.error));
-            // The last one is at the end, where nothing is left to do.
+            // The last checkpoint is at the end of the run, where no step is left.
             let resumed = || seven(&problem, by).resume(ResumeState::read(&path).unwrap());
             report.check(resumed().run(until) == Ok(whole), || format!("{:?}", resumed().run(until)));
             let others = [resumed().run(Until::Time(0.6)), resumed().steps(Steps::Count(8)).run(until)];
@@ -178,11 +183,11 @@ fn resumed(report: &mut Report) {
                 report.check(other == Err(InputError::AnotherRun), || format!("another run: {other:?}"));
             }
         }
-        // By hand, in the middle, and to a place that is none.
+        // A state that is kept by hand in the middle of a run, and written to a path that does not exist.
         let mut kept = None;
         let mut keep = |at: &StepView<'_, 1>| {
             if at.k == 3 {
-                kept = at.interrupted();
+                kept = at.resume_state();
             }
             ControlFlow::Continue(())
         };
@@ -202,7 +207,7 @@ fn resumed(report: &mut Report) {
                 report.check(read.iter().all(Result::is_err), || format!("{place} of {}: {read:?}", bytes.len()));
             }
         }
-        for value in HOSTILE.into_iter().filter(|value| value.abs() < 10.0) {
+        for value in EXTREME.into_iter().filter(|value| value.abs() < 10.0) {
             let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
             let run = seven(&other, by).resume(ResumeState::read(&path).unwrap()).run(until);
             report.check(run == Err(InputError::AnotherRun), || format!("from {value}: {run:?}"));

@@ -1,24 +1,30 @@
-//! Attacks on discrete Lagrangians: their jets and single steps, the solvers of these, and paths.
+//! Invalid input to discrete Lagrangians: their jets and single steps, the solvers of the steps, and paths.
 
 use super::{STEPS, starts};
-use crate::Attack;
-use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Report, fine, grade, places, triples};
+use crate::InputTest;
+use crate::numbers::{Claiming, EXTREME, Everything, Grade, Report, fine, grade, places, triples};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
 use discrete_herglotz::{
-    ActionStrang, AnyIntegrator, DiscreteLagrangian, DiscretePath, DiscreteStep, Gauss, HamiltonianFlow, Method,
-    Midpoint, MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Trapezoidal, Until,
-    check_claims, derived_jet, derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian,
-    discrete_momentum, discrete_regularity, discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian,
-    last_correction, legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse,
-    sigma_d, statements,
+    AnyIntegrator, DiscreteLagrangian, DiscreteStep, MomentumDecay, MomentumRow, Problem, Steps, Until,
+    checks::check_claims,
+    gauss::Gauss,
+    rules::{Method, Midpoint, Rectangle, Trapezoidal},
+    solve::{Solver, last_correction},
+    splitting::{ActionStrang, Riccati, Strang},
+    theory::{
+        DiscretePath, HamiltonianFlow, derived_jet, derived_second_jet, discrete_action, discrete_flow,
+        discrete_flow_jacobian, discrete_momentum, discrete_regularity, discrete_symmetry_defect, hamiltonian_flow,
+        hamiltonian_flow_jacobian, legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus,
+        legendre_plus_inverse, sigma_d, statements,
+    },
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["DiscreteStep::checked"], run: transitions },
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest { entries: &["DiscreteStep::checked"], run: transitions },
+    InputTest {
+        entries: &[
             "derived_jet",
             "derived_second_jet",
             "sigma_d",
@@ -34,8 +40,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: jets,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "discrete_flow",
             "discrete_flow_jacobian",
             "hamiltonian_flow",
@@ -48,8 +54,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: steps,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Quadrature::new",
             "Quadrature::lagrangian",
             "Gauss::new",
@@ -62,8 +68,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: constructors,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "DiscretePath::new",
             "DiscretePath::points",
             "DiscretePath::steps",
@@ -75,16 +81,16 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: paths,
     },
-    Attack { on: &["MomentumRow::defect", "MomentumDecay::new"], run: momenta },
-    Attack { on: &["last_correction"], run: corrections },
-    Attack { on: &["Solver::on_the_stack", "Solver::by_faer", "Solver::solve"], run: solvers },
-    Attack { on: &["statements::residual"], run: residuals },
-    Attack { on: &["check_claims"], run: claims },
+    InputTest { entries: &["MomentumRow::defect", "MomentumDecay::new"], run: momenta },
+    InputTest { entries: &["last_correction"], run: corrections },
+    InputTest { entries: &["Solver::on_the_stack", "Solver::by_faer", "Solver::solve"], run: solvers },
+    InputTest { entries: &["statements::residual"], run: residuals },
+    InputTest { entries: &["check_claims"], run: claims },
 ];
 
 fn transitions(report: &mut Report) {
     for x in triples() {
-        for sigma in HOSTILE {
+        for sigma in EXTREME {
             let made = DiscreteStep { end: PhasePoint::from(x), velocity: x.y, sigma, iterations: 1 };
             let checked = made.checked();
             let good = x.is_finite() && sigma.is_finite() && sigma > 0.0;
@@ -117,26 +123,26 @@ fn jets(report: &mut Report) {
     }
 }
 
-/// Single steps, of which only finite ones are handed out.
+/// Single steps, which are finite or refused.
 fn steps(report: &mut Report) {
     fn one<D: DiscreteLagrangian<1>>(report: &mut Report, ld: &D) {
         for (t, x) in starts() {
             let input = (t, x);
             let guess = SVector::from([0.5]);
             for solver in [&mut Solver::on_the_stack(), &mut Solver::by_faer()] {
-                report.door(&input, ld.forward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
-                report.door(&input, ld.backward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
+                report.entry_point(&input, ld.forward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
+                report.entry_point(&input, ld.backward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
             }
-            report.door(&input, legendre_inverse(&Everything, t, &x, &guess));
-            report.door(&input, legendre_minus_inverse(ld, t, &x, &guess));
-            report.door(&input, legendre_plus_inverse(ld, t, &x, &guess));
+            report.entry_point(&input, legendre_inverse(&Everything, t, &x, &guess));
+            report.entry_point(&input, legendre_minus_inverse(ld, t, &x, &guess));
+            report.entry_point(&input, legendre_plus_inverse(ld, t, &x, &guess));
             for way in [HamiltonianFlow::Direct, HamiltonianFlow::ThroughPlus, HamiltonianFlow::ThroughMinus] {
-                report.door(&input, hamiltonian_flow(ld, t, &x, &guess, way));
+                report.entry_point(&input, hamiltonian_flow(ld, t, &x, &guess, way));
             }
             let points = DiscretePoint::from(ChartVector::from(x));
             let image = discrete_flow(ld, t, &points);
-            report.door(&input, image);
-            // Of a splitting they do not depend on the action.
+            report.entry_point(&input, image);
+            // The steps of a splitting do not depend on the action.
             let without_z = (t, (x.q, x.p));
             let tame = grade(&input) != Grade::Bad;
             for jacobian in [hamiltonian_flow_jacobian(ld, t, &points), discrete_flow_jacobian(ld, t, &points, &points)]
@@ -147,8 +153,8 @@ fn steps(report: &mut Report) {
             }
         }
         let tame: PhasePoint<1> = triples()[0].into();
-        for guess in HOSTILE {
-            // A poor guess costs iterations, or the step: never a step that is none.
+        for guess in EXTREME {
+            // A poor guess costs iterations, or fails the step, and the step that is returned is finite.
             let step = ld.forward(0.4, &tame, &SVector::from([guess]), &mut Solver::default());
             let good = step.as_ref().map_or(true, |s| grade(&s.end) != Grade::Bad);
             report.check(good, || format!("the guess {guess} leads to {step:?}"));
@@ -162,7 +168,7 @@ fn steps(report: &mut Report) {
 
 fn constructors(report: &mut Report) {
     let tame: PhasePoint<1> = triples()[0].into();
-    for h in HOSTILE.into_iter().chain(STEPS) {
+    for h in EXTREME.into_iter().chain(STEPS) {
         let good = h != 0.0 && h.is_finite();
         let rule = Midpoint::new(Everything, h);
         report.check(rule.is_ok() == good && rule.as_ref().map_or(true, |r| r.step_size() == h), || format!("h = {h}"));
@@ -199,7 +205,7 @@ fn paths(report: &mut Report) {
     for points in [vec![], vec![SVector::from([0.1])]] {
         report.check(DiscretePath::<1>::new(points).is_err(), || "a path without a step".into());
     }
-    for value in HOSTILE {
+    for value in EXTREME {
         let points: Vec<_> = [0.3, value, 0.4].map(|q| SVector::from([q])).into();
         let path = DiscretePath::new(points.clone());
         report.check(path.is_ok() == value.is_finite(), || format!("a path through {value}"));
@@ -215,7 +221,7 @@ fn paths(report: &mut Report) {
         report.formula(&value, discrete_action(&ld, 0.0, &points, 0.0));
     }
     let path = DiscretePath::new([0.3, 0.35, 0.4].map(|q| SVector::from([q])).into()).unwrap();
-    for value in HOSTILE {
+    for value in EXTREME {
         for (t0, z0) in [(value, 0.0), (0.0, value)] {
             report.formula(&value, path.actions(&ld, t0, z0));
             report.formula(&value, path.action_differential(&ld, t0, z0));
@@ -227,12 +233,12 @@ fn paths(report: &mut Report) {
 }
 
 fn momenta(report: &mut Report) {
-    for value in HOSTILE {
+    for value in EXTREME {
         let row = MomentumRow { t: 0.0, momentum: value, predicted: 0.5 };
         report.formula(&value, fine(row.defect()));
         let row = MomentumRow { t: 0.0, momentum: 0.5, predicted: value };
         let defect = row.defect();
-        // An infinite prediction is off by NaN; one of nothing by something that is infinite.
+        // An infinite prediction gives NaN; a prediction of zero an infinite defect.
         report.check(!(defect <= 0.1), || format!("predicted {value}: {defect}"));
         let mut decay = MomentumDecay::new(Symmetry::Translation(SVector::from([1.0])));
         let problem = Problem::new(&Claiming, 0.4, PhasePoint::new([0.1], [value], 0.0));
@@ -242,14 +248,14 @@ fn momenta(report: &mut Report) {
         });
         let rows = decay.rows.iter().map(|row| (row.momentum, row.predicted)).collect::<Vec<_>>();
         report.check(observed.is_err() || rows[0] == (value, value), || format!("p = {value}: {rows:?}"));
-        report.door(&value, observed.map(|_| rows));
+        report.entry_point(&value, observed.map(|_| rows));
     }
 }
 
 /// An iteration does not end on a correction that is not a number.
 fn corrections(report: &mut Report) {
     // Sizes are not negative.
-    for value in HOSTILE.into_iter().filter(|v| v.is_nan() || *v >= 0.0) {
+    for value in EXTREME.into_iter().filter(|v| v.is_nan() || *v >= 0.0) {
         report.check(value.is_finite() || !last_correction(value, 1.0, 1e-16), || format!("the correction {value}"));
         report.check(!value.is_nan() || !last_correction(1.0, value, 1e-16), || format!("after {value}"));
         report.check(!value.is_nan() || !last_correction(1.0, 1.0, value), || format!("the tolerance {value}"));
@@ -257,7 +263,7 @@ fn corrections(report: &mut Report) {
 }
 
 fn solvers(report: &mut Report) {
-    for value in HOSTILE {
+    for value in EXTREME {
         for matrix in [[1.0, value, 0.5, 2.0], [value, 0.0, 0.0, value], [value; 4], [value, 1.0, 1.0, value]] {
             for right in [[1.0, 1.0], [value, 1.0]] {
                 for (name, mut solver) in [("stack", Solver::on_the_stack()), ("faer", Solver::by_faer())] {
@@ -268,7 +274,7 @@ fn solvers(report: &mut Report) {
                     let bad = matrix.iter().chain(&right).any(|x| !x.is_finite());
                     report
                         .check(solved.is_err() || finite && !bad, || format!("{name}: {matrix:?} of {right:?}: {b:?}"));
-                    // What was bad does not stay in the workspace.
+                    // Numbers that are not finite do not stay in the workspace.
                     let mut b = SVector::from([2.0, 3.0]);
                     let good = solver.solve(&mut SMatrix::identity(), &mut b);
                     report
@@ -295,11 +301,11 @@ fn residuals(report: &mut Report) {
     }
 }
 
-/// A claim is verified where it can be, and where it cannot it is not taken for true.
+/// A property is verified where L is defined; elsewhere it is not assumed to hold.
 fn claims(report: &mut Report) {
     for (t, x) in places() {
         let found = check_claims(&Claiming, t, &x.into());
-        // The claims have nothing to do with the action.
+        // The properties do not depend on the action.
         let bad = grade(&(t, (x.x, x.y))) == Grade::Bad;
         report.check(!bad || found.is_err(), || format!("at t = {t}, {x:?}: {found:?}"));
         report.check(grade(&(t, x)) != Grade::Tame || found == Ok(Claiming.structure()), || {

@@ -1,8 +1,8 @@
-//! Attacks on what observes a run: rows, events, odd observers, and what they see.
+//! Invalid input to observers: rows, events, observers with odd requests, and their views of a run.
 
 use super::runs::{BY, seven, tame};
-use crate::Attack;
-use crate::numbers::{Everything, HOSTILE, Report, fine, triples};
+use crate::InputTest;
+use crate::numbers::{EXTREME, Everything, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, CsvRows, Event, Events, InputError, Observer, Outcome, OutputRequest, Problem, Progress, Quotient,
@@ -10,9 +10,9 @@ use discrete_herglotz::{
 };
 use std::ops::ControlFlow;
 
-pub const ATTACKS: &[Attack] = &[
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &[
             "Rows::every",
             "Rows::at",
             "Rows::column",
@@ -26,9 +26,9 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: rows,
     },
-    Attack { on: &["Progress::new", "Quotient::new", "Quotient::largest_change"], run: told },
-    Attack {
-        on: &[
+    InputTest { entries: &["Progress::new", "Quotient::new", "Quotient::largest_change"], run: progress_and_quotients },
+    InputTest {
+        entries: &[
             "Event::new",
             "Event::rising",
             "Event::falling",
@@ -38,9 +38,9 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: events,
     },
-    Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "OutputRequest::and"], run: odd_observers },
-    Attack {
-        on: &[
+    InputTest { entries: &["Run::observe", "Stop::here", "Stop::failed", "OutputRequest::and"], run: odd_observers },
+    InputTest {
+        entries: &[
             "StepView::velocity",
             "StepView::velocity_at",
             "StepView::energy",
@@ -60,18 +60,24 @@ fn rows(report: &mut Report) {
         let mut rows = Rows::every(stride).unwrap().without_action().with_velocity();
         let outcome = seven(&problem, None).observe(&mut rows).run(Until::Time(0.5));
         report.check(rows.rows.len() == expected, || format!("a row every {stride} steps: {outcome:?}"));
-        report.door(&0.5, outcome.map(|_| rows.rows.iter().map(|r| (r.t, r.q, (r.p, r.v, r.z))).collect::<Vec<_>>()));
+        report.entry_point(
+            &0.5,
+            outcome.map(|_| rows.rows.iter().map(|r| (r.t, r.q, (r.p, r.v, r.z))).collect::<Vec<_>>()),
+        );
         report.check(rows.rows.iter().all(|r| r.v.is_some() && r.z.is_none()), || format!("{:?}", rows.rows));
-        // The energy has z in it, whether or not z is shown.
+        // The energy depends on z, whether or not z is requested.
         let mut whole = Rows::every(stride).unwrap().without_action().with_energy().with_conformal_factor();
         let mut csv = CsvRows::new(Rows::every(stride).unwrap(), Vec::new());
         let outcome = seven(&problem, None).observe(&mut whole).observe(&mut csv).run(Until::Time(0.5));
-        report.door(&0.5, outcome.map(|_| whole.rows.iter().map(|r| (r.energy, r.log_factor)).collect::<Vec<_>>()));
+        report.entry_point(
+            &0.5,
+            outcome.map(|_| whole.rows.iter().map(|r| (r.energy, r.log_factor)).collect::<Vec<_>>()),
+        );
         let of_header = whole.rows.iter().all(|r| r.numbers().count() == whole.header().len());
         report.check(of_header && csv.error.is_none(), || format!("{:?}: {:?}", whole.header(), whole.rows));
     }
-    for value in HOSTILE {
-        // In order, and inside of the span.
+    for value in EXTREME {
+        // Times in order and inside of the span.
         let two = Rows::<1>::at([0.1, value]);
         report.check(two.is_ok() == value.is_finite(), || format!("rows at 0.1 and {value}"));
         for integrator in BY {
@@ -84,12 +90,12 @@ fn rows(report: &mut Report) {
             let inside = (0.0..=0.5).contains(&value);
             report.check(outcome.is_ok() == inside, || format!("a row at {value}: {outcome:?}"));
             let recorded = one.rows.iter().map(|r| (r.t, r.q, (r.p, r.z))).collect::<Vec<_>>();
-            // A time that is too near for a step may be one that is not reached.
+            // A time that is closer to the start than a step may not be reached.
             let complete = outcome.is_ok_and(|o| o.status == Status::Completed);
             report.check(!complete || recorded.len() == 1 && recorded[0].0 == value, || format!("{recorded:?}"));
-            report.door(&value, fine(recorded));
+            report.entry_point(&value, fine(recorded));
         }
-        // A column is the caller's: what it makes of a state is handed on.
+        // A column is the caller's function: its value is recorded as it is.
         let mut columns = Rows::every(7).unwrap().column("value", |_, _| value).column("t", |t, _| t);
         let outcome = seven(&problem, None).observe(&mut columns).run(Until::Time(0.5));
         let handed_on = columns.rows.iter().all(|r| r.columns[0].to_bits() == value.to_bits() && r.columns[1] == r.t);
@@ -102,7 +108,7 @@ fn rows(report: &mut Report) {
     let mut none = Rows::at([]).unwrap();
     let outcome = seven(&problem, None).observe(&mut none).run(Until::Time(0.5));
     report.check(outcome.is_ok_and(|o| o.steps == 7) && none.rows.is_empty(), || "no rows".into());
-    // Back in time they are in its order.
+    // Backward in time the times decrease.
     for (times, good) in [([-0.1, -0.3], true), ([-0.3, -0.1], false), ([0.1, -0.3], false)] {
         let mut back = Rows::at(times).unwrap();
         let outcome = seven(&problem, None).observe(&mut back).run(Until::Time(-0.5));
@@ -111,15 +117,15 @@ fn rows(report: &mut Report) {
     }
 }
 
-fn told(report: &mut Report) {
+fn progress_and_quotients(report: &mut Report) {
     let problem = tame();
-    for value in HOSTILE {
+    for value in EXTREME {
         let mut parts = Vec::new();
         let mut progress = Progress::new(|part| parts.push(part));
         let outcome = seven(&problem, None).observe(&mut progress).run(Until::Time(value));
         let completed = outcome.is_ok_and(|o| o.status == Status::Completed);
         report.check(!completed || parts.last() == Some(&1.0), || format!("to {value}: {parts:?}"));
-        // What is no quotient is said to be none.
+        // A quotient that is not defined is reported.
         let mut quotient = Quotient::new(move |_, _: &PhasePoint<1>| value, |_, _| 1.0);
         let outcome = seven(&problem, None).observe(&mut quotient).run(Until::Time(0.5));
         let change = quotient.largest_change();
@@ -136,7 +142,7 @@ fn with_events(events: &mut Events<'_, 1>, until: Until) -> Result<Outcome<1>, I
 }
 
 fn events(report: &mut Report) {
-    for value in HOSTILE {
+    for value in EXTREME {
         let mut events = Events::new([Event::new(|_, _: &PhasePoint<1>| value).terminal()]);
         let outcome = with_events(&mut events, Until::Steps(5)).unwrap();
         let good = match outcome.status {
@@ -145,7 +151,7 @@ fn events(report: &mut Report) {
             _ => false,
         };
         report.check(good && events.crossings.is_empty(), || format!("an event {value}: {:?}", outcome.status));
-        // A jump, from anything to anything of another sign, is found where it is.
+        // A jump between any two values of different sign is found at its time.
         let mut jump =
             Events::new([Event::new(|t, _: &PhasePoint<1>| if t < 0.25 { value } else { -value })]).without_action();
         let outcome = with_events(&mut jump, Until::Steps(5)).unwrap();
@@ -153,7 +159,7 @@ fn events(report: &mut Report) {
         let good = if value == 0.0 || !value.is_finite() { jump.crossings.is_empty() } else { there };
         report.check(good && outcome.state().check().is_ok(), || format!("from {value}: {:?}", jump.crossings));
     }
-    // One that is not a number in mid-run keeps what was found before.
+    // Where a function becomes NaN during the run, the crossings found before are kept.
     let mut late = Events::new([Event::new(|t, _: &PhasePoint<1>| if t > 0.35 { f64::NAN } else { 0.25 - t })]);
     let outcome = with_events(&mut late, Until::Steps(100)).unwrap();
     let failed = matches!(outcome.status, Status::Failed { cause: StepError::Event { t }, .. } if t > 0.35);
@@ -162,12 +168,12 @@ fn events(report: &mut Report) {
     let mut none = Events::new([]);
     report.check(with_events(&mut none, Until::Steps(0)).is_err(), || "no step".into());
     report.check(with_events(&mut none, Until::Steps(3)).is_ok_and(|o| o.t > 0.29), || "no event".into());
-    // As many steps as can be counted, ended by the event.
+    // The largest number of steps, ended by the event.
     let mut end = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.55).rising().terminal()]);
     let outcome = with_events(&mut end, Until::Steps(1 << 42)).unwrap();
     let ended = matches!(outcome.status, Status::Stopped { step: 6, by: "an event", t } if t == outcome.t);
     report.check(ended && (outcome.t - 0.55).abs() < 1e-15, || format!("{outcome:?}"));
-    // Directions are those of the run: back in time a function of it falls.
+    // Directions are those of the run: backward in time a function of t falls.
     let of_time = |at: f64| Event::new(move |t, _: &PhasePoint<1>| t - at);
     for (at, found) in [(0.25, [0, 1]), (-0.25, [0, 2])] {
         let mut all = Events::new([of_time(at), of_time(at).rising(), of_time(at).falling()]);
@@ -189,7 +195,7 @@ impl Observer<1> for AtTheStart {
     }
 }
 
-/// Observes no run.
+/// Refuses every run.
 struct Refusing;
 
 impl Observer<1> for Refusing {
@@ -201,7 +207,7 @@ impl Observer<1> for Refusing {
     }
 }
 
-/// Asks for this step, whatever has been taken, and notes what it sees.
+/// Requests this step, whatever step has been taken, and records the steps that it sees.
 struct AsksFor(usize, Vec<usize>);
 
 impl Observer<1> for AsksFor {
@@ -231,7 +237,7 @@ fn odd_observers(report: &mut Report) {
             let refused = seven(&problem, integrator).observe(&mut Refusing).run(Until::Time(until));
             report.check(refused == Err(InputError::Times { index: 0, t: until }), || format!("{refused:?}"));
         }
-        // A step that is past is the next one; one beyond the run is its last.
+        // A request for a past step is one for the next step; a request beyond the end is one for the last step.
         let every: Vec<usize> = (1..=7).collect();
         for (step, expected) in [(0, &every[..]), (3, &[3, 4, 5, 6, 7]), (7, &[7]), (usize::MAX, &[7])] {
             let mut odd = AsksFor(step, Vec::new());
@@ -239,7 +245,7 @@ fn odd_observers(report: &mut Report) {
             report.check(outcome.is_ok() && odd.1 == expected, || format!("step {step}: {:?}, {outcome:?}", odd.1));
         }
     }
-    // To the accuracy of every run of which nothing is said.
+    // To the accuracy that is the default of a run.
     let mut last = AsksFor(usize::MAX, Vec::new());
     let outcome = problem.accuracy(1e-9).observe(&mut last).run(Until::Time(0.5)).unwrap();
     report.check(last.1 == [outcome.steps] && outcome.status == Status::Completed, || format!("{outcome:?}"));
@@ -259,18 +265,18 @@ fn moments(report: &mut Report) {
             let mut at_start = None;
             let mut seen = 0;
             let mut look = |at: &StepView<'_, 1>| {
-                report.door(&at.t, at.velocity());
-                report.door(&at.t, at.energy());
-                for value in HOSTILE {
-                    report.door(&value, at.velocity_at(at.t, &PhasePoint::new([value], [value], value)));
+                report.entry_point(&at.t, at.velocity());
+                report.entry_point(&at.t, at.energy());
+                for value in EXTREME {
+                    report.entry_point(&value, at.velocity_at(at.t, &PhasePoint::new([value], [value], value)));
                 }
                 let Some(step) = at.last_step() else { return ControlFlow::Break(Stop::here("no step")) };
                 let ((from, start), (to, end)) = step.ends();
                 let met = at_start.replace((to, end)).is_none_or(|before| before == (from, start));
                 let ends = step.at(from) == Ok(start) && step.at(to) == Ok(end) && (to, end) == (at.t, at.state);
                 report.check(met && ends && step.span() == (from, to), || format!("{from} to {to}"));
-                for t in HOSTILE {
-                    report.door(&t, step.at(t));
+                for t in EXTREME {
+                    report.entry_point(&t, step.at(t));
                 }
                 seen += 1;
                 ControlFlow::Continue(())
@@ -279,7 +285,7 @@ fn moments(report: &mut Report) {
             report.check(outcome.status == Status::Completed && seen == 7, || format!("{outcome:?}"));
         }
     }
-    // At the start there is no step; the last one may be taken by itself, for the claims that are compared at it.
+    // At the start there is no step; the last one may be taken by itself, since declared properties are checked there.
     let mut kinds = Vec::new();
     let mut start = Start(&mut kinds);
     let outcome = seven(&problem, None).observe(&mut start).run(Until::Time(0.5));
@@ -287,7 +293,7 @@ fn moments(report: &mut Report) {
     report.check(outcome.is_ok() && counted, || format!("{kinds:?}"));
 }
 
-/// Notes whether there is a last step, at the start and after all steps.
+/// Records whether there is a last step, at the start and after all steps.
 struct Start<'k>(&'k mut Vec<(usize, bool)>);
 
 impl Observer<1> for Start<'_> {

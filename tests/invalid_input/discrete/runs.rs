@@ -1,18 +1,18 @@
-//! Attacks on problems, runs of them and their plans.
+//! Invalid input to problems, runs and plans.
 
-use crate::Attack;
-use crate::numbers::{Claiming, Grade, HOSTILE, Report, grade, places, triples};
+use crate::InputTest;
+use crate::numbers::{Claiming, EXTREME, Grade, Report, grade, places, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Method, Midpoint, Outcome, Problem, Rows, Run, SplittingScheme, Start, Status, Steps,
-    Until,
+    AnyIntegrator, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Start, Status, Steps, Until,
+    rules::{Method, Midpoint},
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["AnyIntegrator::check"], run: integrators },
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest { entries: &["AnyIntegrator::check"], run: integrators },
+    InputTest {
+        entries: &[
             "Problem::new",
             "Problem::from_points",
             "Problem::lagrangian",
@@ -24,8 +24,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: problems,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Problem::by",
             "Problem::steps",
             "Problem::accuracy",
@@ -41,7 +41,7 @@ pub const ATTACKS: &[Attack] = &[
             "Plan::count",
             "Plan::error",
             "Plan::integrator",
-            "Plan::items",
+            "Plan::entries",
             "Plan::stepper",
             "Plan::run",
         ],
@@ -49,7 +49,7 @@ pub const ATTACKS: &[Attack] = &[
     },
 ];
 
-/// A free particle that claims nothing.
+/// A free particle that declares no structure.
 struct Silent;
 
 impl Lagrangian<1> for Silent {
@@ -58,7 +58,7 @@ impl Lagrangian<1> for Silent {
     }
 }
 
-/// Without coordinates.
+/// A Lagrangian without coordinates.
 struct Empty;
 
 impl Lagrangian<0> for Empty {
@@ -88,7 +88,7 @@ pub const BY: [Option<AnyIntegrator>; 5] = [
     Some(AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::YOSHIDA_4)),
 ];
 
-/// [`Claiming`] from a tame start at t = 0.
+/// [`Claiming`] from an ordinary start at t = 0.
 pub fn tame() -> Problem<'static, Claiming, 1> {
     Problem::new(&Claiming, 0.0, VelocityPoint::from(triples()[0])).unwrap()
 }
@@ -111,16 +111,16 @@ fn problems(report: &mut Report) {
     let rules = [0.1, -0.1].map(|h| Midpoint::new(Claiming, h).unwrap());
     for (t, x) in places() {
         let velocity = Problem::new(&Claiming, t, VelocityPoint::from(x));
-        report.door(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));
+        report.entry_point(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));
         let kept = velocity.is_ok_and(|p| p.t0() == t && *p.structure() == p.lagrangian().structure());
         report.check(kept || velocity.is_err(), || format!("{velocity:?}"));
         let momentum = Problem::new(&Claiming, t, PhasePoint::from(x));
-        report.door(&(t, x), momentum.map(|problem| (*problem.start(), *problem.state())));
+        report.entry_point(&(t, x), momentum.map(|problem| (*problem.start(), *problem.state())));
         for ld in &rules {
             let points = Problem::from_points(&Claiming, ld, t, DiscretePoint::from(x));
-            report.door(&(t, x), points.map(|problem| (*problem.start(), *problem.state())));
+            report.entry_point(&(t, x), points.map(|problem| (*problem.start(), *problem.state())));
         }
-        // What a run leads to is a start.
+        // The outcome of a run is a valid start.
         let outcome = velocity.and_then(|problem| seven(&problem, None).without_action().run(Until::Time(t + 0.5)));
         let again = outcome.as_ref().ok().map(|o| (o.state(), Problem::new(&Claiming, o.t, o)));
         let good = again.as_ref().is_none_or(|(state, _)| state.check().is_ok() && state.z == x.z);
@@ -128,8 +128,8 @@ fn problems(report: &mut Report) {
         let again = again.and_then(|(state, problem)| Some((state, *problem.ok()?.state())));
         report.check(again.is_none_or(|(end, start)| end == start), || format!("{again:?}"));
     }
-    for guess in HOSTILE {
-        // A poor guess costs iterations, or the start: never a velocity that is none.
+    for guess in EXTREME {
+        // A poor guess costs iterations, or the start is refused; the velocity is finite.
         let made = Problem::new(&Claiming, 0.4, Start::Momentum(state, SVector::from([guess])));
         let good = made.is_ok_and(|problem| grade(&problem.start().v) != Grade::Bad && problem.state() == &state);
         report.check(good || made.is_err(), || format!("the guess {guess} leads to {made:?}"));
@@ -143,35 +143,35 @@ fn runs(report: &mut Report) {
         for integrator in BY {
             let problem = Problem::new(&Claiming, t, VelocityPoint::from(x));
             let run = |problem: Problem<'_, _, 1>| seven(&problem, integrator).run(Until::Time(t + 0.5)).map(numbers);
-            report.door(&(t, x), problem.and_then(run));
+            report.entry_point(&(t, x), problem.and_then(run));
         }
     }
     let problem = tame();
     let in_seven = |until| seven(&problem, None).with_conformal_factor().with_error_estimate().run(until).map(numbers);
     let by_steps = |steps| problem.steps(steps).run(Until::Time(0.5)).map(numbers);
-    for span in HOSTILE {
+    for span in EXTREME {
         report.check(span.is_finite() || matches!(in_seven(Until::Time(span)), Err(InputError::Span { .. })), || {
             format!("a span of {span}")
         });
-        report.door(&span, in_seven(Until::Time(span)));
+        report.entry_point(&span, in_seven(Until::Time(span)));
     }
-    for h in HOSTILE.into_iter().filter(|h| !(*h > 0.0 && *h < 1e-3)) {
+    for h in EXTREME.into_iter().filter(|h| !(*h > 0.0 && *h < 1e-3)) {
         let refused = !(h > 0.0 && h.is_finite());
         report.check(!refused || matches!(by_steps(Steps::Size(h)), Err(InputError::Step { .. })), || {
             format!("steps of {h}")
         });
-        report.door(&h, by_steps(Steps::Size(h)));
+        report.entry_point(&h, by_steps(Steps::Size(h)));
     }
-    // A number of steps of a size, none too small.
-    for h in HOSTILE {
+    // A number of steps of a size, where no size is too small.
+    for h in EXTREME {
         for count in [0, 1, 7, usize::MAX] {
             let ended = problem.steps(Steps::Size(h)).run(Until::Steps(count));
             let refused = h == 0.0 || !h.is_finite() || count == 0 || count == usize::MAX;
             report.check(!refused || ended.is_err(), || format!("{count} steps of {h}: {ended:?}"));
-            report.door(&h, ended.map(numbers));
+            report.entry_point(&h, ended.map(numbers));
         }
     }
-    for error in HOSTILE {
+    for error in EXTREME {
         let made = problem.accuracy(error);
         let refused = !(error > 0.0 && error.is_finite());
         let ended = problem.accuracy(error).run(Until::Time(0.5)).map(numbers);
@@ -182,13 +182,13 @@ fn runs(report: &mut Report) {
             let kept = plan.error().is_some_and(|found| found <= error) && plan.integrator().order > 0;
             report.check(kept, || format!("{:?} where {error} is asked for", plan.error()));
         }
-        report.door(&error, ended);
+        report.entry_point(&error, ended);
     }
-    for scale in HOSTILE {
+    for scale in EXTREME {
         let ended = problem.accuracy(1e-3).scales([scale]).with_error_estimate().run(Until::Time(0.5)).map(numbers);
         let refused = !(scale > 0.0 && scale.is_finite());
         report.check(refused == matches!(ended, Err(InputError::Scale { .. })), || format!("a scale of {scale}"));
-        report.door(&scale, ended);
+        report.entry_point(&scale, ended);
     }
     report.check(by_steps(Steps::Count(0)).is_err(), || "no step".into());
     let unsized_steps = problem.steps(Steps::Count(7)).run(Until::Steps(7));
@@ -199,8 +199,8 @@ fn runs(report: &mut Report) {
         let plan = run.plan(Until::Time(until)).unwrap();
         let good = plan.count() == 7 && (plan.step_size() - way * 0.5 / 7.0).abs() < 1e-16;
         report.check(good, || format!("seven steps of {}", plan.step_size()));
-        report.check(!plan.items().is_empty() && plan.stepper().is_ok(), || "a plan says what it does".into());
-        // By itself it has no observers.
+        report.check(!plan.entries().is_empty() && plan.stepper().is_ok(), || "a plan says what it does".into());
+        // The plan is run without observers.
         let (alone, observed) = (plan.run(), run.run(Until::Time(until)));
         report.check(alone == observed && alone.is_ok_and(|o| o.status == Status::Completed), || format!("{alone:?}"));
         report.check(rows.rows.len() == 8, || format!("{} rows", rows.rows.len()));

@@ -1,20 +1,23 @@
-//! Attacks on what takes steps: flows, Gauss collocation, splittings, compositions, and what looks at them.
+//! Invalid input to steppers: flows, Gauss collocation, splittings, compositions, and to what monitors them.
 
 use super::{STEPS, starts};
-use crate::Attack;
-use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Numbers, Report, fine, grade, triples};
+use crate::InputTest;
+use crate::numbers::{Claiming, EXTREME, Everything, Grade, Numbers, Report, fine, grade, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, PhasePoint};
 use discrete_herglotz::{
-    ActionFlow, ActionMap, ActionSplitting, Composition, DiscreteLagrangian, EnergyDrift, EnergyLook, Flow, Gauss,
-    GaussRoute, InputError, Midpoint, Riccati, Splitting, SplittingScheme, Stepper,
+    DiscreteLagrangian, InputError, SplittingScheme, Stepper,
+    checks::{EnergyDrift, EnergyLook},
+    gauss::{Gauss, GaussRoute},
+    rules::{Composition, Flow, Midpoint},
+    splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, Splitting},
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["Composition::new"], run: compositions },
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest { entries: &["Composition::new"], run: compositions },
+    InputTest {
+        entries: &[
             "Flow::new",
             "Flow::with_guess",
             "Flow::from_points",
@@ -28,8 +31,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: flows,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Gauss::stepper",
             "Gauss::stepper_without_action",
             "GaussStepper::without_newton",
@@ -42,17 +45,17 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: gauss,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Gauss::transformed_stepper",
             "TransformedStepper::time_momentum",
             "TransformedStepper::advance_to",
             "Stepper::advance_until",
         ],
-        run: clocked,
+        run: transformed,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Splitting::new",
             "Splitting::without_action",
             "Splitting::compensated",
@@ -65,27 +68,27 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: splittings,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Stepper::advance",
             "Stepper::state",
             "Stepper::time",
             "Stepper::sigma",
             "Stepper::evaluations",
             "Stepper::unresolved",
-            "Stepper::doubt",
+            "Stepper::suspect_interval",
             "Stepper::guess",
             "Stepper::last_velocity",
         ],
         run: steppers,
     },
-    Attack { on: &["EnergyDrift::new", "EnergyDrift::defect"], run: drifts },
+    InputTest { entries: &["EnergyDrift::new", "EnergyDrift::defect"], run: drifts },
 ];
 
-/// An energy that is no number is no drift, and what is one is above one.
+/// Where an energy is not a number or is extreme, there is no defect, or one above 1.
 fn drifts(report: &mut Report) {
     let tame = EnergyLook { total: 1.0, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken: 0 };
-    for value in HOSTILE {
+    for value in EXTREME {
         let wild = [
             EnergyLook { total: value, ..tame },
             EnergyLook { kinetic: value, ..tame },
@@ -101,22 +104,22 @@ fn drifts(report: &mut Report) {
     }
 }
 
-/// A door that makes a stepper: it refuses a start that is not finite, and its states are finite.
+/// An entry point that makes a stepper: a start that is not finite is refused, and the states are finite.
 fn drive<S: Stepper<1>>(report: &mut Report, input: &(impl Numbers + std::fmt::Debug), made: Result<S, InputError>) {
     let driven = made.map(|mut stepper| {
         let _ = stepper.advance(3);
         (stepper.state(), stepper.time(), if stepper.sigma() >= 0.0 { 0.0 } else { f64::NAN })
     });
-    report.door(input, driven);
+    report.entry_point(input, driven);
 }
 
-/// The constructor of a stepper under attack by its start and its step.
-fn doors<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<1>) -> Result<S, InputError>) {
+/// The constructor of a stepper with invalid starts and steps.
+fn constructor<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<1>) -> Result<S, InputError>) {
     for (t, x) in starts() {
         drive(report, &(t, x), make(0.1, t, x));
     }
     let tame: PhasePoint<1> = triples()[0].into();
-    for h in HOSTILE.into_iter().chain(STEPS) {
+    for h in EXTREME.into_iter().chain(STEPS) {
         let made = make(h, 0.4, tame);
         let refused = h == 0.0 || !h.is_finite();
         report.check(!refused || matches!(made, Err(InputError::Step { .. })), || format!("the step {h} is taken"));
@@ -126,22 +129,22 @@ fn doors<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<
 
 fn compositions(report: &mut Report) {
     let scheme = SplittingScheme::YOSHIDA_4;
-    doors(report, |h, t, x| Composition::new(|h| Midpoint::new(Everything, h), &scheme, h, t, x));
+    constructor(report, |h, t, x| Composition::new(|h| Midpoint::new(Everything, h), &scheme, h, t, x));
 }
 
 fn splittings(report: &mut Report) {
     let scheme = SplittingScheme::BLANES_MOAN_6;
-    doors(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
-    doors(report, |h, t, x| {
+    constructor(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
+    constructor(report, |h, t, x| {
         Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.watched().compensated().without_action())
     });
     let scheme = SplittingScheme::YOSHIDA_4;
     let system = QuadraticInZ::default();
-    doors(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
+    constructor(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
     let flow = Riccati { b: -0.1, c: 0.0 };
-    doors(report, |h, t, x| ActionSplitting::with_flow(&Claiming, &flow, &scheme, h, t, x));
-    for value in HOSTILE {
-        // A flow that is none of the Lagrangian's, or none at all.
+    constructor(report, |h, t, x| ActionSplitting::with_flow(&Claiming, &flow, &scheme, h, t, x));
+    for value in EXTREME {
+        // A flow that does not belong to the Lagrangian, or that is not a flow.
         let flow = Riccati { b: value, c: value };
         let made = ActionSplitting::with_flow(&Claiming, &flow, &scheme, 0.1, 0.0, triples()[0].into());
         report.check(made.is_err(), || format!("the flow {flow:?} is taken"));
@@ -171,18 +174,20 @@ fn steppers(report: &mut Report) {
     let mut other = gauss.stepper(0.0, PhasePoint { p: -start.p, ..start }, -start.p).unwrap();
     let foreign = other.advance(1).ok().and_then(|()| other.dense()).unwrap();
     for mut stepper in steppers {
-        // No step is no change.
+        // No step changes nothing.
         report.check(stepper.advance(0).is_ok() && stepper.state() == start && stepper.time() == 0.0, || {
             "no step".into()
         });
-        let blank = stepper.sigma() == 1.0 && stepper.unresolved().is_none() && stepper.doubt().is_none();
+        let blank = stepper.sigma() == 1.0 && stepper.unresolved().is_none() && stepper.suspect_interval().is_none();
         report.check(blank && stepper.last_velocity().is_none(), || "before the first step".into());
-        // A guess of another motion changes the work alone.
+        // The guess of another motion changes the work alone.
         stepper.guess(&foreign);
         report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
         let v = stepper.last_velocity();
         report.check(v.is_none_or(|v| v.iter().all(|v| v.is_finite())), || format!("{v:?}"));
-        report.check(stepper.doubt().is_none_or(|d| d.step + d.steps <= 2), || "a doubt of steps to come".into());
+        report.check(stepper.suspect_interval().is_none_or(|d| d.step + d.steps <= 2), || {
+            "a suspect interval beyond the steps taken".into()
+        });
     }
 }
 
@@ -195,21 +200,21 @@ fn flows(report: &mut Report) {
             let _ = flow.advance(3);
             let seen = flow.state().check().is_ok() && flow.time().is_finite();
             report.check(seen, || format!("{x:?}: {:?}", flow.state()));
-            let mark = flow.unresolved().is_none_or(|s| s.step < 3 && s.defect >= 1.0);
-            report.check(mark, || format!("{x:?}: {:?}", flow.unresolved()));
+            let valid = flow.unresolved().is_none_or(|s| s.step < 3 && s.defect >= 1.0);
+            report.check(valid, || format!("{x:?}: {:?}", flow.unresolved()));
             let back = flow.step_back().is_err() || flow.state().check().is_ok();
             report
                 .check(back && flow.step().map_or(true, |s| s.to.check().is_ok()), || format!("{x:?}: back and forth"));
         }
     }
     let tame: PhasePoint<1> = triples()[0].into();
-    for guess in HOSTILE {
+    for guess in EXTREME {
         let made = Flow::with_guess(&ld, 0.0, tame, SVector::from([guess]));
         report.check(made.map_or(true, |f| f.state() == &tame), || format!("the guess {guess}"));
     }
-    for number in HOSTILE {
+    for number in EXTREME {
         let (state, v) = (PhasePoint::new([number], [1.0], 0.0), SVector::from([number]));
-        // What is not finite has no regular mass, and resolves nothing.
+        // Where W is not finite it is not regular, and no motion is resolved.
         let start = ld.check_start(0.0, &state, &v);
         report.check(number.is_finite() || start.is_err(), || format!("a start at {number}"));
         let calm = SVector::from([1.0]);
@@ -235,7 +240,7 @@ fn gauss(report: &mut Report) {
         let gauss = Gauss::new(Claiming, 5, h).unwrap();
         drive(report, &h, gauss.stepper(0.0, triples()[0].into(), one));
     }
-    for guess in HOSTILE {
+    for guess in EXTREME {
         let made = general.stepper(0.0, triples()[0].into(), SVector::from([guess]));
         report.check(made.map_or(true, |s| grade(&s.state()) != Grade::Bad), || format!("the guess {guess}"));
     }
@@ -245,7 +250,7 @@ fn gauss(report: &mut Report) {
         .check(stepper.dense().is_none() && stepper.advance(2).is_ok(), || "dense output before the first step".into());
     let curve = stepper.dense().unwrap();
     report.check(curve.span() == (0.1, 0.2), || format!("the span {:?}", curve.span()));
-    for t in HOSTILE {
+    for t in EXTREME {
         report.formula(&t, fine(curve.at(t)));
         report.formula(&t, fine(curve.velocity(t)));
     }
@@ -255,9 +260,9 @@ fn gauss(report: &mut Report) {
     report.check(span == Some((0.0, -0.1)), || format!("the span {span:?} of a step back"));
 }
 
-fn clocked(report: &mut Report) {
+fn transformed(report: &mut Report) {
     let kepler = Kepler::<2>::default();
-    for (value, h) in HOSTILE.into_iter().flat_map(|value| [(value, 0.2), (value, -0.2)]) {
+    for (value, h) in EXTREME.into_iter().flat_map(|value| [(value, 0.2), (value, -0.2)]) {
         let gauss = Gauss::new(kepler, 4, h).unwrap();
         for x in [[value, 0.0, 0.0, 1.0], [1.0, value, 0.0, 1.0], [1.0, 0.0, value, 1.0], [value; 4]] {
             let start = PhasePoint::<2>::new([x[0], x[1]], [x[2], x[3]], 0.0);
@@ -266,7 +271,7 @@ fn clocked(report: &mut Report) {
                     let _ = stepper.advance(3);
                     (stepper.state(), stepper.time(), stepper.time_momentum())
                 });
-            report.door(&start, made);
+            report.entry_point(&start, made);
         }
         let start = PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0);
         report.check(
@@ -274,12 +279,12 @@ fn clocked(report: &mut Report) {
                 || gauss.transformed_stepper(kepler.time_transformation(), value, start, start.p).is_err(),
             || format!("from t = {value}"),
         );
-        // A time that is far away is not asked for: that many steps are what it takes.
+        // A distant time is not requested, since it takes that many steps.
         if !value.is_finite() || value.abs() <= 1.0 {
             let mut stepper = gauss.transformed_stepper(kepler.time_transformation(), 0.0, start, start.p).unwrap();
             let done = stepper.advance_to(value);
             let at = if value * h > 0.0 { value } else { 0.0 };
-            // Of a time too short for its steps it says so, and stays.
+            // A time that is too short for its steps is refused, and the state does not change.
             let there = done.is_ok() && (stepper.time() - at).abs() <= 1e-15;
             let refused = done.is_err() && stepper.time() == 0.0;
             let good = if value.is_finite() { there || refused && value.abs() < 1e-12 } else { refused };

@@ -1,21 +1,24 @@
-//! Attacks on contact forms, the fields and brackets that belong to them, and the groups that act.
+//! Invalid input to contact forms, to the fields and brackets that belong to them, and to groups.
 
-use crate::Attack;
-use crate::numbers::{Everything, HOSTILE, Report, fine, places, triples};
+use crate::InputTest;
+use crate::numbers::{EXTREME, Everything, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::statements::AnyFunction;
 use contact_geom::{
     ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, Energy, EtaMinus, EtaPlus, Form,
-    HerglotzField, InfinitesimalConformality, LagrangianForm, OneParameterGroup, SecondDiscreteJet, Smooth,
-    SmoothFunction, Symmetry, VelocityPoint, conformal_factor_along, conformality, conformality_with_jacobian,
-    derivative_along, dissipation_defect, generic, hamiltonian_vector_field, infinitesimal_conformality,
-    jacobi_bracket, lie_bracket, lie_derivative,
+    HerglotzField, LagrangianForm, OneParameterGroup, SecondDiscreteJet, Smooth, SmoothFunction, Symmetry,
+    VelocityPoint, conformality,
+    hamiltonian::{
+        InfinitesimalConformality, conformal_factor_along, derivative_along, dissipation_defect,
+        hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket, lie_derivative,
+    },
+    support::{conformality_with_jacobian, generic},
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["Symmetry::rotation", "Symmetry::rotations", "Symmetry::axis"], run: symmetries },
-    Attack {
-        on: &[
+pub const TESTS: &[InputTest] = &[
+    InputTest { entries: &["Symmetry::rotation", "Symmetry::rotations", "Symmetry::axis"], run: symmetries },
+    InputTest {
+        entries: &[
             "OneParameterGroup::generator",
             "OneParameterGroup::tangent_lift",
             "OneParameterGroup::on_velocities",
@@ -26,8 +29,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: groups,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "ContactForm::eta",
             "ContactForm::d_eta",
             "ContactForm::volume",
@@ -41,8 +44,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: forms,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "DiscreteJet::new",
             "DiscreteJet::with_sigma",
             "DiscreteJet::sigma",
@@ -52,8 +55,8 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: jets,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "hamiltonian_vector_field",
             "derivative_along",
             "jacobi_bracket",
@@ -65,14 +68,14 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: fields,
     },
-    Attack { on: &["conformality", "conformality_with_jacobian"], run: pullbacks },
-    Attack {
-        on: &["Smooth::at", "Smooth::with_jacobian", "SmoothFunction::value", "SmoothFunction::differential"],
+    InputTest { entries: &["conformality", "conformality_with_jacobian"], run: pullbacks },
+    InputTest {
+        entries: &["Smooth::at", "Smooth::with_jacobian", "SmoothFunction::value", "SmoothFunction::differential"],
         run: smooth,
     },
 ];
 
-/// Indices that are no plane, axes that have no direction.
+/// Indices that define no plane, and axes without a direction.
 fn symmetries(report: &mut Report) {
     for (i, j) in [(0, 0), (0, 2), (2, 0), (usize::MAX, 0), (usize::MAX, usize::MAX)] {
         report.check(Symmetry::<2>::rotation(i, j).is_err(), || format!("rotation({i}, {j})"));
@@ -81,10 +84,10 @@ fn symmetries(report: &mut Report) {
     for planes in [[(0, 1), (0, 2)], [(0, 1), (2, 1)], [(0, 1), (1, 0)], [(0, 1), (0, 1)]] {
         report.check(Symmetry::<4>::rotations(&planes).is_err(), || format!("rotations({planes:?})"));
     }
-    // Of planes that are given past the constructor, none beyond the coordinates is turned.
+    // A plane beyond the coordinates, which the constructor would refuse, is not rotated.
     let turned = Symmetry::<2>::Rotations([Some(usize::MAX), None]).act(0.3, &SVector::from([1.0, 2.0]));
     report.check(turned == SVector::from([1.0, 2.0]), || format!("{turned}"));
-    for value in HOSTILE {
+    for value in EXTREME {
         for axis in [[value, 0.0, 0.0], [1.0, value, 0.0], [value; 3]] {
             let unit = |s: Symmetry<3>| match s {
                 Symmetry::Axis(a) => (a.norm() - 1.0).abs() <= 8.0 * f64::EPSILON,
@@ -92,7 +95,7 @@ fn symmetries(report: &mut Report) {
             };
             let made = Symmetry::<3>::axis(axis);
             let refused = !axis.iter().all(|a| a.is_finite()) || axis == [0.0; 3];
-            // The length of a huge axis overflows, that of a subnormal one has few digits: either is refused.
+            // The length of a huge axis overflows, and that of a subnormal one has few digits: either is refused.
             report.check(if refused { made.is_err() } else { made.is_err() || made.is_ok_and(unit) }, || {
                 format!("axis({axis:?}) is {made:?}")
             });
@@ -102,7 +105,7 @@ fn symmetries(report: &mut Report) {
 
 fn groups(report: &mut Report) {
     let group = Symmetry::Scaling(SVector::from([0.7]));
-    for s in HOSTILE {
+    for s in EXTREME {
         report.formula(&s, fine(group.act(s, &SVector::from([0.3]))));
         report.formula(&s, fine(group.tangent_lift(s, &SVector::from([0.3]), &SVector::from([0.5]))));
     }
@@ -132,7 +135,7 @@ fn forms(report: &mut Report) {
     for x in triples() {
         one(report, &Darboux, &x, &x);
         one(report, &Form(Darboux), &x, &x);
-        // That of Darboux coordinates is the same everywhere.
+        // The Reeb field and the volume of Darboux coordinates are constant.
         report.check(Darboux.reeb(&x) == Ok(upward) && Darboux.volume(&x).is_ok_and(|v| v.abs() == 1.0), || {
             format!("{x:?}")
         });
@@ -183,7 +186,7 @@ fn jets(report: &mut Report) {
         let condition = jet.regularity().condition();
         report.check(condition >= 1.0 || condition.is_nan(), || format!("{x:?}: condition {condition}"));
     }
-    for sigma in HOSTILE {
+    for sigma in EXTREME {
         let jet = DiscreteJet::new(0.0, SVector::from([1.0]), SVector::from([1.0]), 0.0).with_sigma(sigma);
         report.check(jet.sigma().to_bits() == sigma.to_bits(), || format!("sigma {sigma} becomes {}", jet.sigma()));
     }
@@ -206,7 +209,7 @@ fn fields(report: &mut Report) {
         report.formula(&(t, x), found.map(|InfinitesimalConformality { rate, defect }| (rate, defect)));
     }
     let path = |_: f64| ChartVector { x: [0.3].into(), y: [0.7].into(), z: 0.2 };
-    for value in HOSTILE {
+    for value in EXTREME {
         let factor = conformal_factor_along(&Darboux, &f, path, &[(0.1, value), (0.2, 0.5)]);
         report.check(factor.as_ref().is_ok_and(|s| value.is_finite() || !s.is_finite() || *s == 0.0), || {
             format!("a weight {value} leads to {factor:?}")
@@ -228,7 +231,7 @@ fn pullbacks(report: &mut Report) {
         let refused = conformality_with_jacobian(&Darboux, &Darboux, &x, &x, &jacobian).is_err();
         report.check(refused, || format!("a Jacobian of {rows} x {columns}"));
     }
-    for value in HOSTILE {
+    for value in EXTREME {
         let x = triples()[0];
         let jacobian =
             DMatrix::from_fn(3, 3, |i, j| if i == 1 && j == 1 { value } else { f64::from(u8::from(i == j)) });

@@ -1,25 +1,26 @@
-//! Attacks on Lagrangians: their derivatives, fields, claims and closed motions.
+//! Invalid input to Lagrangians: their derivatives, fields, declared structure and closed motions.
 
-use crate::Attack;
-use crate::numbers::{Everything, HOSTILE, Report, fine, places, triples};
+use crate::InputTest;
+use crate::numbers::{EXTREME, Everything, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::ActionSquared;
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
     Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, TimeTransformation, VelocityPoint,
-    WithoutClosedDerivatives, check_closed_derivatives, derived_gradient, derived_hessian, gradient_rounding,
-    herglotz_field, herglotz_rates, legendre, legendre_jacobian, legendre_polynomials, regularity, statements,
+    WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, regularity,
+    statements,
+    support::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, legendre_polynomials},
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack {
-        on: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates", "gradient_rounding"],
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates", "gradient_rounding"],
         run: herglotz,
     },
-    Attack { on: &["legendre_polynomials"], run: polynomials },
-    Attack { on: &["regularity", "Regularity::of", "Regularity::condition"], run: regularities },
-    Attack {
-        on: &[
+    InputTest { entries: &["legendre_polynomials"], run: polynomials },
+    InputTest { entries: &["regularity", "Regularity::of", "Regularity::condition"], run: regularities },
+    InputTest {
+        entries: &[
             "derived_gradient",
             "derived_hessian",
             "check_closed_derivatives",
@@ -35,13 +36,13 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: lagrangians,
     },
-    Attack { on: &["Structure::defects"], run: structures },
-    Attack {
-        on: &["statements::residual", "statements::known_hamiltonian", "statements::conformal_flow"],
+    InputTest { entries: &["Structure::defects"], run: structures },
+    InputTest {
+        entries: &["statements::residual", "statements::known_hamiltonian", "statements::conformal_flow"],
         run: residuals,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "FreeParticle::solution",
             "FreeParticle::velocity_through",
             "HarmonicOscillator::solution",
@@ -52,7 +53,10 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: closed_forms,
     },
-    Attack { on: &["Kepler::time_transformation", "TimeTransformation::rate", "Lagrangian::dt_dtau"], run: clocks },
+    InputTest {
+        entries: &["Kepler::time_transformation", "TimeTransformation::rate", "Lagrangian::dt_dtau"],
+        run: time_transformations,
+    },
 ];
 
 fn herglotz(report: &mut Report) {
@@ -64,7 +68,7 @@ fn herglotz(report: &mut Report) {
         report.formula(&(t, x), herglotz_rates(&Everything, t, &at));
         report.formula(&(t, x), herglotz_field(&WithoutClosedDerivatives(Everything), t, &at));
         let (of_value, of_gradient) = gradient_rounding(&Everything, t, &at);
-        // Sizes, or no numbers: never a number below 0.
+        // Sizes are not negative, and may be NaN.
         let entries = (0..3).map(|i| of_gradient.component(i)).chain([of_value]);
         report.check(entries.into_iter().all(|e| !(e < 0.0)), || format!("{t}, {x:?}: {of_value}, {of_gradient:?}"));
     }
@@ -75,7 +79,7 @@ fn regularities(report: &mut Report) {
         let w = regularity(&Everything, t, &x.into());
         report.formula(&(t, x), fine((w.smallest, w.condition())));
     }
-    for value in HOSTILE {
+    for value in EXTREME {
         let w = Regularity::of(DMatrix::from_row_slice(2, 2, &[1.0, value, 0.5, 2.0]));
         let good = w.condition() >= 1.0 && (value.is_finite() || w.condition() == f64::INFINITY);
         report.check(good, || format!("{value}: {w:?}"));
@@ -116,7 +120,7 @@ fn lagrangians(report: &mut Report) {
     }
 }
 
-/// Claims at a place that is none: each is as wrong as can be.
+/// The defects of a declared structure at places where L may not be defined.
 fn structures(report: &mut Report) {
     let all = Structure {
         autonomous: true,
@@ -128,7 +132,7 @@ fn structures(report: &mut Report) {
         constant_mass: true,
     };
     for (t, x) in places() {
-        // Where L is not defined nothing is said; elsewhere every claim gets a number.
+        // Where L is not defined there are no defects; elsewhere every property has one.
         let Some(defects) = all.defects(&Everything, t, &x.into()) else { continue };
         report.check(t.is_finite() && x.is_finite(), || format!("claims are judged at t = {t}, {x:?}"));
         let defects: Vec<_> = defects.collect();
@@ -142,7 +146,7 @@ fn structures(report: &mut Report) {
 }
 
 fn residuals(report: &mut Report) {
-    // The system does not know the time, nor a symmetry or a Hamiltonian in closed form.
+    // The system has no explicit time, symmetry or Hamiltonian in closed form.
     let without = [Statement::HamiltonianField, Statement::LegendreTransformation, Statement::Noether];
     for (t, x) in places() {
         let has_nan = x.to_vector().iter().any(|c| c.is_nan());
@@ -159,7 +163,7 @@ fn residuals(report: &mut Report) {
     }
     report.check(statements::known_hamiltonian::<1, _>(&Pendulum::default()).is_some(), || "no Hamiltonian".into());
     let flow = ActionSquared { c: 0.4 };
-    for t in HOSTILE {
+    for t in EXTREME {
         let residual = statements::conformal_flow(&flow, t, &triples()[0], &[(0.0, t)]);
         report.check(!t.is_nan() || !residual.as_ref().is_ok_and(|r| *r <= 1e-3), || format!("t = {t}: {residual:?}"));
     }
@@ -173,39 +177,39 @@ fn closed_forms(report: &mut Report) {
         report.formula(&x, fine(free.solution(0.4, &at)));
         report.formula(&x, fine(oscillator.solution(0.4, &at)));
         report.formula(&x, fine(field.solution(0.4, &at)));
-        // Where there is none or not one, there is none.
+        // Where no velocity or more than one joins the points, none is returned.
         for through in [free.velocity_through(x.x[0], x.y[0], 0.4), oscillator.velocity_through(x.x[0], x.y[0], 0.4)] {
-            report.door(&(x.x, x.y), through.ok_or("none"));
+            report.entry_point(&(x.x, x.y), through.ok_or("none"));
         }
-        report.door(&(x.x, x.y), field.velocity_through(&x.x, &x.y, 0.4).ok_or("none"));
+        report.entry_point(&(x.x, x.y), field.velocity_through(&x.x, &x.y, 0.4).ok_or("none"));
     }
     let start = VelocityPoint::new([0.3], [0.7], 0.2);
-    for t in HOSTILE {
+    for t in EXTREME {
         report.formula(
             &t,
             fine(oscillator.solution(t, &start)).map(|x| (x, if t < 0.0 && t.is_infinite() { f64::NAN } else { 0.0 })),
         );
-        report.door(&t, free.velocity_through(0.1, 0.2, t).ok_or("none"));
-        report.door(&t, oscillator.velocity_through(0.1, 0.2, t).ok_or("none"));
+        report.entry_point(&t, free.velocity_through(0.1, 0.2, t).ok_or("none"));
+        report.entry_point(&t, oscillator.velocity_through(0.1, 0.2, t).ok_or("none"));
         for n in [0, 1, 2, 5, u8::MAX] {
             report.formula(&t, LaneEmden { n }.solution(t).ok_or("none"));
         }
     }
 }
 
-fn clocks(report: &mut Report) {
+fn time_transformations(report: &mut Report) {
     let kepler = Kepler::<2>::default();
-    let clock = kepler.time_transformation();
-    for value in HOSTILE {
+    let transformation = kepler.time_transformation();
+    for value in EXTREME {
         let q = SVector::from([value, 0.3]);
-        report.formula(&value, fine(clock.rate(&q)));
+        report.formula(&value, fine(transformation.rate(&q)));
         report.formula(&value, fine(kepler.dt_dtau(&q)));
     }
 }
 
-/// Of any degree and any room: no more than fit.
+/// Polynomials of any degree into buffers of any length.
 fn polynomials(report: &mut Report) {
-    for x in HOSTILE {
+    for x in EXTREME {
         for s in [0, 1, 2, 3, 9, usize::MAX] {
             let [_, p1, p2, ..]: [f64; 4] = legendre_polynomials(s, x);
             report.check(p1.to_bits() == x.to_bits(), || format!("P_1({x}) = {p1}"));

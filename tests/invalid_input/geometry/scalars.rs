@@ -1,21 +1,25 @@
-//! Attacks on numbers, coordinates and matrices.
+//! Invalid input to scalars, coordinates and matrices.
 
-use crate::Attack;
-use crate::numbers::{HOSTILE, Report, fine, triples};
+use crate::InputTest;
+use crate::numbers::{EXTREME, Report, fine, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    AugmentedVector, DiscretePoint, Dual, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, TangentVector, VelocityPoint,
-    linear, max_abs_or_nan, max_or_nan, seed,
+    DiscretePoint, Dual, PhasePoint, Scalar, VelocityPoint,
+    numbers::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan},
+    support::{linear, seed},
 };
 
-pub const ATTACKS: &[Attack] = &[
-    Attack {
-        on: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &["max_or_nan", "largest", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
         run: maxima,
     },
-    Attack { on: &["SingularMatrix::of", "linear::solve", "linear::solve_in_kernel"], run: systems_of_equations },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &["SingularMatrix::of", "linear::solve", "linear::solve_in_kernel"],
+        run: systems_of_equations,
+    },
+    InputTest {
+        entries: &[
             "ChartVector::dot",
             "ChartVector::scale",
             "ChartVector::plus",
@@ -28,13 +32,20 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: coordinates,
     },
-    Attack { on: &["$name::from_slices", "$name::check"], run: points },
-    Attack {
-        on: &["$Dual::constant", "Module::null", "Module::each", "Module::join", "Module::scaled", "Module::combined"],
+    InputTest { entries: &["$name::from_slices", "$name::check"], run: points },
+    InputTest {
+        entries: &[
+            "$Dual::constant",
+            "Module::null",
+            "Module::each",
+            "Module::join",
+            "Module::scaled",
+            "Module::combined",
+        ],
         run: differentials,
     },
-    Attack {
-        on: &[
+    InputTest {
+        entries: &[
             "Scalar::re",
             "Scalar::apart",
             "Scalar::pivot_size",
@@ -70,8 +81,8 @@ pub const ATTACKS: &[Attack] = &[
 ];
 
 fn maxima(report: &mut Report) {
-    for a in HOSTILE {
-        for b in HOSTILE {
+    for a in EXTREME {
+        for b in EXTREME {
             let most = max_or_nan(a, b);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a && most >= b };
             report.check(good, || format!("larger({a}, {b}) = {most}"));
@@ -86,9 +97,9 @@ fn maxima(report: &mut Report) {
     report.check(max_abs_or_nan([]) == 0.0, || "the largest of nothing".into());
 }
 
-/// Matrices that are singular, nearly so or not finite.
+/// Matrices that are singular, nearly singular or not finite.
 fn systems_of_equations(report: &mut Report) {
-    for value in HOSTILE {
+    for value in EXTREME {
         for matrix in
             [[1.0, value, 0.5, 2.0], [value, 0.0, 0.0, value], [value, value, value, value], [value, 1.0, 1.0, value]]
         {
@@ -100,7 +111,7 @@ fn systems_of_equations(report: &mut Report) {
                     done.map(|determinant| (determinant, b)).map_err(|e| e.of("the matrix", "take another"))
                 };
                 let input = (SVector::from(matrix), SVector::from(right));
-                // A pivot may be so small that the solution overflows: those who solve look at it.
+                // A pivot may be so small that the solution overflows, which the callers check.
                 if value == 0.0 || value.abs() > 1e-290 || value.is_nan() {
                     report.formula(&input, solve(false).map(|(_, b)| b));
                 }
@@ -139,12 +150,12 @@ fn coordinates(report: &mut Report) {
 fn points(report: &mut Report) {
     for x in triples() {
         let (a, b) = ([x.component(0)], [x.component(1)]);
-        report.door(&x, VelocityPoint::<1>::from_slices(&a, &b, x.z));
-        report.door(&x, PhasePoint::<1>::from_slices(&a, &b, x.z));
-        report.door(&x, DiscretePoint::<1>::from_slices(&a, &b, x.z));
-        report.door(&x, VelocityPoint::from(x).check());
-        report.door(&x, PhasePoint::from(x).check());
-        report.door(&x, DiscretePoint::from(x).check());
+        report.entry_point(&x, VelocityPoint::<1>::from_slices(&a, &b, x.z));
+        report.entry_point(&x, PhasePoint::<1>::from_slices(&a, &b, x.z));
+        report.entry_point(&x, DiscretePoint::<1>::from_slices(&a, &b, x.z));
+        report.entry_point(&x, VelocityPoint::from(x).check());
+        report.entry_point(&x, PhasePoint::from(x).check());
+        report.entry_point(&x, DiscretePoint::from(x).check());
     }
     let read = VelocityPoint::<2>::from_slices(&[1.0, 2.0], &[3.0, 4.0], 5.0);
     report.check(read == Ok(VelocityPoint::new([1.0, 2.0], [3.0, 4.0], 5.0)), || format!("{read:?}"));
@@ -159,7 +170,7 @@ fn differentials(report: &mut Report) {
     type D = Dual<f64, SVector<f64, 1>>;
     let null: SVector<f64, 1> = TangentVector::<f64>::null();
     report.check(D::constant(1.0).d == null, || "a constant's differential".into());
-    for value in HOSTILE {
+    for value in EXTREME {
         report.formula(&value, fine(D::constant(value)));
         let border = AugmentedVector::<1> { x: SVector::from([value]), z: 1.0 };
         let numbers = |b: AugmentedVector<1>| (b.x, b.z);
@@ -167,16 +178,17 @@ fn differentials(report: &mut Report) {
         report.formula(&value, fine(numbers(border.join(border, |a, b| a + b))));
         report.formula(&value, fine(numbers(border.scaled(2.0))));
         report.formula(&value, fine(numbers(border.combined(2.0, border, 0.5))));
-        // A number that is none is not lost where its factor vanishes.
+        // A NaN is not lost where its factor vanishes.
         report.formula(&value, fine(numbers(border.scaled(0.0)).0));
     }
 }
 
-/// The elementary functions on duals: a NaN stays one, and tame arguments in the domain give finite values and slopes.
+/// The elementary functions on duals: a NaN is returned, and ordinary arguments in the domain give finite values and
+/// slopes.
 fn functions(report: &mut Report) {
     type D = Dual<f64, SVector<f64, 1>>;
     type Function = fn(D) -> D;
-    // On the whole line.
+    // Functions that are defined on the whole line.
     let whole: [(&str, Function); 19] = [
         ("apart", |x| D::apart(|| x.exp())),
         ("abs", |x| x.abs()),
@@ -198,7 +210,7 @@ fn functions(report: &mut Report) {
         ("tanh", |x| x.tanh()),
         ("atan", |x| x.atan()),
     ];
-    // Elsewhere than where they are defined they are not numbers.
+    // Functions that are defined on a part of the line.
     let partly: [(&str, Function); 9] = [
         ("along_slope", |x| x.along_slope(x.recip())),
         ("slope_power", |x| x.slope_power(-1.0) + x.slope_power(0.5)),
@@ -210,7 +222,7 @@ fn functions(report: &mut Report) {
         ("ln_1p", |x| x.ln_1p()),
         ("tan", |x| x.tan()),
     ];
-    for value in HOSTILE {
+    for value in EXTREME {
         let x = D { re: value, d: SVector::from([1.0]) };
         report.check(x.re().to_bits() == value.to_bits(), || format!("re of {value}"));
         report.check(value.is_nan() || x.pivot_size() == value.abs(), || format!("size of {value} as a pivot"));

@@ -4,14 +4,14 @@ use crate::common::oracle::motion_with_derivative;
 use crate::common::{on_random, within};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, System, SystemVisitor, visit_catalogue};
-use contact_geom::{ChartVector, LagrangianForm, conformality_with_jacobian};
+use contact_geom::{ChartVector, LagrangianForm, support::conformality_with_jacobian};
 
-/// What the oracle's own error allows: its relative tolerance of 3e-14 a step, over some tens of steps and through the
-/// growth of the variational equation (up to 1e2 on the samples).
+/// The error of the oracle: its relative tolerance of 3e-14 a step, over some tens of steps, times the growth of the
+/// variational equation (up to 1e2 on the samples).
 const ORACLE: f64 = 1e-10;
 
-/// Gauss' quadrature with ten nodes on `[0, t]`: exact to round-off for the rates of the closed flows.
-pub fn gauss(t: f64) -> Vec<(f64, f64)> {
+/// Gauss' quadrature with ten nodes on `[0, t]`, which is exact to round-off for the rates of the closed flows.
+fn gauss(t: f64) -> Vec<(f64, f64)> {
     let half = [
         (0.148_874_338_981_631_21, 0.295_524_224_714_752_87),
         (0.433_395_394_129_247_2, 0.269_266_719_309_996_35),
@@ -23,7 +23,7 @@ pub fn gauss(t: f64) -> Vec<(f64, f64)> {
 }
 
 fn along_closed_flow(flow: &impl ClosedFlow) {
-    on_random(flow.name(), 4, |u| {
+    on_random(&format!("statement 5 on {}", flow.name()), 4, |u| {
         let x = ChartVector::from_fn(|i| 2.0 * u[i] - 1.0);
         let t = 0.1 + u[3];
         let residual = conformal_flow(flow, t, &x, &gauss(t)).map_err(|e| e.to_string())?;
@@ -54,7 +54,7 @@ fn along_every_motion() {
                 let measured =
                     conformality_with_jacobian(&form(t), &form(t + 0.3), &start.into(), &end.into(), &jacobian);
                 let ok = measured.is_ok_and(|m| m.defect < ORACLE && (m.sigma - sigma).abs() < ORACLE * sigma);
-                assert!(ok, "{}: {measured:?}, exp int L_z = {sigma}", system.name());
+                assert!(ok, "statement 5 on {}: {measured:?}, exp int L_z = {sigma}", system.name());
             }
         }
     }

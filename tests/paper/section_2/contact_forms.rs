@@ -1,22 +1,12 @@
-//! Statement 1 (section 2.1): `eta ^ (d eta)^n` is a volume form on T*Q x R, on TQ x R for a regular L, and on Q x Q x R for
-//! a regular L_d.
+//! Statements 1 and 4 (section 2.1): the sign of the canonical volume, a form that is not contact, a field that is not
+//! conformal.
 
-use crate::common::{over_catalogue, over_discretisations, pairs, systems};
-use contact_geom::{ChartVector, Darboux, Form, GeometryError, Scalar, Smooth, Statement, generic};
+use contact_geom::{
+    ChartVector, Darboux, Form, GeometryError, Scalar, Smooth, hamiltonian::infinitesimal_conformality,
+    support::generic,
+};
 
-/// On every system of the catalogue.
-#[test]
-fn on_the_catalogue() {
-    assert_eq!(over_catalogue(Statement::Volume), systems());
-}
-
-/// With every discretisation of every system.
-#[test]
-fn with_every_discretisation() {
-    assert_eq!(over_discretisations(Statement::Volume), pairs().all);
-}
-
-/// The form dz is closed, so nowhere contact: the volume vanishes.
+/// The form dz is closed, so that it is nowhere a contact form: the volume vanishes.
 #[test]
 fn a_closed_form_is_not_contact() {
     struct Closed;
@@ -39,4 +29,18 @@ fn the_canonical_volume_has_its_sign() {
         generic::volume(&Darboux, &ChartVector::<3>::from_fn(|i| i as f64)),
     );
     assert_eq!(volumes, (Ok(1.0), Ok(-2.0), Ok(-6.0)));
+}
+
+/// A shear of z that is no contact Hamiltonian field is not conformal.
+#[test]
+fn another_field_is_not_conformal() {
+    struct Shear;
+    impl<const N: usize> Smooth<N> for Shear {
+        fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
+            Ok(ChartVector { x: x.y, y: x.x, z: x.x[0] * x.x[0] })
+        }
+    }
+    let x = ChartVector::<2>::from_fn(|i| 0.3 + i as f64);
+    let measured = infinitesimal_conformality(&Darboux, &Shear, &x);
+    assert!(measured.is_ok_and(|m| m.defect > 0.1), "{measured:?}");
 }

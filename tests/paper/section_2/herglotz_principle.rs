@@ -1,21 +1,17 @@
-//! Statement 10 (section 2.2.1): Herglotz' principle. The action with fixed ends is critical exactly on solutions, and
-//! `dZ/dz0 = e^(int L_z)`.
+//! Statement 10 (section 2.2.1), Herglotz' principle: the derivative of the action along curves that are no motions,
+//! `dZ/dz0`, and curves by splines.
 
-use crate::common::over_motions;
+use crate::common::lagrangians::LogarithmicWall;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, HarmonicOscillator, Pendulum, System};
-use contact_geom::{Lagrangian, Scalar, Statement};
-use exact_lagrangian::{Curve, ExactError, MotionCurve, SplineCurve, VariedCurve, action, action_derivative};
+use exact_lagrangian::{
+    ExactError,
+    principle::{Curve, MotionCurve, SplineCurve, VariedCurve, action, action_derivative},
+};
 use std::cell::Cell;
 
-/// Along random motions of every system, and along bent curves with the same ends.
-#[test]
-fn on_every_system() {
-    over_motions(Statement::HerglotzPrinciple);
-}
-
-/// The derivative of the action along a curve that is no solution is the slope of the action itself: central differences of step
-/// d, extrapolated once, err by d^4 and eps/d.
+/// The derivative of the action along a curve that is no solution against central differences of the action, whose
+/// error with step d, extrapolated once, is d^4 and eps/d.
 #[test]
 fn the_derivative_is_that_of_the_action() {
     let (system, span, d) = (CoupledInZ::default(), (0.3, 1.2), 1e-3);
@@ -32,8 +28,9 @@ fn the_derivative_is_that_of_the_action() {
     assert!(formula.abs() > 0.1);
 }
 
-/// The action of a spline through nodes of a motion tends to that of the motion with the sixth power of their distance: it is
-/// critical there, so that the error of the curve counts twice, and its velocity's is of the third order.
+/// The action of a spline through nodes of a motion converges to that of the motion with order 6 in the distance of the
+/// nodes: the velocity of the spline has order 3, and the action is critical, so that its error is quadratic in that of
+/// the curve.
 #[test]
 fn splines_through_nodes() {
     let (system, duration) = (Pendulum { gamma: -0.3 }, 2.0);
@@ -65,19 +62,11 @@ fn the_growth_of_dz_along_a_curve_at_rest() {
     }
 }
 
-/// A logarithm that ends at q = 0.
-struct Wall;
-impl Lagrangian<1> for Wall {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + q[0].ln() * 1e-3 - z * 0.1
-    }
-}
-
-/// A curve that leaves the domain of L: the time and the state on the curve.
+/// A curve that leaves the domain of L: the error has the time and the state on the curve.
 #[test]
 fn a_curve_that_leaves_the_domain() {
     let curve = |s: f64| (SVector::from([1.0 - s]), SVector::from([-1.0]));
-    match action(&Wall, &curve, (5.0, 3.0), 0.2) {
+    match action(&LogarithmicWall, &curve, (5.0, 3.0), 0.2) {
         Err(ExactError::OutsideDomain { t, reached, .. }) => {
             assert!(
                 t > 5.5 && t <= 6.0 && (reached.q[0] - (6.0 - t)).abs() < 1e-12 && reached.v[0] == -1.0,
@@ -102,7 +91,8 @@ impl<C: Curve<1>> Curve<1> for Counted<'_, C> {
     }
 }
 
-/// The action along a spline is computed from node to node, in both directions: else its kinks would cost thousands of evaluations.
+/// The action along a spline is integrated from node to node, in both directions: otherwise its kinks would cost
+/// thousands of evaluations.
 #[test]
 fn a_spline_breaks_at_its_nodes() {
     let times: Vec<f64> = (0..=8).map(|k| -1.0 + 0.25 * f64::from(k)).collect();
@@ -111,7 +101,7 @@ fn a_spline_breaks_at_its_nodes() {
     let still = |_: f64| (SVector::<f64, 1>::zeros(), SVector::<f64, 1>::zeros());
     assert_eq!(spline.breaks(), times);
     assert_eq!(VariedCurve { curve: &spline, variation: &still, by: 1.0 }.breaks(), times);
-    // There and back, by few evaluations: no panel contains a break.
+    // In both directions by few evaluations: no panel contains a break.
     let system = Pendulum { gamma: -0.3 };
     for duration in [-1.0, 1.0] {
         let counted = Counted { curve: &spline, count: Cell::new(0) };
@@ -123,7 +113,7 @@ fn a_spline_breaks_at_its_nodes() {
             pieces = action(&system, &piece, (from, 0.25 * duration), pieces).map_or(f64::NAN, |a| a.z);
         }
         assert!((whole - pieces).abs() < 1e-15);
-        // Each of the eight panels is looked at between its nodes as well.
+        // Each of the eight panels is checked between its nodes as well.
         assert!(counted.count.get() < 1000, "{} evaluations", counted.count.get());
     }
 }

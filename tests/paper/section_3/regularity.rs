@@ -1,18 +1,36 @@
-//! Statement 19 (section 3.1, theorem): the flow `Phi_d = (F-L_d)^-1 o F+L_d` exists exactly where F-L_d is a local
-//! diffeomorphism; a discrete Lagrangian that is not regular is refused.
+//! Statements 17 and 19 (section 3.1): discrete Lagrangians that are not regular.
 
-use crate::common::{over_discretisations, pairs};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement};
-use discrete_herglotz::{Flow, InputError, Midpoint, StepError, discrete_flow, discrete_regularity};
+use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError, StepError,
+    rules::{Flow, Midpoint},
+    theory::{discrete_flow, discrete_regularity},
+};
 
-/// F-L_d and F+L_d are inverted, with every discretisation of every system.
+/// Statement 17 at a point where the mixed derivative `D1 D2 L_d` vanishes: neither F+L_d nor F-L_d is a local
+/// diffeomorphism there.
 #[test]
-fn with_every_discretisation() {
-    assert_eq!(over_discretisations(Statement::DiscreteFlowExists), pairs().all);
+fn both_fail_together() {
+    struct Cubic;
+    impl DiscreteLagrangian<1> for Cubic {
+        fn step_size(&self) -> f64 {
+            1.0
+        }
+        fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+            let d = x.q1[0] - x.q0[0];
+            Ok(d * d * d + x.q0[0] * x.q0[0] - x.z0 * 0.1)
+        }
+    }
+    let determinants = |q1: f64| {
+        let jet = Cubic.second_jet(0.0, &DiscretePoint::new([0.0], [q1], 0.3));
+        jet.map(|j| (j.legendre_minus_jacobian().determinant(), j.legendre_plus_jacobian().determinant()))
+    };
+    assert_eq!(determinants(0.0), Ok((0.0, 0.0)));
+    assert!(determinants(0.5).is_ok_and(|(minus, plus)| minus != 0.0 && plus != 0.0));
 }
 
-/// A Lagrangian without kinetic energy gives a discrete one that is nowhere regular.
+/// Statement 19 for a Lagrangian without kinetic energy, whose discrete Lagrangian is nowhere regular.
 #[test]
 fn a_singular_one_is_refused() {
     struct NoInertia;
@@ -29,7 +47,7 @@ fn a_singular_one_is_refused() {
     assert!(matches!(step, Err(StepError::Singular { .. })), "{step:?}");
     let flow = Flow::from_points(&ld, 0.0, x).err();
     assert!(matches!(flow, Some(InputError::FirstStep(StepError::Singular { .. }))), "{flow:?}");
-    // L itself is not regular, which is said first.
+    // From a state the singularity of L itself is found first.
     let flow = Flow::new(&ld, 0.0, PhasePoint::new([0.3], [0.5], 0.0)).err();
     assert!(matches!(flow, Some(InputError::Geometry(GeometryError::Singular { .. }))), "{flow:?}");
 }

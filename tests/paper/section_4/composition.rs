@@ -1,6 +1,7 @@
-//! Composition: `L_{h1+h2}^e(q0, q2, z0) = L_{h1}^e(q0, q1, z0) + L_{h2}^e(q1, q2, z1)` at the critical `q1`, and only there.
+//! Composition: `L_{h1+h2}^e(q0, q2, z0) = L_{h1}^e(q0, q1, z0) + L_{h2}^e(q1, q2, z1)` at the critical `q1`, and only
+//! there.
 
-use crate::common::{AlongMotion, OverMotions};
+use crate::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, System, visit_catalogue};
@@ -21,17 +22,14 @@ fn on_every_system() {
             statements::composition(system, t, x, (0.12 * h, 0.18 * h))
         }
     }
-    visit_catalogue(&mut OverMotions(Composition));
+    visit_catalogue(&mut OverMotions { name: "composition".into(), bound: EXACT_TOLERANCE, residual: Composition });
 }
 
-/// The slope of a composition is the derivative of its value: central differences, extrapolated once.
+/// The slope of a composition is the derivative of its value, by central differences, extrapolated once.
 #[test]
 fn the_slope_is_that_of_the_value() {
     let system = CoupledInZ::default();
-    let (Ok(a), Ok(b)) = (ExactLagrangian::<_, 1>::new(&system, 0.3), ExactLagrangian::<_, 1>::new(&system, 0.4))
-    else {
-        return;
-    };
+    let [a, b] = [0.3, 0.4].map(|h| ExactLagrangian::<_, 1>::new(&system, h).unwrap());
     let ends = [SVector::from([0.3]), SVector::from([0.9])];
     let at = |q1: f64| through(&a, &b, 0.1, (&ends, 0.4), &SVector::from([q1]));
     let value = |q1: f64| at(q1).map_or(f64::NAN, |c| c.value);

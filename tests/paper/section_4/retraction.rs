@@ -1,18 +1,16 @@
-//! Statement 32 (section 4.1): `R_h^(e-)` inverts `exp_h`, and `R_h^(e+) = phi_h o R_h^(e-)`.
+//! Statement 32 (section 4.1): the exact retraction without a guess, at small steps, near conjugate points and by each
+//! of its routes.
 
-use crate::common::{AlongMotion, OverMotions, over_motions};
+use crate::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
-use contact_geom::{DiscretePoint, Lagrangian, MaxAbsOrNan, MaxOrNan, Scalar, Statement, VelocityPoint};
+use contact_geom::{
+    DiscretePoint, Lagrangian, Scalar, Statement, VelocityPoint,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+};
 use exact_lagrangian::{ContactExponential, ExactError, RetractionRoute, herglotz_flow, statements};
 
-/// Along random motions of every system, from a guess on their branch.
-#[test]
-fn on_every_system() {
-    over_motions(Statement::ExactRetractions);
-}
-
-/// Without a guess the motion that is found joins the points, whether or not it is the one that they were made from.
+/// Without a guess the motion that is found joins the points, but need not be the one from which they were made.
 #[test]
 fn without_a_guess() {
     struct Unguided;
@@ -28,7 +26,7 @@ fn without_a_guess() {
             let exp = ContactExponential::new(system, h)?;
             let y = exp.at(t, x)?;
             let found = match exp.retract(t, &y) {
-                // Two far points need not be joined by a motion near the straight line.
+                // Two distant points need not be joined by a motion near the straight line.
                 Err(ExactError::NotConverged { .. } | ExactError::ConjugatePoint { .. }) if h > 0.1 => return Ok(0.0),
                 found => found?,
             };
@@ -37,11 +35,12 @@ fn without_a_guess() {
             Ok((reached - y.q1).max_abs_or_nan() / (condition * (1.0 + y.q1.max_abs_or_nan())))
         }
     }
-    visit_catalogue(&mut OverMotions(Unguided));
+    let name = "statement 32 without a guess".into();
+    visit_catalogue(&mut OverMotions { name, bound: EXACT_TOLERANCE, residual: Unguided });
 }
 
-/// Down to h = 1e-8 the velocity is lost by what the condition of the exponential map says, and no more: the residual in its
-/// units stays round-off while the condition grows like 1/h.
+/// Down to h = 1e-8 the error of the velocity is that given by the condition of the exponential map: the residual in
+/// units of the condition stays at round-off while the condition grows like 1/h.
 #[test]
 fn the_loss_at_small_steps_is_the_condition() {
     let (system, x) = (Pendulum::default(), VelocityPoint::new([1.0], [0.7], 0.1));
@@ -55,8 +54,8 @@ fn the_loss_at_small_steps_is_the_condition() {
     }
 }
 
-/// Each route is taken where the one before fails, and says so: near a conjugate point the iteration with both ends given does not
-/// contract, and beyond it Newton's method may need to be led there.
+/// Each route is taken where the one before fails: near a conjugate point the iteration with both ends given does not
+/// contract, and beyond it Newton's method needs continuation.
 #[test]
 fn routes() {
     let route = |h: f64, q: f64, v: f64| {
@@ -67,12 +66,12 @@ fn routes() {
     assert_eq!(route(1.0, 0.4, 1.2), Ok((RetractionRoute::Collocation, false)));
     assert_eq!(route(3.0, 0.4, 1.2), Ok((RetractionRoute::Newton, false)));
     assert_eq!(route(3.2, 1.0, 0.0), Ok((RetractionRoute::Continuation, true)));
-    // Strong damping: the iteration with both ends given does not contract, Newton's method does.
+    // Under strong damping the iteration with both ends given does not contract, and Newton's method converges.
     for gamma in [-50.0, -20.0, 5.0] {
         let exp = ContactExponential::new(HarmonicOscillator { gamma }, 1.0).unwrap();
         let x = VelocityPoint::new([0.4], [1.2], 0.3);
         let found = exp.at(0.0, &x).and_then(|y| exp.retract(0.0, &y)).map_or(f64::NAN, |r| r.start.v[0]);
-        // dq1/dv0 is 1/50: 50 roundings of q.
+        // dq1/dv0 is 1/50, so that the error is that of 50 roundings of q.
         assert!((found - 1.2).abs() < 64.0 * 4.0 * f64::EPSILON, "gamma = {gamma}: {found}");
     }
 }
@@ -88,7 +87,7 @@ impl Lagrangian<2> for Tremor {
     }
 }
 
-/// An iteration that contracts slowly, near a conjugate point, is not taken for one that has ended.
+/// Slow contraction of the iteration, near a conjugate point, is not mistaken for convergence.
 #[test]
 fn a_slow_iteration_is_not_taken_for_one_that_has_ended() {
     for force in [1e-6, 1e-8, 1e-10, 1e-11, 1e-12, 1e-13] {
@@ -102,7 +101,8 @@ fn a_slow_iteration_is_not_taken_for_one_that_has_ended() {
     }
 }
 
-/// The end, the action and b of a retraction are those of the motion from its start, also after the last small change.
+/// The end, the action and b of a retraction are those of the motion from its start, also after the last small
+/// correction.
 #[test]
 fn the_end_belongs_to_the_start() {
     let pendulum = Pendulum { gamma: -0.05 };

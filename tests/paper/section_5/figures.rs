@@ -1,4 +1,4 @@
-//! The exact series of the paper's figures, and the discrete ones, against numbers that were computed elsewhere.
+//! The exact series of the paper's figures against numbers that were computed with 60 digits.
 
 use contact_geom::systems::{FreeParticle, HarmonicOscillator};
 use contact_geom::{Energy, SmoothFunction, VelocityPoint};
@@ -28,7 +28,7 @@ fn compare(expected: f64, computed: f64, size: f64, what: &str) {
     assert!((expected - computed).abs() <= 1e-13 * size, "{what}: {computed} instead of {expected}");
 }
 
-/// Within 1e-13, relative to the value; for the oscillator, which passes through zero, to the amplitude.
+/// Within 1e-13, relative to the value; for the oscillator, which passes through zero, relative to the amplitude.
 #[test]
 fn against_sixty_digits() {
     let free = FreeParticle { gamma: GAMMA };

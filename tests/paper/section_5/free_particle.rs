@@ -3,17 +3,22 @@
 
 use crate::common::{on_random, within};
 use contact_geom::systems::FreeParticle;
-use contact_geom::{DiscretePoint, MaxOrNan, Scalar, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Rectangle, StepError, discrete_flow, legendre_minus};
+use contact_geom::{DiscretePoint, Scalar, VelocityPoint, numbers::MaxOrNan};
+use discrete_herglotz::{
+    DiscreteLagrangian, StepError,
+    rules::{LeftMidpoint, Rectangle},
+    theory::{discrete_flow, legendre_minus},
+};
 use exact_lagrangian::QuadraticExact;
 
-/// The exact discrete Lagrangian as printed, with the wrong sign of z0.
-struct Misprinted {
-    gamma: f64,
-    h: f64,
+/// The formula that the paper prints for the exact discrete Lagrangian, with the term `- z0 (e^(gamma h) - 1)` of the
+/// wrong sign.
+pub struct Printed {
+    pub gamma: f64,
+    pub h: f64,
 }
 
-impl DiscreteLagrangian<1> for Misprinted {
+impl DiscreteLagrangian<1> for Printed {
     fn step_size(&self) -> f64 {
         self.h
     }
@@ -32,8 +37,8 @@ fn random(name: &str, check: impl Fn(f64, f64, &DiscretePoint<1>) -> f64) {
     });
 }
 
-/// `q2 = (h gamma + 2) q1 - (h gamma + 1) q0`, `z1 = (q1 - q0)^2/(2h) + (h gamma + 1) z0`; the rectangle and the midpoint rule
-/// are the same for this L.
+/// `q2 = (h gamma + 2) q1 - (h gamma + 1) q0`, `z1 = (q1 - q0)^2/(2h) + (h gamma + 1) z0`; the rectangle and the
+/// midpoint rule are the same for this L.
 #[test]
 fn explicit_step() {
     random("free particle", |gamma, h, x| {
@@ -50,8 +55,8 @@ fn explicit_step() {
     });
 }
 
-/// The corrected exact discrete Lagrangian has the paper's closed form, steps along the true motion, and
-/// `D_z L^e = e^(gamma h) - 1`.
+/// The corrected exact discrete Lagrangian has the paper's closed form, its steps are on the true motion, and `D_z L^e
+/// = e^(gamma h) - 1`.
 #[test]
 fn exact_discrete_lagrangian() {
     random("exact free particle", |gamma, h, x| {
@@ -69,11 +74,12 @@ fn exact_discrete_lagrangian() {
     });
 }
 
-/// The printed one, with the wrong sign of z0, misses the theorem F-L^e = FL o R^- by the factor that its sigma_d is wrong by.
+/// The printed formula, with the wrong sign of z0, violates the theorem F-L^e = FL o R^- by the factor by which its
+/// sigma_d is wrong.
 #[test]
 fn the_printed_one_is_wrong() {
     let (gamma, h) = (-0.05f64, 0.5);
-    let ld = Misprinted { gamma, h };
+    let ld = Printed { gamma, h };
     let system = FreeParticle { gamma };
     let p0 = legendre_minus(&ld, 0.0, &DiscretePoint::new([0.0], [1.0], 0.0)).map(|s| s.p[0]);
     let v0 = system.velocity_through(0.0, 1.0, h);

@@ -1,19 +1,21 @@
-//! Statement 40 (section 6, future work): the orders of `L_d - L_h^e`, of the discrete Legendre transforms, and of the flow.
+//! Statement 40 (section 6, future work): the orders of `L_d - L_h^e`, of the discrete Legendre transforms, and of the
+//! flow.
 
-use crate::common::discretise;
+use crate::table::discretise;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use discrete_herglotz::Method;
+use discrete_herglotz::rules::Method;
 use exact_lagrangian::{ExactLagrangian, Order, error_orders};
 
-/// One of many points without symmetry.
+/// A point of the unit cube without symmetry; `which` selects one of many.
 fn fractions(n: usize, which: f64) -> Vec<f64> {
     (0..n)
         .map(|i| (which * [2.0f64, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0][i % 10].sqrt()).fract())
         .collect()
 }
 
-/// With each method of order r on every system: `r + 1` for the value and the flow, r for the transforms, which are derivatives at
-/// the scale h. Each slope within 0.15. At some point a leading error may all but vanish: then the slopes are those of another.
+/// With each method of order r on every system: `r + 1` for the value and the flow, r for the transforms, which are
+/// derivatives at the scale h. Each slope within 0.15. Where the leading error almost vanishes at a point, the slopes
+/// are taken at another point.
 #[test]
 fn every_method_on_every_system() {
     struct Systems;
@@ -23,7 +25,7 @@ fn every_method_on_every_system() {
                 let outcome = slopes(system, method, 4.0).or_else(|first| {
                     slopes(system, method, 5.0).map_err(|second| format!("{first}; elsewhere {second}"))
                 });
-                assert_eq!(outcome, Ok(()), "{} with {method}", system.name());
+                assert_eq!(outcome, Ok(()), "statement 40 on {} with {method}", system.name());
             }
         }
     }
@@ -56,7 +58,7 @@ fn slopes<const N: usize, S: System<N>>(system: &S, method: Method, which: f64) 
     Ok(())
 }
 
-/// The exact one is exact: all its errors are round-off, at every step.
+/// All errors of the exact discrete Lagrangian are round-off, at every step.
 #[test]
 fn the_exact_one() {
     struct Systems;
@@ -67,7 +69,7 @@ fn the_exact_one() {
             let flat = orders.is_ok_and(|o| {
                 [o.value, o.legendre_minus, o.legendre_plus, o.flow].iter().all(|m| m.order == Order::Exact)
             });
-            assert!(flat, "{}", system.name());
+            assert!(flat, "statement 40 on {} with L_h^e", system.name());
         }
     }
     visit_catalogue(&mut Systems);

@@ -1,18 +1,22 @@
-//! Orders of the discretisations in q, p and z, by slope on problems nonlinear in q and z.
+//! Orders of the methods in q, p and z, by slope on problems nonlinear in q and z.
 //!
-//! The errors against an independent integrator are fitted over steps small enough for the asymptotic regime, where they are
-//! well above its own error; the band of 0.15 is the field's.
+//! The errors against an independent integrator are fitted over steps small enough for the asymptotic regime, where
+//! they are well above the error of that integrator; a slope may differ from the order by 0.15.
 
-use crate::common::discretise;
 use crate::common::oracle::motion;
+use crate::common::slope;
+use crate::table::discretise;
 use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, QuadraticInZ, Relativistic, System};
-use contact_geom::{MaxAbsOrNan, PhasePoint, legendre};
-use discrete_herglotz::{Flow, Method, Stepper};
+use contact_geom::{PhasePoint, legendre, numbers::MaxAbsOrNan};
+use discrete_herglotz::{
+    Stepper,
+    rules::{Flow, Method},
+};
 
 /// The time over which the error is taken.
 const SPAN: f64 = 1.0;
 
-/// Ten times the integrator's tolerance: smaller errors are not fitted.
+/// Ten times the tolerance of the integrator: smaller errors are not fitted.
 const FLOOR: f64 = 3e-13;
 
 /// The errors in q, p and z at the end for a number of steps.
@@ -31,20 +35,11 @@ fn errors<const N: usize, S: System<N>>(method: Method, system: &S, steps: usize
     })
 }
 
-/// The least-squares slope of log error against log step.
-fn slope(points: &[(f64, f64)]) -> f64 {
-    let logs: Vec<_> = points.iter().map(|(h, e)| (h.ln(), e.ln())).collect();
-    let n = logs.len() as f64;
-    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-    let covariance: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
-    covariance / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
-}
-
 fn measure<const N: usize, S: System<N>>(system: &S) {
     let t0 = system.initial_time();
     let truth = legendre(system, t0 + SPAN, &motion(system, t0, &system.initial(), SPAN));
     for method in Method::applicable(&system.structure()) {
-        // Of order 4 and more, smaller steps leave errors near those of the integrator.
+        // For order 4 and more, smaller steps leave errors close to those of the integrator.
         let counts = match method.order() {
             1 | 2 => [64, 128, 256, 512],
             4 => [8, 16, 32, 64],
@@ -68,7 +63,8 @@ fn measure<const N: usize, S: System<N>>(system: &S) {
     }
 }
 
-/// Nonlinear in q and z, one with W depending on q, v and z; strong drag shows the first order of the rules explicit in z.
+/// Problems nonlinear in q and z, one with W depending on q, v and z; under strong drag the rules explicit in z have
+/// order one.
 #[test]
 fn orders_by_slope() {
     measure(&QuadraticInZ { c: 1.0 });

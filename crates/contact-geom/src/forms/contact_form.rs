@@ -1,4 +1,4 @@
-//! Contact forms: what follows from eta and d eta at a point.
+//! Contact forms, and the operations that eta and d eta determine at a point.
 
 use crate::forms::smooth::apply_transposed;
 use crate::{ChartVector, GeometryError, Smooth};
@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// A contact form on a manifold of dimension `2N + 1`, in a chart; paper, section 2.1.
 ///
-/// Only `eta` and `d_eta` are asked for; volume, Reeb field, flat and sharp follow for any form by the functions of
-/// [`generic`], and a form that has them in closed form overrides them.
+/// Only `eta` and `d_eta` are required; volume, Reeb field, flat and sharp of any form are computed by the functions of
+/// [`generic`], and a form with closed expressions for them overrides these methods.
 pub trait ContactForm<const N: usize> {
     /// The covector `eta(x)`.
     ///
@@ -90,7 +90,8 @@ impl<const N: usize, S: Smooth<N>> ContactForm<N> for Form<S> {
     }
 }
 
-/// What eta and d eta at a point determine, for any contact form: the routes that closed forms are tested against.
+/// The operations that eta and d eta at a point determine, for any contact form. Closed expressions are tested against
+/// them.
 pub mod generic {
     use super::*;
 

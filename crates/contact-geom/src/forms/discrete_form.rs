@@ -16,8 +16,8 @@ pub struct DiscreteJet<const N: usize> {
     pub d2: SVector<f64, N>,
     /// `Dz L_d`, the derivative in `z0`.
     pub dz: f64,
-    /// `sigma_d = 1 + Dz L_d`, the conformal factor of the step. Kept apart: where the drag is strong, `1 + dz` has lost
-    /// its digits.
+    /// `sigma_d = 1 + Dz L_d`, the conformal factor of the step. It is stored separately, since `1 + dz` has lost its
+    /// digits where the drag is strong.
     sigma: f64,
 }
 
@@ -28,7 +28,7 @@ impl<const N: usize> DiscreteJet<N> {
         DiscreteJet { value, d1, d2, dz, sigma: 1.0 + dz }
     }
 
-    /// The jet with a `sigma_d` that is known to more digits than `1 + dz`.
+    /// The jet with a `sigma_d` that is more accurate than `1 + dz`.
     #[inline(always)]
     pub fn with_sigma(self, sigma: f64) -> Self {
         DiscreteJet { sigma, ..self }
@@ -103,8 +103,8 @@ impl<const N: usize> SecondDiscreteJet<N> {
         })
     }
 
-    /// How regular F-L_d is here: the singular values of its derivative in `q1`, on which it being a local
-    /// diffeomorphism rests.
+    /// The regularity of F-L_d at this point: the singular values of its derivative in `q1`. F-L_d is a local
+    /// diffeomorphism where the smallest does not vanish.
     pub fn regularity(&self) -> Regularity {
         let fibre = self.start_momentum().p_y;
         Regularity::of(DMatrix::from_fn(N, N, |i, j| fibre[(i, j)]))
@@ -113,7 +113,7 @@ impl<const N: usize> SecondDiscreteJet<N> {
 
 /// The form `eta- = (F-L_d)^* eta = dz0 + D1 L_d / (1 + Dz L_d) dq0`; paper, section 3.1.
 ///
-/// The field is a function that gives the second jet of `L_d` at a point.
+/// The tuple field is a function that returns the second jet of `L_d` at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct EtaMinus<F>(pub F);
 
@@ -135,7 +135,7 @@ where
 
 /// The form `eta+ = (F+L_d)^* eta = (1 + Dz L_d) dz0 + D1 L_d dq0 = sigma_d eta-`; paper, section 3.1.
 ///
-/// The field is a function that gives the second jet of `L_d` at a point.
+/// The tuple field is a function that returns the second jet of `L_d` at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct EtaPlus<F>(pub F);
 
@@ -149,7 +149,7 @@ where
     }
 
     fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
-        // d(z0 + L_d) - D2 dq1 differentiated: dq1 ^ d(D2).
+        // The differential of d(z0 + L_d) - D2 dq1 is dq1 ^ d(D2).
         let jet = (self.0)(&(*x).into())?;
         Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match (i, j) {
             (i, j) if i < N && j >= N && j < 2 * N => -jet.d12[(i, j - N)],
@@ -166,7 +166,7 @@ where
         Ok(EtaMinus(&self.0).volume(x)? * sigma.powi(N as i32 + 1))
     }
 
-    /// `R+` moves neither `q1` nor `D2 L_d`: `R+ = (a, 0, c)` with `D21 a + D2z c = 0` and `D1 a + sigma_d c = 1`.
+    /// `R+` leaves `q1` and `D2 L_d` unchanged: `R+ = (a, 0, c)` with `D21 a + D2z c = 0` and `D1 a + sigma_d c = 1`.
     fn reeb(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         let jet = (self.0)(&(*x).into())?;
         let mut a = -jet.d2z;

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// The one-form `eta = dz - P dx` at a point, with the derivatives of `P(x, y, z)` there.
 ///
-/// It is the pullback of Darboux' form along `(x, y, z) -> (x, P, z)`, and contact exactly where `dP/dy` is regular. With
-/// `P = L_v` it is eta_L on TQ x R; with `P = -D1 L_d / (1 + Dz L_d)` it is eta- on Q x Q x R.
+/// It is the pullback of Darboux' form along `(x, y, z) -> (x, P, z)`, and contact exactly where `dP/dy` is regular.
+/// With `P = L_v` it is eta_L on TQ x R; with `P = -D1 L_d / (1 + Dz L_d)` it is eta- on Q x Q x R.
 pub(crate) struct FibreForm<const N: usize> {
     /// The momentum `P`.
     pub p: SVector<f64, N>,
@@ -18,11 +18,11 @@ pub(crate) struct FibreForm<const N: usize> {
     pub p_y: SMatrix<f64, N, N>,
     /// `dP_i / dz`.
     pub p_z: SVector<f64, N>,
-    /// What `dP/dy` is in the field's terms, for an error.
+    /// The usual name of `dP/dy`, for errors.
     pub what: &'static str,
 }
 
-/// What to do where the fibre derivative is singular.
+/// The suggestion for the caller where the fibre derivative is singular.
 const REMEDY: &str = "the form is not contact here; choose a regular Lagrangian, or a point where it is regular";
 
 impl<const N: usize> FibreForm<N> {
@@ -64,7 +64,8 @@ impl<const N: usize> FibreForm<N> {
         }
     }
 
-    /// Solves `flat(v) = alpha` block by block: `v_x` from the second block, `eta(v)` from the third, `v_y` from the first.
+    /// Solves `flat(v) = alpha` block by block: `v_x` from the second block, `eta(v)` from the third, `v_y` from the
+    /// first.
     pub fn sharp(&self, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         let mut x = alpha.y;
         solve(&mut self.p_y.transpose(), &mut x).map_err(|e| e.of(self.what, REMEDY))?;
@@ -76,7 +77,7 @@ impl<const N: usize> FibreForm<N> {
     }
 }
 
-/// The methods of [`ContactForm`](crate::ContactForm) by those of the [`FibreForm`] at a point.
+/// Implements the methods of [`ContactForm`](crate::ContactForm) by those of the [`FibreForm`] at a point.
 macro_rules! contact_form_by_fibre {
     () => {
         fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {

@@ -4,13 +4,13 @@ use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
 use crate::{ChartVector, ContactForm, Derivatives, GeometryError, Lagrangian, Scalar, Smooth};
 use nalgebra::{DMatrix, SVector};
 
-/// `eta_L = dz - theta_L` with `theta_L = L_v dq`, at a fixed time; contact exactly where L is regular. Its Reeb field is
-/// `R_L = d/dz - W^-1 L_vz d/dv`; paper, section 2.2.
+/// `eta_L = dz - theta_L` with `theta_L = L_v dq`, at a fixed time; contact exactly where L is regular. Its Reeb field
+/// is `R_L = d/dz - W^-1 L_vz d/dv`; paper, section 2.2.
 #[derive(Clone, Copy, Debug)]
 pub struct LagrangianForm<'a, L> {
     /// The Lagrangian.
     pub lagrangian: &'a L,
-    /// The time at which it is taken.
+    /// The time at which it is evaluated.
     pub t: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::{
 };
 use nalgebra::{DVector, SVector};
 
-/// Coordinates `(x, y, z)` in `R^N x R^N x R`: of a point in a chart, of a tangent vector or of a covector.
+/// The coordinates `(x, y, z)` in `R^N x R^N x R` of a point in a chart, of a tangent vector or of a covector.
 ///
 /// All three contact manifolds have this shape: `(q, p, z)` on T\*Q x R, `(q, v, z)` on TQ x R, `(q0, q1, z0)` on
 /// Q x Q x R. As a matrix index the order is `x_1..x_N, y_1..y_N, z`.
@@ -99,7 +99,7 @@ impl<const N: usize> ChartVector<N> {
         DVector::from_fn(Self::DIMENSION, |i, _| self.component(i))
     }
 
-    /// The largest absolute component; not a number where a component is not, unlike nalgebra's function of this name.
+    /// The largest absolute component; NaN where a component is NaN, unlike nalgebra's function of this name.
     pub fn amax(&self) -> f64 {
         self.x.max_abs_or_nan().max_or_nan(self.y.max_abs_or_nan()).max_or_nan(self.z.abs())
     }
@@ -202,7 +202,7 @@ point!(
     VelocityPoint, q: "Position.", v: "Velocity, position per time.", z: "Action."
 );
 point!(
-    /// A point `(q, p, z)` of T\*Q x R: position, momentum, action. The working state of every flow.
+    /// A point `(q, p, z)` of T\*Q x R: position, momentum, action. Flows act on points of this type.
     PhasePoint, q: "Position.", p: "Momentum, action per position.", z: "Action."
 );
 point!(
@@ -210,7 +210,7 @@ point!(
     DiscretePoint, q0: "Position at the start of the step.", q1: "Position at its end.", z0: "Action at its start."
 );
 
-/// The entries as a vector of `N`.
+/// The entries as a vector of dimension `N`.
 fn sized<const N: usize>(what: &'static str, entries: &[f64]) -> Result<SVector<f64, N>, GeometryError> {
     if entries.len() != N {
         return Err(GeometryError::WrongSize { what, expected: N, found: entries.len() });

@@ -1,10 +1,11 @@
-//! Pullbacks of contact forms: is a map contact, and with which conformal factor?
+//! Pullbacks of contact forms, and the conformal factor and conformality defect of a map.
 
 use crate::forms::smooth::apply_transposed;
 use crate::{ChartVector, ContactForm, GeometryError, Smooth, numbers::MaxAbsOrNan};
 use nalgebra::DMatrix;
 
-/// The pullback of a contact form along a map at a point, compared with the contact form there: `F* tau = sigma eta`?
+/// The pullback of a contact form along a map at a point, compared with a multiple of the contact form there,
+/// `F* tau = sigma eta`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conformality<const N: usize> {
     /// The covector `F* tau`.
@@ -13,15 +14,15 @@ pub struct Conformality<const N: usize> {
     pub sigma: f64,
     /// The largest component of `F* tau - sigma eta`, relative to the largest of `F* tau`.
     ///
-    /// Round-off (times the condition of the Jacobian) for a conformal contactomorphism, of the size of the local error
-    /// for a map that only approximates one.
+    /// It is round-off (times the condition number of the Jacobian) for a conformal contactomorphism, and of the size
+    /// of the local error for a map that approximates one.
     pub defect: f64,
 }
 
 /// Pulls `target` back along a map from the chart of `source`, and measures how conformal the map is at `x`.
 ///
-/// The map is any smooth one, given as a generic function: a step of an integrator of your own, say, which so answers
-/// whether it is contact. Where only the Jacobian at a point is at hand, use [`conformality_with_jacobian`].
+/// The map is any smooth map given as a generic function, for example one step of an integrator, to test whether it is
+/// contact. If only the image and the Jacobian at a point are available, use [`conformality_with_jacobian`].
 ///
 /// # Errors
 /// Those of the map and of the forms.
@@ -55,7 +56,7 @@ pub fn conformality_with_jacobian<const N: usize>(
     let pullback = apply_transposed(jacobian, &target.eta(image)?);
     let sigma = pullback.dot(&source.reeb(x)?);
     let (difference, size) = (pullback.minus(source.eta(x)?.scale(sigma)).max_abs_or_nan(), pullback.max_abs_or_nan());
-    // A map that sends everything to one point pulls back nothing: conformal, with the factor 0.
+    // The pullback along a constant map is 0, which is conformal with the factor 0.
     let defect = if difference == 0.0 && size == 0.0 { 0.0 } else { difference / size };
     Ok(Conformality { pullback, sigma, defect })
 }

@@ -23,8 +23,8 @@ impl<const N: usize, F: SmoothFunction<N>> SmoothFunction<N> for &F {
     }
 }
 
-/// `2N + 1` components that depend smoothly on a point: the coordinates of a map's image, the components of a vector field
-/// or those of a one-form.
+/// `2N + 1` components that depend smoothly on a point: the coordinates of a map's image, the components of a vector
+/// field or those of a one-form.
 pub trait Smooth<const N: usize> {
     /// The components at the point with coordinates `x`.
     ///
@@ -55,7 +55,7 @@ impl<const N: usize, S: Smooth<N>> Smooth<N> for &S {
     }
 }
 
-/// A vector or covector as a matrix product: `m v` in the coordinates' order.
+/// The matrix product `m v`, in the order of the coordinates.
 pub(crate) fn apply<const N: usize>(m: &DMatrix<f64>, v: &ChartVector<N>) -> ChartVector<N> {
     let image = m * v.to_vector();
     ChartVector::from_fn(|i| image[i])

@@ -1,6 +1,6 @@
 //! Dual numbers: a value with its differential along given directions.
 
-// The product and quotient rules mix operations: clippy takes that for a slip.
+// The product and quotient rules mix operations, which clippy reports as suspicious.
 #![allow(clippy::suspicious_arithmetic_impl)]
 
 use crate::{Scalar, numbers::TangentVector};
@@ -27,10 +27,11 @@ pub struct Dual<T, D> {
     pub d: D,
 }
 
-/// The same number for kernels over vector registers: a [`Dual`] all of whose operations become part of the code that calls them.
+/// A [`Dual`] for SIMD kernels: all of its operations are inlined into the code that calls them.
 ///
-/// A kernel finds its instruction set at run time, and what is not merged into it is compiled without that set, at twenty times
-/// the cost. Of nested duals, and of long programs in them, the merged code would be too long to compile; they are [`Dual`]s.
+/// The instruction set of a kernel is selected at run time, and functions that are not inlined into the kernel are
+/// compiled without it, at twenty times the cost. For nested duals, and for long programs on them, the inlined code
+/// would be too long to compile; they use [`Dual`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KernelDual<T, D> {
     /// The value.
@@ -39,7 +40,7 @@ pub struct KernelDual<T, D> {
     pub d: D,
 }
 
-/// The arithmetic, with what the compiler is told of its functions.
+/// The arithmetic, with the given inline attribute on its functions.
 macro_rules! arithmetic {
     ($Dual:ident, $inline:meta) => {
         impl<T: Scalar, D: TangentVector<T>> $Dual<T, D> {
@@ -55,7 +56,7 @@ macro_rules! arithmetic {
                 $Dual { re: value, d: self.d.scaled(slope) }
             }
 
-            /// The same where the slope may be infinite at a finite value.
+            /// The chain rule where the slope may be infinite at a finite value.
             #[$inline]
             fn chain_from_root(self, value: T, slope: T) -> Self {
                 $Dual { re: value, d: self.d.each(|x| x.along_slope(slope)) }
@@ -240,11 +241,12 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn powf(self, a: f64) -> Self {
-                // The value by itself: the power below is infinite at 0, and leaves the range of numbers before the value does.
+                // The value is computed separately: the power in the slope is infinite at 0, and overflows or
+                // underflows before the value does.
                 match a {
                     0.0 => Self::one(),
                     1.0 => self,
-                    // Infinite at 0 itself: no derivative is made up there.
+                    // The value itself is infinite at 0, and a differential of 0 gives NaN there.
                     _ if a < 0.0 => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
                     _ => self.chain_from_root(self.re.powf(a), self.re.slope_power(a - 1.0) * a),
                 }

@@ -2,8 +2,9 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`, by Bonnet's recursion, as many as there is room for; those beyond `P_s` stay 1. Of
-/// numbers of any precision, as the nodes of Gauss collocation ask for.
+/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`, by Bonnet's recursion, as many as fit into the array; the
+/// entries beyond `P_s` are 1. The number type is generic, since the nodes of Gauss collocation are needed in different
+/// precisions.
 ///
 /// ```
 /// let p: [f64; 4] = contact_geom::support::legendre_polynomials(3, 0.5);

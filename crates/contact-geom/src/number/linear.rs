@@ -1,10 +1,10 @@
-//! Linear systems on the stack, over any scalar.
+//! Small linear systems over any scalar, solved in place.
 
 use crate::{GeometryError, Scalar};
 use nalgebra::{Dim, Matrix, StorageMut, U1};
 use thiserror::Error;
 
-/// A matrix that has no inverse, or entries that are not finite.
+/// The error for a matrix that has no inverse, or entries that are not finite.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error("singular matrix (pivot {pivot:e})")]
 pub struct SingularMatrix {
@@ -13,17 +13,17 @@ pub struct SingularMatrix {
 }
 
 impl SingularMatrix {
-    /// The error of the geometry that says which matrix this is in the field's terms, and what to do.
+    /// The corresponding error of the geometry, with the usual name of the matrix and a suggestion for the caller.
     pub fn of(self, what: &'static str, remedy: &'static str) -> GeometryError {
         GeometryError::Singular { what, pivot: self.pivot, remedy }
     }
 }
 
-/// Solves `a x = b` by elimination with row pivoting, in place, over any [`Scalar`]; `a` and `b` are used up. Returns the
-/// determinant of `a`, the product of the pivots.
+/// Solves `a x = b` by Gaussian elimination with partial pivoting, over any [`Scalar`]. The solution overwrites `b`,
+/// and `a` is overwritten as well. Returns the determinant of `a`, the product of the pivots.
 ///
-/// nalgebra's factorisations ask for a field, which duals are not; and for the sizes of few-body mechanics this is faster
-/// than any library call. Its cost is `N^3 / 3` products.
+/// nalgebra's factorisations require a field, which dual numbers are not; for the sizes of few-body mechanics this
+/// function is also faster than any library call. Its cost is `N^3 / 3` products.
 ///
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.
@@ -35,7 +35,7 @@ pub fn solve<T: Scalar, D: Dim>(
     solve_in_kernel(a, b)
 }
 
-/// The same as a part of the code that calls it, for kernels over vector registers; see [`KernelDual`](crate::support::KernelDual).
+/// The same, inlined into the calling code, for SIMD kernels; see [`KernelDual`](crate::support::KernelDual).
 ///
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.

@@ -1,9 +1,9 @@
-//! The largest of numbers among which there may be one that is not a number.
+//! Maxima that propagate NaN.
 
 use nalgebra::{Dim, Matrix, RawStorage};
 
-/// The larger of two numbers; not a number where one is not. `f64::max` and nalgebra's `amax` lose a NaN, and a check that
-/// uses them cannot fail on it.
+/// The larger of two numbers; NaN where one of them is NaN. `f64::max` and nalgebra's `amax` discard a NaN, so that a
+/// check that uses them cannot detect it.
 ///
 /// ```
 /// use contact_geom::numbers::max_or_nan;
@@ -12,11 +12,11 @@ use nalgebra::{Dim, Matrix, RawStorage};
 /// ```
 #[inline(always)]
 pub fn max_or_nan(a: f64, b: f64) -> f64 {
-    // Where b is not a number neither comparison holds.
+    // If b is NaN, the comparison is false and b is returned.
     if a >= b || a.is_nan() { a } else { b }
 }
 
-/// The largest absolute value, 0 of nothing; not a number where an entry is not.
+/// The largest absolute value; 0 if there are no entries, NaN if an entry is NaN.
 ///
 /// ```
 /// use contact_geom::numbers::max_abs_or_nan;
@@ -28,9 +28,9 @@ pub fn max_abs_or_nan(entries: impl IntoIterator<Item = f64>) -> f64 {
     entries.into_iter().fold(0.0, |m, e| max_or_nan(m, e.abs()))
 }
 
-/// [`max_or_nan`] as a method: for chains, where `max` would lose a NaN.
+/// [`max_or_nan`] as a method, for chains of calls.
 pub trait MaxOrNan {
-    /// The larger of two numbers; not a number where one is not.
+    /// The larger of two numbers; NaN where one of them is NaN.
     #[must_use]
     fn max_or_nan(self, other: Self) -> Self;
 }
@@ -42,7 +42,7 @@ impl MaxOrNan for f64 {
     }
 }
 
-/// [`max_abs_or_nan`] of a matrix or a vector, for which nalgebra's `amax` would lose a NaN.
+/// [`max_abs_or_nan`] of a matrix or a vector, where nalgebra's `amax` would discard a NaN.
 ///
 /// ```
 /// use contact_geom::{nalgebra::Vector2, numbers::{MaxOrNan, MaxAbsOrNan}};
@@ -50,7 +50,7 @@ impl MaxOrNan for f64 {
 /// assert!(Vector2::new(f64::NAN, -3.0).max_abs_or_nan().max_or_nan(2.0).is_nan());
 /// ```
 pub trait MaxAbsOrNan {
-    /// The largest absolute entry, 0 of nothing; not a number where an entry is not.
+    /// The largest absolute entry; 0 if there are no entries, NaN if an entry is NaN.
     fn max_abs_or_nan(&self) -> f64;
 }
 

@@ -1,20 +1,20 @@
-//! What a differential is an element of.
+//! The modules of which differentials are elements.
 
 use crate::Scalar;
 use nalgebra::SVector;
 use std::fmt::Debug;
 
-/// The free module that a differential lives in: one component of `T` for each direction.
+/// An element of the free module of differentials: one component of `T` for each direction.
 ///
-/// Its shape is chosen by what is wanted: [`SVector`] for `N` directions, [`AugmentedVector`] for `N + 1`,
-/// [`ChartVector`](crate::ChartVector) for all `2N + 1` coordinates of a contact manifold. So no direction is carried that nobody
-/// asked for.
+/// The type determines the directions: [`SVector`] has `N` directions, [`AugmentedVector`] `N + 1`, and
+/// [`ChartVector`](crate::ChartVector) all `2N + 1` coordinates of a contact manifold. Only the requested directional
+/// derivatives are carried.
 pub trait TangentVector<T>: Copy + PartialEq + Debug + 'static {
     /// The differential of a constant.
     fn null() -> Self;
     /// Applies `f` to each component.
     fn each(self, f: impl FnMut(T) -> T) -> Self;
-    /// Joins the components of two elements by `f`.
+    /// Combines the components of two elements by `f`.
     fn join(self, other: Self, f: impl FnMut(T, T) -> T) -> Self;
     /// `a self`.
     fn scaled(self, a: T) -> Self;

@@ -1,4 +1,4 @@
-//! [`Scalar`] for num-dual's numbers, an independent oracle for the derivatives.
+//! [`Scalar`] for the dual numbers of the crate num-dual, for an independent check of the derivatives.
 
 use crate::Scalar;
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
@@ -9,7 +9,7 @@ macro_rules! scalar {
             fn re(self) -> f64 {
                 self.re
             }
-            /// Of the value alone: num-dual has no common access to the differentials.
+            /// The extent of the value alone, since num-dual has no uniform access to the differentials.
             fn extent(self) -> f64 {
                 Scalar::extent(self.re)
             }

@@ -1,7 +1,8 @@
-//! The operators that every number needs beside its own.
+//! A macro for the operators of number types.
 
-/// The operators of a [`Scalar`](crate::Scalar) from its four rules of arithmetic: `+ - * /` with numbers of its kind and with `f64`, the
-/// assigning ones, 0 and 1. The type has `From<f64>`, `PartialEq` and `Copy`; its parameters, if it has any, stand in brackets.
+/// Implements the operators of a [`Scalar`](crate::Scalar) from its four rules of arithmetic: `+ - * /` with numbers of
+/// its type and with `f64`, the assignment operators, 0 and 1. The type must implement `From<f64>`, `PartialEq` and
+/// `Copy`; its generic parameters, if any, are given in brackets.
 ///
 /// ```
 /// /// A number with a note of what was added to it.

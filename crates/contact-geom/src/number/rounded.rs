@@ -1,13 +1,13 @@
-//! Numbers that know the size of the terms they came from.
+//! Numbers with a running error bound.
 
 use crate::{Scalar, scalar_operators};
 use std::ops::Neg;
 
-/// A number with the size of its terms: a running bound of its rounding error, in units of the machine's epsilon.
+/// A number with the size of its terms: a running bound of its rounding error, in units of machine epsilon.
 ///
-/// Of a sum that vanishes but for rounding, `value / size` is at most about epsilon; of one that does not cancel it is of the
-/// order of one. The quotient does not depend on any unit, so that it tells a zero from a small number whatever the scale.
-/// Constants are exact. (N. J. Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3.)
+/// For a sum that vanishes up to rounding, `value / size` is at most about epsilon; for a sum without cancellation it
+/// is of order one. The quotient does not depend on units, so that it distinguishes zero from a small number at any
+/// scale. Constants are exact. (N. J. Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3.)
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounded {
     pub value: f64,
@@ -15,21 +15,21 @@ pub(crate) struct Rounded {
 }
 
 impl Rounded {
-    /// The result of one more operation: what the operands' errors give, and one rounding. Below the normal numbers a
-    /// rounding is absolute.
+    /// The result of an operation: the propagated errors of the operands and one rounding. The rounding of subnormal
+    /// numbers is absolute.
     #[inline]
     fn new(value: f64, carried: f64) -> Self {
         let rounding = if value == 0.0 { 0.0 } else { value.abs() + f64::MIN_POSITIVE };
         Rounded { value, size: carried + rounding }
     }
 
-    /// `f(x)` given its value and its slope. An exact argument carries nothing, however steep the function.
+    /// `f(x)` given its value and its slope. An exact argument contributes no error, however large the slope.
     #[inline]
     fn through(self, value: f64, slope: f64) -> Self {
         Rounded::new(value, if self.size == 0.0 { 0.0 } else { slope.abs() * self.size })
     }
 
-    /// The value relative to its terms; 0 for a zero of no terms, not a number where either is not finite.
+    /// The value relative to its terms; 0 if it is zero, NaN if the value or its size is not finite.
     pub fn relative(self) -> f64 {
         if !(self.value.is_finite() && self.size.is_finite()) {
             f64::NAN
@@ -48,7 +48,7 @@ impl From<f64> for Rounded {
     }
 }
 
-/// Of equal value, however it came about.
+/// Compares the values alone.
 impl PartialEq for Rounded {
     fn eq(&self, b: &Self) -> bool {
         self.value == b.value
@@ -97,7 +97,7 @@ impl Scalar for Rounded {
         let r = self.value.sqrt();
         self.through(r, 0.5 / r)
     }
-    /// As many roundings as there may be products.
+    /// Counts as many roundings as there may be products.
     fn powi(self, n: i32) -> Self {
         let (value, n_real) = (self.value.powi(n), f64::from(n));
         let mut power = self.through(value, n_real * self.value.powi(n.saturating_sub(1)));

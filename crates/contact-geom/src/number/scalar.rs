@@ -1,21 +1,21 @@
-//! The numbers that a Lagrangian is written over.
+//! The number types over which a Lagrangian is written.
 
 use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign};
 use num_traits::{One, Zero};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number that smooth formulas are written over: `f64`, a [`Dual`](crate::Dual) of any depth, or lanes of a vector
-/// register.
+/// A number type for smooth formulas: `f64`, a [`Dual`](crate::Dual) of any depth, or the lanes of a SIMD register.
 ///
 /// A Lagrangian, a Hamiltonian, a map or a group action is one function, generic over `T: Scalar`; its derivatives are
-/// that same function evaluated on duals. The trait holds arithmetic (with another `Self` and with `f64`), the elementary
-/// functions, and comparisons that choose a value.
+/// that same function evaluated on duals. The trait provides arithmetic (with another `Self` and with `f64`), the
+/// elementary functions, and comparisons that select a value.
 ///
-/// A formula must not branch on a number by `if`: it may be worked on for several states at once, in the lanes of a vector
-/// register, each of which has its own answer. [`if_less`](Self::if_less), [`abs`](Self::abs), [`max`](Self::max) and the like
-/// choose lane by lane; both values are computed, and one is taken with its differentials. Where a formula asks for one value
-/// of lanes that differ, by [`re`](Self::re), [`extent`](Self::extent), `==` or `is_zero`, the step is not taken in lanes.
-/// Integrators reach their order only where L is smooth along a step.
+/// A formula must not branch on a number by `if`: it may be evaluated for several states at once, in the lanes of a
+/// SIMD register, for which the comparison has different results. [`if_less`](Self::if_less), [`abs`](Self::abs),
+/// [`max`](Self::max) and similar functions select lane by lane; both values are computed, and one is selected with its
+/// differentials. If a formula requests a single value of lanes that differ, by [`re`](Self::re),
+/// [`extent`](Self::extent), `==` or `is_zero`, the step is not taken in lanes. Integrators attain their order only
+/// where L is smooth along a step.
 ///
 /// ```
 /// use contact_geom::Scalar;
@@ -41,34 +41,34 @@ pub trait Scalar:
     + Mul<f64, Output = Self>
     + Div<f64, Output = Self>
 {
-    /// The value without its differentials, of what lies between formulas: guesses, domains, messages. Lanes of a vector
-    /// register that differ have no such value: it is not a number then, and the integrator refuses the step.
+    /// The value without its differentials, for uses outside of formulas: initial guesses, domains, messages. For SIMD
+    /// lanes that differ there is no such value: the result is NaN, and the integrator refuses the step.
     fn re(self) -> f64;
-    /// The size of the value without its differentials, used only to choose pivots and to see that a number is finite.
-    /// For lanes: of the lane that matters most to a pivot, the smallest.
+    /// The absolute value without its differentials, used only to choose pivots and to check that a number is finite.
+    /// For lanes it is that of the lane that is critical for a pivot, the smallest.
     #[inline(always)]
     fn pivot_size(self) -> f64 {
         self.re().abs()
     }
-    /// The largest absolute value among the value and all its differentials: what an iteration or an error control over
-    /// this scalar has to make small. A NaN anywhere makes it infinite.
+    /// The largest absolute value among the value and all its differentials, for the convergence tests of iterations
+    /// and for error control over this scalar. It is infinite if any of them is NaN.
     fn extent(self) -> f64;
-    /// `then` where this number is less than another, `otherwise` where it is not, each with its differentials; not a number
-    /// where one of the two is none. At a tie `otherwise`.
+    /// `then` where this number is less than another, `otherwise` where it is not, each with its differentials; NaN
+    /// where one of the two compared numbers is NaN. Equal numbers give `otherwise`.
     fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self;
-    /// The larger of two numbers; not a number where one is none. At a tie this one, with its differentials.
+    /// The larger of two numbers; NaN where one of them is NaN. For equal numbers this one, with its differentials.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.if_less(other, other, self)
     }
-    /// The smaller of two numbers; not a number where one is none. At a tie this one, with its differentials.
+    /// The smaller of two numbers; NaN where one of them is NaN. For equal numbers this one, with its differentials.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         other.if_less(self, other, self)
     }
-    /// The absolute value. Its derivative is [`signum`](Self::signum), so 0 at 0.
+    /// The absolute value. Its derivative is [`signum`](Self::signum), hence 0 at 0.
     fn abs(self) -> Self;
-    /// 1, -1 or 0: the sign, and 0 of either zero. Its derivative is 0 everywhere.
+    /// The sign, 1, -1 or 0; it is 0 for both zeros. Its derivative is 0 everywhere.
     #[inline(always)]
     fn signum(self) -> Self {
         let zero = Self::zero();
@@ -80,17 +80,19 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// The power `x^n` for an integer `n`.
     fn powi(self, n: i32) -> Self;
-    /// The power `x^a` for a real `a`, `x > 0`; `x = 0` where `a` is not negative, with its derivatives from the right.
+    /// The power `x^a` for a real `a` and `x > 0`, and for `x = 0` where `a` is not negative, with its derivatives from
+    /// the right.
     fn powf(self, a: f64) -> Self;
-    /// A differential times the slope that it meets, where the slope may be infinite: of a root at 0. A differential of 0 stays 0 there,
-    /// as that of a constant does, and that of `(q.q)^1.5`; not a number where one of the two is none.
+    /// A differential times a slope that may be infinite, as that of a root at 0. There a differential of 0 stays 0, as
+    /// for a constant and for `(q.q)^1.5`; the product is NaN where one of the two is NaN.
     #[inline(always)]
     fn along_slope(self, slope: Self) -> Self {
         let (zero, infinite) = (Self::zero(), Self::from(f64::INFINITY));
         let at_zero = Scalar::abs(slope).if_less(infinite, zero, zero);
         zero.if_less(Scalar::abs(self), self * slope, at_zero)
     }
-    /// The power `x^a` as a factor of the slope of another power: its own differentials are [`along_slope`](Self::along_slope).
+    /// The power `x^a` as a factor of the slope of another power: its own differentials are formed by
+    /// [`along_slope`](Self::along_slope).
     #[inline(always)]
     fn slope_power(self, a: f64) -> Self {
         if a == -1.0 { self.recip() } else { self.powf(a) }
@@ -103,7 +105,7 @@ pub trait Scalar:
     fn ln(self) -> Self;
     /// `ln(1 + x)`, without cancellation near 0.
     fn ln_1p(self) -> Self;
-    /// Sine and cosine together, which costs hardly more than one of them.
+    /// Sine and cosine together, at hardly more cost than one of them.
     fn sin_cos(self) -> (Self, Self);
     /// The sine.
     #[inline(always)]
@@ -115,7 +117,8 @@ pub trait Scalar:
     fn cos(self) -> Self {
         self.sin_cos().1
     }
-    /// Sine and versine `1 - cos x` together, the latter without cancellation near 0: both through the half angle.
+    /// Sine and versine `1 - cos x` together, both computed by the half angle, so that the versine has no cancellation
+    /// near 0.
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {
         let (s, c) = (self * 0.5).sin_cos();
@@ -141,12 +144,13 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// The arc tangent.
     fn atan(self) -> Self;
-    /// Whether it is a number with derivatives, so large that many of them are better kept in memory than on the stack.
+    /// Whether the type is a number with derivatives, which is so large that many of them are better kept on the heap
+    /// than on the stack.
     const NESTED: bool = false;
 
-    /// Does a piece of work over these numbers as a function of its own, with the instructions that they need: for programs that are
-    /// too long to become a part of each kernel that calls them, such as interpreters. What the work calls is marked
-    /// `#[inline(always)]`.
+    /// Runs a computation over these numbers in a function of its own, compiled with the instruction set that they
+    /// need, for programs that are too long to be inlined into each calling kernel, such as interpreters. The functions
+    /// that `work` calls must be `#[inline(always)]`.
     #[inline(never)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
         work()
@@ -216,7 +220,8 @@ impl Scalar for f64 {
     fn sin_cos(self) -> (Self, Self) {
         f64::sin_cos(self)
     }
-    /// Two calls with nothing shared: where one of the results is not used, as the versine in a force, its call is dropped.
+    /// Two independent calls, so that the compiler removes the one whose result is not used, such as the versine in a
+    /// force.
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {
         let half = f64::sin(0.5 * self);
@@ -282,7 +287,7 @@ mod tests {
         assert_eq!(jet(Scalar::min(moving(0.5), SecondAlong::one())), [0.5, 1.0, 0.0]);
         assert_eq!(jet(moving(-3.0).abs().powi(3)), [27.0, -27.0, 18.0]);
         assert_eq!(jet(moving(-3.0).signum()), [-1.0, 0.0, 0.0]);
-        // What is not chosen does not count, not even where it is infinite.
+        // The value that is not selected has no influence, even where it is infinite.
         let root = |x: SecondAlong| x.if_less(SecondAlong::zero(), SecondAlong::zero(), x.sqrt());
         assert_eq!(jet(root(moving(-1.0))), [0.0; 3]);
         assert_eq!(jet(SecondAlong::zero().if_less(moving(1.0), moving(0.0), moving(0.0).ln())), [0.0, 1.0, 0.0]);
@@ -339,7 +344,8 @@ mod tests {
         assert!(moving(0.5).powi(i32::MIN).re.re.is_infinite());
     }
 
-    /// `(q.q)^a` has a gradient of 0 at 0 for `a > 1/2`, and second derivatives of 0 for `a > 1`, infinite ones for less.
+    /// `(q.q)^a` has at 0 a gradient of 0 for `a > 1/2`, and second derivatives of 0 for `a > 1` and infinite ones for
+    /// smaller a.
     #[test]
     fn powers_of_squares_have_their_derivatives_at_0() {
         type Two<T> = Dual<T, SVector<T, 2>>;
@@ -355,9 +361,9 @@ mod tests {
         }
         let y = q.dot(&q).powf(0.75);
         assert_eq!((y.re.d, y.d[0].d[0]), (SVector::<f64, 2>::zeros(), f64::INFINITY));
-        // Where the value is infinite, no derivative is made up.
+        // Where the value is infinite, a differential of 0 gives NaN.
         assert!(q.dot(&q).powf(-0.5).re.d[0].is_nan() && q.dot(&q).sqrt().recip().re.d[0].is_nan());
-        // A constant has a derivative of 0, a number that is none has none.
+        // A constant has derivatives of 0, and NaN has derivatives of NaN.
         assert_eq!(jet(SecondAlong::zero().sqrt()), [0.0; 3]);
         assert_eq!(jet(SecondAlong::zero().powf(0.3)), [0.0; 3]);
         let none = (moving(0.0) * moving(0.0) - 1.0).sqrt();

@@ -4,10 +4,12 @@ use super::{System, between};
 use crate::{Lagrangian, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// An anisotropic oscillator in the plane whose inertia depends on position and action, with a magnetic term that grows with
-/// the action and a drag that is quadratic in it:
-/// `L = ((1 + a cos x) v_x^2 + (1 + a sin y cos z) v_y^2)/2 + b z (x v_y - y v_x) - (x^2 + 2 y^2)/2 - x^2 y/3 - c z^2/2`, with
-/// `|a| < 1`. Dimensionless: mass one, time in units of the inverse frequency along x.
+/// An anisotropic oscillator in the plane whose inertia depends on position and action, with a magnetic term that grows
+/// with the action and a drag that is quadratic in it, for `|a| < 1`:
+/// `L = ((1 + a cos x) v_x^2 + (1 + a sin y cos z) v_y^2)/2 + b z (x v_y - y v_x) -
+/// (x^2 + 2 y^2)/2 - x^2 y/3 - c z^2/2`.
+///
+/// Dimensionless: mass one, time in units of the inverse frequency along x.
 ///
 /// Herglotz' equations are those of this L. No block of second derivatives in `(q, v, z)` is constant, and W is
 /// diagonal with entries of at least `1 - |a|`. The system tests formulas in more than one dimension and with `L_qz`,

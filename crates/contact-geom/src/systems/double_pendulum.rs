@@ -6,10 +6,11 @@ use nalgebra::SVector;
 
 /// The planar double pendulum with linear drag,
 /// `L = (m1 + m2) l1^2 v1^2/2 + m2 l2^2 v2^2/2 + m2 l1 l2 cos(q1 - q2) v1 v2 - V(q) + gamma z` with
-/// `V = (m1 + m2) l1 (1 - cos q1) + m2 l2 (1 - cos q2)`, both angles from the downward vertical. Dimensionless: `g = 1`.
+/// `V = (m1 + m2) l1 (1 - cos q1) + m2 l2 (1 - cos q2)`, both angles from the downward vertical. Dimensionless:
+/// `g = 1`.
 ///
-/// Herglotz' equations are `(W q')' = L_q + gamma W q'`, so the drag acts on the momenta; nonlinear and chaotic at large
-/// energy. W depends on `q1 - q2`, with determinant `m2 l1^2 l2^2 (m1 + m2 sin^2(q1 - q2)) > 0`.
+/// Herglotz' equations are `(W q')' = L_q + gamma W q'`, so the drag acts on the momenta; nonlinear and chaotic at
+/// large energy. W depends on `q1 - q2`, with determinant `m2 l1^2 l2^2 (m1 + m2 sin^2(q1 - q2)) > 0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoublePendulum {
     /// The masses of the upper and of the lower bob.

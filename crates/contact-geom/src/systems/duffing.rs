@@ -4,11 +4,11 @@ use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless: lengths
-/// and times in which mass and, by default, both spring constants have absolute value one.
+/// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless:
+/// lengths and times in which mass and, by default, both spring constants have absolute value one.
 ///
-/// Herglotz' equation is `q'' = -alpha q - beta q^3 + force cos(omega t) + gamma q'`; nonlinear, W = 1. For `alpha < 0 <
-/// beta` there are two wells, `q = +-sqrt(-alpha/beta)`.
+/// Herglotz' equation is `q'' = -alpha q - beta q^3 + force cos(omega t) + gamma q'`; nonlinear, W = 1. For
+/// `alpha < 0 < beta` there are two wells, `q = +-sqrt(-alpha/beta)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Duffing {
     /// The linear spring constant; negative for a double well.

@@ -5,8 +5,8 @@ use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
-/// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the mass
-/// is one.
+/// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the
+/// mass is one.
 ///
 /// Herglotz' equation is `q'' = gamma q'`; linear, W = 1. The motion is known in closed form; see
 /// [`solution`](Self::solution) and [`velocity_through`](Self::velocity_through).

@@ -7,9 +7,9 @@ use nalgebra::SVector;
 /// The Lane-Emden equation of index n as a Herglotz equation, `L = v^2/2 - q^(n+1)/(n+1) - (2/t) z`, `t > 0`.
 /// Dimensionless: t is the radius of a polytropic star in Emden's unit, `q^n` its density in units of the central one.
 ///
-/// Herglotz' equation is `q'' = -q^n - (2/t) q'`; nonlinear for `n > 1`, W = 1, the drag singular at `t = 0`. The conformal
-/// factor from t to r is `(t/r)^2`. Bravetti, Seri, Vermeeren and Zadra, "Numerical integration in celestial mechanics: a
-/// case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
+/// Herglotz' equation is `q'' = -q^n - (2/t) q'`; nonlinear for `n > 1`, W = 1, the drag singular at `t = 0`. The
+/// conformal factor from t to r is `(t/r)^2`. Bravetti, Seri, Vermeeren and Zadra, "Numerical integration in celestial
+/// mechanics: a case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
 ///
 /// The default index is 5: the only nonlinear case with a closed form, smooth and positive for all t. (For indices 0
 /// and 1 the equation is linear, which can make the order of a method appear too high.)

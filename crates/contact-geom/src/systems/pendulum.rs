@@ -4,8 +4,8 @@ use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q` the
-/// angle from the lower equilibrium.
+/// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q`
+/// the angle from the lower equilibrium.
 ///
 /// Herglotz' equation is `q'' = -sin q + gamma q'`; nonlinear, W = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

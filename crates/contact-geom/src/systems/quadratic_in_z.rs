@@ -4,12 +4,12 @@ use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// The oscillator with a drag proportional to the action, `L = v^2/2 - q^2/2 - c z^2/2`. Dimensionless: time in units of
-/// the inverse frequency of the undamped oscillator.
+/// The oscillator with a drag proportional to the action, `L = v^2/2 - q^2/2 - c z^2/2`. Dimensionless: time in units
+/// of the inverse frequency of the undamped oscillator.
 ///
-/// Herglotz' equation is `q'' = -q - c z q'`, coupled to `z' = L`; nonlinear through z alone, W = 1. The conformal factor's
-/// rate `-c z` depends on the motion: the simplest case in which z does not decouple. Vermeeren, Bravetti and Seri,
-/// "Contact variational integrators", J. Phys. A 52 (2019), treat it as an example.
+/// Herglotz' equation is `q'' = -q - c z q'`, coupled to `z' = L`; nonlinear through z alone, W = 1. The conformal
+/// factor's rate `-c z` depends on the motion: the simplest case in which z does not decouple. Vermeeren, Bravetti and
+/// Seri, "Contact variational integrators", J. Phys. A 52 (2019), treat it as an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraticInZ {
     /// The strength of the drag per unit of action.

@@ -4,8 +4,8 @@ use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// A relativistic particle on a spring, with drag: `L = -sqrt(1 - v^2) - q^2/2 + gamma z`, `|v| < 1`. Dimensionless: rest
-/// mass, spring constant and speed of light one.
+/// A relativistic particle on a spring, with drag: `L = -sqrt(1 - v^2) - q^2/2 + gamma z`, `|v| < 1`. Dimensionless:
+/// rest mass, spring constant and speed of light one.
 ///
 /// Herglotz' equation is `p' = -q + gamma p` with `p = v / sqrt(1 - v^2)`; nonlinear through the kinetic term alone.
 /// `W = (1 - v^2)^(-3/2)` depends on the velocity and is unbounded as `|v|` approaches 1.

@@ -5,11 +5,12 @@ use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// The spherical pendulum with linear drag, `L = (v_theta^2 + sin^2 theta v_phi^2)/2 - (1 - cos theta) + gamma z`, with
-/// `q = (theta, phi)`: the angle from the downward vertical, and the azimuth. Dimensionless: time in units of `sqrt(l/g)`.
+/// `q = (theta, phi)`: the angle from the downward vertical, and the azimuth. Dimensionless: time in units of
+/// `sqrt(l/g)`.
 ///
 /// Herglotz' equations are `theta'' = sin theta cos theta phi'^2 - sin theta + gamma theta'` and
-/// `(sin^2 theta phi')' = gamma sin^2 theta phi'`; nonlinear. `W = diag(1, sin^2 theta)` depends on the position, and is
-/// singular at the two poles of the chart, `theta = 0` and `pi`. Rotations about the vertical are a symmetry.
+/// `(sin^2 theta phi')' = gamma sin^2 theta phi'`; nonlinear. `W = diag(1, sin^2 theta)` depends on the position, and
+/// is singular at the two poles of the chart, `theta = 0` and `pi`. Rotations about the vertical are a symmetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphericalPendulum {
     /// The rate `L_z` of the conformal factor, negative for dissipation.

@@ -5,8 +5,8 @@ use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
-/// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any units
-/// in which the mass is one; natural are those in which the field is one.
+/// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any
+/// units in which the mass is one; natural are those in which the field is one.
 ///
 /// Herglotz' equation is `q'' = a + gamma q'`; linear, inhomogeneous, W the identity. The velocity tends to `-a/gamma`
 /// for `gamma < 0`. Translations perpendicular to the field are symmetries. The motion is known in closed form; see

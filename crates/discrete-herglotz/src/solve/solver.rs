@@ -6,7 +6,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::linear;
 
 /// The dimension from which faer's blocked LU is faster than elimination on the stack: measured 1.83 against 2.11 us at 24,
-/// 4.55 against 3.43 us at 32 (`cargo bench -p contact-benchmarks --bench solve`).
+/// 4.55 against 3.43 us at 32 (`cargo bench -p contact-measure --features benchmarks --bench solve`).
 pub const CROSSOVER: usize = 28;
 
 /// Solves the linear systems of Newton's method; holds the workspace that faer needs, so that no step allocates.

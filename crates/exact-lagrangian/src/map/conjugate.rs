@@ -1,42 +1,45 @@
-//! Conjugate points: where the exponential map stops being a local diffeomorphism.
+//! Conjugate points, at which the exponential map is not a local diffeomorphism.
 
 use crate::map::exact_lagrangian::seeded;
 use crate::{ContactExponential, ExactError, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, numbers::max_abs_or_nan};
 
-/// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there again, to
-/// first order.
+/// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there
+/// again, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConjugatePoint {
-    /// The time, counted from the motion's start.
+    /// The time since the start of the motion.
     pub after: f64,
-    /// How nearly `dq1/dv0` is singular there: its smallest value on a direction in units of what the motion makes of that
-    /// direction, position and velocity (times the time). So a motion that has merely decayed is none.
+    /// A measure of how close to singular `dq1/dv0` is there: the smallest ratio, over all variations of the initial
+    /// velocity, of the change of position to the change of position and velocity (times the time). A motion that has
+    /// merely decayed therefore has no conjugate point.
     pub smallest: f64,
 }
 
-/// The samples of a motion between which conjugate points are looked for.
+/// The number of samples of a motion between which conjugate points are searched.
 const SAMPLES: usize = 128;
 
-/// What a motion makes of variations of its initial velocity.
+/// The variation of the end of a motion with its initial velocity, as needed to detect a fold of the exponential map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fold {
     /// The sign of `det dq1/dv0`.
     pub sign: f64,
-    /// The smallest of `|dq1| / |(dq1, t dv1)|` over all directions of dv0: zero where a variation of the velocity remains
-    /// one of the velocity alone, at a conjugate point.
+    /// The smallest of `|dq1| / |(dq1, t dv1)|` over all directions of dv0. It is zero at a conjugate point, where a
+    /// variation of the initial velocity changes only the final velocity.
     pub sine: f64,
-    /// Whether a variation has decayed below what numbers resolve: then there is nothing to be told.
+    /// Whether a variation has left the range of normal numbers, usually by decay, so that no conjugate point can be
+    /// detected.
     pub decayed: bool,
 }
 
 impl Fold {
-    /// From the variations of the end, columns of `dq1` above columns of `dv1`, after a time.
+    /// Computes it from the variations of the end after a time; `dq` and `dv` have one column for each direction of
+    /// dv0.
     pub fn of<const N: usize>(dq: &SMatrix<f64, N, N>, dv: &SMatrix<f64, N, N>, time: f64) -> Self {
         let entry = |i: usize, j: usize| if i < N { dq[(i, j)] } else { dv[(i - N, j)] * time };
         let columns = DMatrix::from_fn(2 * N, N, entry);
-        // Each variation in its own unit.
+        // Scale each variation to unit size.
         let sizes: Vec<f64> = columns.column_iter().map(|c| max_abs_or_nan(c.iter().copied())).collect();
         if sizes.iter().any(|s| !(*s > f64::MIN_POSITIVE / f64::EPSILON && s.is_finite())) {
             return Fold { sign: 0.0, sine: 0.0, decayed: true };
@@ -49,11 +52,12 @@ impl Fold {
 }
 
 impl<L> ContactExponential<L> {
-    /// The conjugate points along the motion from a start at time t, up to the time h, in their order.
+    /// The conjugate points along the motion from a start at time t, up to the time h, in ascending order.
     ///
-    /// `dq(s)/dv0` is followed at 128 equidistant times s; a change of sign of its determinant, or a minimum of its smallest
-    /// value that goes to zero (a conjugate point of even multiplicity), is located to round-off. Two conjugate points
-    /// within one interval are missed. Where the variations have decayed below the smallest number the search ends.
+    /// `dq(s)/dv0` is computed at 128 equidistant times s. A change of sign of its determinant, or a minimum of its
+    /// smallest relative value at zero (a conjugate point of even multiplicity), is located to round-off. Two conjugate
+    /// points within one interval are missed. The search ends where the variations have decayed below the smallest
+    /// normal number.
     ///
     /// # Errors
     /// Those of [`herglotz_flow`] up to h.
@@ -120,7 +124,7 @@ fn bisect<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> 
     }
 }
 
-/// The lowest point of a function with a minimum between two points, by golden section.
+/// The minimum of a function between two points, by golden section search.
 fn lowest<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> Result<(f64, f64), E> {
     let golden = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
@@ -147,12 +151,12 @@ mod tests {
     use super::*;
     use contact_geom::systems::HarmonicOscillator;
 
-    /// A slope that has merely decayed is no conjugate point; those of the decaying oscillation are found as long as there is
-    /// something of it.
+    /// A derivative that has merely decayed is not reported as a conjugate point. The conjugate points of a decaying
+    /// oscillation are found as long as its amplitude is a normal number.
     #[test]
     fn decay_is_no_fold() {
         let x = VelocityPoint::new([0.0], [1.2], 0.0);
-        // By e^-30 and more, and beyond the smallest number.
+        // Decay by e^-30 and more, and below the smallest number.
         for (gamma, h) in [(-3.0, 60.0), (-3.0, 4000.0), (-1.0, 60.0), (-1.9, 60.0)] {
             let exp = ContactExponential::new(HarmonicOscillator { gamma }, h).unwrap();
             let found = exp.conjugate_points(0.0, &x).unwrap();
@@ -164,7 +168,7 @@ mod tests {
             let count = if gamma > -2.0 { (h * w / std::f64::consts::PI) as usize } else { 0 };
             assert_eq!(found.len(), count, "{gamma}");
         }
-        // From the origin the end, however small, tells the velocity.
+        // For a start at the origin, the end determines the velocity however small it is.
         for (gamma, h) in [(-0.5, 100.0), (-1.0, 71.0), (-3.0, 60.0)] {
             let exp = ContactExponential::new(HarmonicOscillator { gamma }, h).unwrap();
             let y = exp.at(0.0, &x).unwrap();

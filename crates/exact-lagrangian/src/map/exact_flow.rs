@@ -7,8 +7,8 @@ use discrete_herglotz::{
     InputError, Integrator, MethodInfo, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions,
 };
 
-/// The flow of the Herglotz field as an [`Integrator`]: its steps, of whatever length, are those of [`herglotz_flow`](crate::herglotz_flow), to round-off; they
-/// end on the jumps of L that it states.
+/// The flow of the Herglotz vector field as an [`Integrator`]. Steps of any length are computed to round-off by
+/// [`herglotz_flow`](crate::herglotz_flow); they end at the jumps of L that its switching functions indicate.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -52,14 +52,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ExactFlow {
     }
 }
 
-/// The exact flow at work.
+/// A run of the exact flow.
 struct Run<'a, L, const N: usize> {
     lagrangian: &'a L,
     t0: f64,
     h: f64,
     k: usize,
     x: VelocityPoint<N>,
-    /// The logarithm of the factor of the last step.
+    /// The logarithm of the conformal factor of the last step.
     b: f64,
     evaluations: u64,
 }

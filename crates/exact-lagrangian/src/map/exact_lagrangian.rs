@@ -13,15 +13,15 @@ use discrete_herglotz::{
     solve::{ITERATION_LIMIT, Solver, last_correction},
 };
 
-/// The exact discrete Lagrangian `L_h^e(q0, q1, z0) = int_0^h L o phi_t o R_h^(e-) dt = z(h) - z0`, the action along the motion from
-/// `q0` to `q1` in time h; paper, section 4.2.
+/// The exact discrete Lagrangian `L_h^e(q0, q1, z0) = int_0^h L o phi_t o R_h^(e-) dt = z(h) - z0`, the action along
+/// the motion from `q0` to `q1` in time h; paper, section 4.2.
 ///
-/// With `p = L_v` at the ends of that motion and `b = int L_z`:
-/// `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, so that `sigma_d = e^b` and `F(+-)L_h^e = FL o R_h^(e+-)`. The jet
-/// is computed by these formulas, the second jet from the first variational equation, a step of the flow by the motion
-/// itself; [`value`](DiscreteLagrangian::value) over duals differentiates the whole computation instead, flow and shooting.
+/// With `p = L_v` at the ends of that motion and `b = int L_z`: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`,
+/// `Dz L_h^e = e^b - 1`, so that `sigma_d = e^b` and `F(+-)L_h^e = FL o R_h^(e+-)`. The jet is computed by these
+/// formulas, the second jet from the first variational equation, and a step of the flow by the motion itself;
+/// [`value`](DiscreteLagrangian::value) over duals instead differentiates the whole computation, flow and shooting.
 ///
-/// It is regular where the exponential map is a local diffeomorphism, on the diagonal `q0 = q1` as well.
+/// It is regular where the exponential map is a local diffeomorphism, also on the diagonal `q0 = q1`.
 #[derive(Clone, Copy, Debug)]
 pub struct ExactLagrangian<L, const N: usize> {
     exponential: ContactExponential<L>,
@@ -40,18 +40,18 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         Ok(ExactLagrangian { exponential: ContactExponential::new(lagrangian, h)?, near: None })
     }
 
-    /// The same on the branch of motions whose initial velocity is near a guess: beyond a conjugate point, or where several
-    /// motions join the points.
+    /// The exact discrete Lagrangian on the branch of motions whose initial velocity is near a guess, for points beyond
+    /// a conjugate point or points that several motions join.
     pub fn near(self, guess: SVector<f64, N>) -> Self {
         ExactLagrangian { near: Some(guess), ..self }
     }
 
-    /// The exponential map that it inverts.
+    /// The exponential map, which it inverts.
     pub fn exponential(&self) -> &ContactExponential<L> {
         &self.exponential
     }
 
-    /// The motion between two points, whose action the value is.
+    /// The motion between two points; its action is the value of the discrete Lagrangian.
     ///
     /// # Errors
     /// Those of [`ContactExponential::retract`].
@@ -62,7 +62,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         }
     }
 
-    /// The same with no more than a jet needs: conjugate points are not looked for.
+    /// The motion between two points without a search for conjugate points, which a jet does not need.
     fn between(&self, t: f64, x: &DiscretePoint<N>) -> Result<Retraction<N>, ExactError<N>> {
         match &self.near {
             None => self.exponential.between(t, x),
@@ -75,7 +75,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         self.exponential.lagrangian.gradient(t, x).y
     }
 
-    /// The first jet by the formulas, from a motion.
+    /// The first jet of a motion, by the formulas.
     fn jet_of(&self, t: f64, motion: &Retraction<N>) -> DiscreteJet<N> {
         let sigma = motion.b.exp();
         let p0 = self.momentum(t, &motion.start);
@@ -83,7 +83,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         DiscreteJet::new(motion.action, -p0 * sigma, p1, motion.b.exp_m1()).with_sigma(sigma)
     }
 
-    /// The velocity at which `L_v` is a given momentum: Newton's method, its slope W.
+    /// The velocity at which `L_v` is a given momentum, by Newton's method with the Jacobian W.
     fn velocity(&self, t: f64, x: &PhasePoint<N>, guess: &SVector<f64, N>) -> Result<SVector<f64, N>, StepError> {
         let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
         let (mut before, mut residual) = (f64::INFINITY, f64::INFINITY);
@@ -92,7 +92,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
             let p = self.exponential.lagrangian.gradient(Dual::from(t), &point).y;
             let missed = SVector::<f64, N>::from_fn(|i, _| x.p[i] - p[i].re);
             if !missed.sum().is_finite() {
-                // Outside the domain, as beyond the velocity of light: back half-way.
+                // Outside the domain of L, for example beyond the speed of light: take half of the last change.
                 if before == f64::INFINITY {
                     return Err(StepError::NonFinite);
                 }
@@ -115,7 +115,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         Err(StepError::NotConverged { residual, iterations: ITERATION_LIMIT })
     }
 
-    /// A step of the flow on T\*Q x R by the motion itself; `duration` is h or, back, -h.
+    /// A step of the flow on T\*Q x R by the motion itself; `duration` is h, or -h for a step backward in time.
     fn along(
         &self,
         t: f64,
@@ -134,7 +134,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
     }
 }
 
-/// A point whose velocity carries the directions.
+/// A point on dual numbers, with the components of the velocity as directions.
 pub(crate) fn seeded<const N: usize>(x: &VelocityPoint<N>) -> VelocityPoint<N, Dual<f64, SVector<f64, N>>> {
     let still = Dual::<f64, SVector<f64, N>>::constant;
     let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
@@ -157,8 +157,8 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         Ok(self.jet_of(t, &self.between(t, x)?))
     }
 
-    /// From the derivatives of the motion in its start: with `dq1 = A dq0 + B dv0 + c dz0` the variation of `v0` is
-    /// `B^-1 (dq1 - A dq0 - c dz0)`, and along it vary `p0`, `p1` and b.
+    /// Computed from the derivatives of the motion with respect to its start. With `dq1 = A dq0 + B dv0 + c dz0` the
+    /// variation of `v0` is `B^-1 (dq1 - A dq0 - c dz0)`, from which those of `p0`, `p1` and b follow.
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let (retraction, h) = (self.between(t, x)?, self.exponential.h);
         let varied = self.exponential.varied(t, &retraction.start)?;
@@ -166,9 +166,9 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         let inverse = slope.try_inverse().ok_or(StepError::ConjugatePoint { smallest: 0.0 })?;
         let by_q0 = SMatrix::<f64, N, N>::from_fn(|i, j| varied.end.q[i].d.x[j]);
         let by_z0 = SVector::<f64, N>::from_fn(|i, _| varied.end.q[i].d.z);
-        // The variations of v0 with q0, q1 and z0.
+        // The derivatives of v0 with respect to q0, q1 and z0.
         let (v_q0, v_q1, v_z0) = (-inverse * by_q0, inverse, -inverse * by_z0);
-        // The variation of what depends on the start, with the start's velocity varying so.
+        // The derivatives with respect to q0, q1 and z0 of a function of the start, whose velocity depends on them.
         let total = |d: &ChartVector<N>| ChartVector {
             x: d.x + v_q0.transpose() * d.y,
             y: v_q1.transpose() * d.y,
@@ -212,7 +212,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         self.along(t, from, guess, self.exponential.h)
     }
 
-    /// The motion back in time.
+    /// The motion backward in time.
     fn backward(
         &self,
         t: f64,

@@ -6,8 +6,9 @@ use contact_geom::{ChartVector, DiscretePoint, Lagrangian, Regularity, Scalar, V
 use contact_geom::{Dual, GeometryError, Smooth};
 use discrete_herglotz::InputError;
 
-/// The contact exponential map `exp_h : (q0, v0, z0) -> (q0, q1, z0)` of a regular Lagrangian, where `q1` is the position of the
-/// motion after a time h; paper, section 4.1. Its inverse is the exact retraction, [`retract`](Self::retract).
+/// The contact exponential map `exp_h : (q0, v0, z0) -> (q0, q1, z0)` of a regular Lagrangian, where `q1` is the
+/// position of the motion after a time h; paper, section 4.1. Its inverse is the exact retraction,
+/// [`retract`](Self::retract).
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -25,7 +26,7 @@ pub struct ContactExponential<L> {
     pub(crate) h: f64,
 }
 
-/// What a small change of a motion's start does to its end: the motion over duals along all coordinates.
+/// A motion on dual numbers, with its derivatives with respect to all coordinates of the start.
 pub(crate) type Varied<const N: usize> = Motion<N, Dual<f64, ChartVector<N>>>;
 
 /// The exponential map's value and derivatives at a point of TQ x R.
@@ -35,14 +36,15 @@ pub struct ExponentialDifferential<const N: usize> {
     pub image: DiscretePoint<N>,
     /// `dq1/dq0`.
     pub q: SMatrix<f64, N, N>,
-    /// `dq1/dv0`, on which it rests whether the map is a local diffeomorphism.
+    /// `dq1/dv0`; the map is a local diffeomorphism where it is regular.
     pub v: SMatrix<f64, N, N>,
     /// `dq1/dz0`.
     pub z: SVector<f64, N>,
 }
 
 impl<const N: usize> ExponentialDifferential<N> {
-    /// The linearisation `T exp_h` in the coordinates' order: rows `(1, 0, 0)`, `(dq1/dq0, dq1/dv0, dq1/dz0)`, `(0, 0, 1)`.
+    /// The linearisation `T exp_h` in the coordinates' order: rows `(1, 0, 0)`, `(dq1/dq0, dq1/dv0, dq1/dz0)`,
+    /// `(0, 0, 1)`.
     pub fn jacobian(&self) -> DMatrix<f64> {
         DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match (i, j) {
             (i, j) if i >= N && i < 2 * N => match j {
@@ -55,8 +57,8 @@ impl<const N: usize> ExponentialDifferential<N> {
         })
     }
 
-    /// The singular values of `dq1/dv0`: the map is a local diffeomorphism where the smallest does not vanish. In a short time
-    /// all of them are about h.
+    /// The singular values of `dq1/dv0`: the map is a local diffeomorphism where the smallest does not vanish. For
+    /// small h all of them are about h.
     pub fn regularity(&self) -> Regularity {
         singular_values(&self.v)
     }
@@ -118,7 +120,7 @@ impl<L> ContactExponential<L> {
         })
     }
 
-    /// The motion with its derivatives in all coordinates of the start.
+    /// The motion with its derivatives with respect to all coordinates of the start.
     pub(crate) fn varied<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> Result<Varied<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
@@ -134,7 +136,7 @@ pub struct HerglotzFlow<'a, L> {
     pub lagrangian: &'a L,
     /// The time at the start.
     pub t: f64,
-    /// The duration, negative to go back.
+    /// The duration; a negative one runs backward in time.
     pub duration: f64,
 }
 

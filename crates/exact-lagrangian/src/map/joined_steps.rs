@@ -8,10 +8,10 @@ use discrete_herglotz::{
     solve::{ITERATION_LIMIT, last_correction},
 };
 
-/// Two steps through a point `q1` in between, and the action's change over both.
+/// Two steps through an intermediate point `q1`, with the change of the action over both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JoinedSteps<const N: usize> {
-    /// The point in between.
+    /// The intermediate point.
     pub q1: SVector<f64, N>,
     /// The action there.
     pub z1: f64,
@@ -21,7 +21,7 @@ pub struct JoinedSteps<const N: usize> {
     pub slope: SVector<f64, N>,
 }
 
-/// The two steps through a given point in between.
+/// The two steps through a given intermediate point.
 ///
 /// # Errors
 /// Those of the discrete Lagrangians.
@@ -39,11 +39,12 @@ pub fn through<const N: usize>(
     Ok(JoinedSteps { q1: *q1, z1, value: one.value + two.value, slope: one.d2 * two.sigma() + two.d1 })
 }
 
-/// The composition at its critical point: the `q1` at which the action's change over two steps is critical, from a guess, by
-/// Newton's method on the momentum matching `F+L_{h1} = F-L_{h2}`.
+/// The composition at its critical point: the `q1` at which the change of the action over two steps is critical, by
+/// Newton's method on the momentum matching `F+L_{h1} = F-L_{h2}`, from a guess.
 ///
-/// For exact discrete Lagrangians its value is that of one step, `L_{h1+h2}^e(q0, q2, z0)`, and there only: Hamilton-Jacobi
-/// theory's composition with the action in it; for the case without action see Marsden and West, Acta Numerica 10 (2001).
+/// For exact discrete Lagrangians its value is that of one step, `L_{h1+h2}^e(q0, q2, z0)`, and only at the critical
+/// point. This is the composition of Hamilton-Jacobi theory for Lagrangians that depend on the action; for the case
+/// without action see Marsden and West, Acta Numerica 10 (2001).
 ///
 /// # Errors
 /// Those of the discrete Lagrangians; [`StepError::Singular`] where the critical point is degenerate,
@@ -61,7 +62,7 @@ pub fn compose<const N: usize>(
         let one = first.second_jet(t, &DiscretePoint { q0, q1, z0 })?;
         let z1 = z0 + one.first.value;
         let two = second.second_jet(t + first.step_size(), &DiscretePoint { q0: q1, q1: q2, z0: z1 })?;
-        // F-L_{h2} moves with q1 directly and through z1.
+        // F-L_{h2} depends on q1 directly and through z1.
         let start = two.legendre_minus_jacobian();
         let mut matrix = SMatrix::<f64, N, N>::from_fn(|i, j| {
             one.d22[(i, j)] - start[(N + i, j)] - start[(N + i, 2 * N)] * one.first.d2[j]

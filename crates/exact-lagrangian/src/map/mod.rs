@@ -1,4 +1,4 @@
-//! The contact exponential map, its inverse, and what is made of them: the exact discrete Lagrangian and the exact flow.
+//! The contact exponential map and its inverse, the exact discrete Lagrangian and the exact flow.
 
 pub(crate) mod conjugate;
 pub(crate) mod exact_flow;

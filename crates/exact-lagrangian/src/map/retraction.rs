@@ -7,59 +7,61 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint};
 use discrete_herglotz::InputError;
 
-/// The contraction below which a conjugate point is far: the slowest mode of the iteration with both ends given contracts by 1 at
-/// a conjugate point, the next by 1/4 there.
+/// The contraction factor below which no conjugate point is near. At a conjugate point the slowest mode of the
+/// iteration with both positions given has the contraction factor 1, and the next mode 1/4.
 const SAFE: f64 = 0.1;
 
-/// The contraction above which the slope is worth its cost.
+/// The contraction factor above which it pays to compute the derivative `dq1/dv0`.
 const PATIENCE: f64 = 0.3;
 
-/// The contraction that an iteration with the slope must have: it shows that the slope is that of this motion.
+/// The largest contraction factor that is accepted of an iteration with this derivative. A larger factor shows that the
+/// derivative is that of another motion.
 const SLOPED: f64 = 0.8;
 
 /// How the motion between two points was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RetractionRoute {
-    /// By collocation with both positions given: the shortest way, taken where its iteration contracts.
+    /// By collocation with both positions given, the least expensive way, which is taken where its iteration contracts.
     Collocation,
     /// By Newton's method on the exponential map.
     Newton,
-    /// By Newton's method, led from a short time to h along the straight line between the points.
+    /// By Newton's method and continuation from a short time to h, along the straight line between the points.
     Continuation,
 }
 
-/// The motion from `q0` to `q1` in time h: `R_h^(e-)` is its start, `R_h^(e+) = phi_h o R_h^(e-)` its end; paper, section 4.1.
+/// The motion from `q0` to `q1` in time h: `R_h^(e-)` is its start, `R_h^(e+) = phi_h o R_h^(e-)` its end; paper,
+/// section 4.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Retraction<const N: usize> {
     /// `R_h^(e-)(q0, q1, z0) = (q0, v0, z0)`.
     pub start: VelocityPoint<N>,
     /// `R_h^(e+)(q0, q1, z0) = (q1, v1, z1)`.
     pub end: VelocityPoint<N>,
-    /// The action `z1 - z0`, to round-off of itself: the value of `L_h^e`.
+    /// The action `z1 - z0`, which is the value of `L_h^e`, to relative round-off.
     pub action: f64,
     /// `b = int L_z dt` along the motion.
     pub b: f64,
-    /// The time from the start, to a part in 32 of h, by which the motion has met a conjugate point: then other motions join the
-    /// points as well, and this is one of several. `None` if it meets none by the sign of `det dq(t)/dv0`, which on the quick route
-    /// is looked at in the end only; [`conjugate_points`](ContactExponential::conjugate_points) looks more closely, also for those
-    /// of even multiplicity.
+    /// The time from the start, in multiples of h/32, by which the motion has met a conjugate point. In this case other
+    /// motions join the points as well. `None` if the sign of `det dq(t)/dv0` shows no conjugate point; on the route by
+    /// collocation it is checked at the end only. [`conjugate_points`](ContactExponential::conjugate_points) searches
+    /// more thoroughly, also for points of even multiplicity.
     pub conjugate: Option<f64>,
     /// How it was found.
     pub route: RetractionRoute,
-    /// The evaluations of the vector field that the last pass took.
+    /// The evaluations of the vector field in the last computation of the motion.
     pub evaluations: u64,
 }
 
 impl<L> ContactExponential<L> {
     /// The retraction of two points at time t.
     ///
-    /// Where several motions join the points in time h this is as a rule the one that the motions of shorter times between points on
-    /// the straight line lead to; [`retract_near`](Self::retract_near) finds others, and
-    /// [`conjugate_points`](Self::conjugate_points) tells whether there may be some: before the first conjugate point the
-    /// motion is locally the only one.
+    /// If several motions join the points in time h, the result is as a rule the one that is connected to the motions
+    /// of shorter times between points on the straight line; [`retract_near`](Self::retract_near) finds others, and
+    /// [`conjugate_points`](Self::conjugate_points) shows whether others may exist: before the first conjugate point
+    /// the motion is locally unique.
     ///
-    /// First by collocation with both positions given, which costs no more than the motion itself; then by Newton's method on
-    /// `exp_h`, from `(q1 - q0)/h`, and by continuation in h.
+    /// Collocation with both positions given is tried first, which costs no more than the motion itself; then Newton's
+    /// method on `exp_h` from `(q1 - q0)/h`, and then continuation in h.
     ///
     /// # Errors
     /// [`ExactError::Input`] for a non-finite point, a singular W, or (where there is no unique motion)
@@ -77,8 +79,8 @@ impl<L> ContactExponential<L> {
         }
     }
 
-    /// The retraction of two points without a search for the first conjugate point, which a jet does not need: `conjugate` is the
-    /// whole time where `dq1/dv0` is seen to reverse orientation.
+    /// The retraction of two points without a search for the first conjugate point, which a jet does not need:
+    /// `conjugate` is h where `dq1/dv0` is found to reverse the orientation.
     pub(crate) fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<Retraction<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
@@ -93,8 +95,8 @@ impl<L> ContactExponential<L> {
         {
             return Ok(found);
         }
-        // Slow, or perhaps near a conjugate point, where all modes but one contract and that one may be absent: ask the slope, and
-        // where the iteration was given up go on with it.
+        // The iteration is slow, or a conjugate point may be near, where all modes but one contract and that one may be
+        // absent. The derivative decides; if the iteration was given up, it is continued with the derivative.
         if let Some(inverse) = self.slope_inverse(t, &VelocityPoint { q: x.q0, v: v0, z: x.z0 }, &mut work) {
             let found = match quick {
                 Some(found) => Some(found),
@@ -115,7 +117,7 @@ impl<L> ContactExponential<L> {
         }
     }
 
-    /// The retraction on the branch of a guess of the initial velocity: by Newton's method from there, and only that.
+    /// The retraction on the branch of a guess of the initial velocity, by Newton's method from there only.
     ///
     /// # Errors
     /// Like those of [`retract`](Self::retract).
@@ -131,7 +133,7 @@ impl<L> ContactExponential<L> {
         self.marked(t, self.between_near(t, x, guess)?)
     }
 
-    /// The same without a search for the first conjugate point.
+    /// The retraction near a guess without a search for the first conjugate point.
     pub(crate) fn between_near<const N: usize>(
         &self,
         t: f64,
@@ -145,9 +147,9 @@ impl<L> ContactExponential<L> {
         self.by_newton(t, x, guess, &mut Work::default())
     }
 
-    /// The different motions among those that Newton's method finds from these guesses of the initial velocity, in the order of
-    /// the guesses; guesses that lead nowhere are left out. Two motions are the same if their velocities agree to half of the
-    /// digits.
+    /// The distinct motions that Newton's method finds from these guesses of the initial velocity, in the order of the
+    /// guesses; guesses from which it fails are omitted. Two motions are the same if their initial velocities agree to
+    /// half of the digits.
     ///
     /// # Errors
     /// [`ExactError::Input`] for a point that is not finite.
@@ -176,9 +178,9 @@ impl<L> ContactExponential<L> {
         Ok(found)
     }
 
-    /// The motion over any scalar that starts near a motion found before, as a function of the two points: the derivatives of
-    /// the end points go through flow and shooting. Newton's method with the slope of the values: each pass makes one more
-    /// order of differentials exact.
+    /// The motion over any scalar as a function of the two points, near a motion found before: the derivatives with
+    /// respect to the points are propagated through flow and shooting. The iteration is Newton's method with the
+    /// Jacobian of the values; each pass makes one more order of differentials exact.
     pub(crate) fn lifted<T: Scalar, const N: usize>(
         &self,
         t: f64,
@@ -202,7 +204,7 @@ impl<L> ContactExponential<L> {
             let missed = SVector::<T, N>::from_fn(|i, _| motion.displacement[i] - (x.q1[i] - x.q0[i]));
             let size = missed.iter().map(|m| m.extent()).fold(0.0, f64::max);
             let scale = motion.displacement.iter().map(|d| d.extent()).fold(0.0, f64::max);
-            // Differentials of second order may grow in the passes in which those of first order vanish.
+            // Differentials of second order may grow in the passes in which those of first order converge.
             if size <= 2.0 * f64::EPSILON * scale || (pass >= 3 && size >= 0.5 * before) {
                 return Ok((start, motion));
             }

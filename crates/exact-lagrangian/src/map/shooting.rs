@@ -1,4 +1,5 @@
-//! The motion between two points in numbers: collocation with both positions given, shooting by Newton's method, continuation.
+//! The numerical solution for the motion between two points: collocation with both positions given, shooting by
+//! Newton's method, and continuation.
 
 use super::conjugate::Fold;
 use super::exact_lagrangian::seeded;
@@ -11,16 +12,16 @@ use contact_geom::support::linear::solve;
 use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::solve::last_correction;
 
-/// The Newton iterations that a retraction may take.
+/// The largest number of Newton iterations of a retraction.
 pub(crate) const ITERATIONS: u32 = 50;
 
-/// The accuracy of the first Newton iterations: of what is only a guess for the last.
+/// The accuracy of the first Newton iterations, whose result is only a guess for the last ones.
 const ROUGH: f64 = 1e-6;
 
-/// The sine of a [`Fold`] below which the end points count as conjugate.
+/// The sine of a [`Fold`], or the [`regularity`] of a shot, below which the end points count as conjugate.
 const CONJUGATE: f64 = 64.0 * f64::EPSILON;
 
-/// The same where the slope is known to [`ROUGH`] accuracy only.
+/// The same where the derivative is known to [`ROUGH`] accuracy only.
 const NEARLY: f64 = 1e-4;
 
 /// Whether a matrix reverses orientation.
@@ -28,7 +29,7 @@ pub(super) fn reverses<const N: usize>(mut m: SMatrix<f64, N, N>) -> bool {
     solve(&mut m, &mut SVector::<f64, N>::zeros()).is_ok_and(|determinant| determinant < 0.0)
 }
 
-/// The motion with its derivatives in the initial velocity.
+/// The motion with its derivatives with respect to the initial velocity.
 type Shot<const N: usize> = Motion<N, Dual<f64, SVector<f64, N>>>;
 
 /// The derivative `dq1/dv0` of a shot.
@@ -36,13 +37,13 @@ fn slope<const N: usize>(shot: &Shot<N>) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|i, j| shot.displacement[i].d[j])
 }
 
-/// What a shot makes of variations of its initial velocity.
+/// The [`Fold`] of a shot.
 fn fold<const N: usize>(shot: &Shot<N>, time: f64) -> Fold {
     Fold::of(&slope(shot), &SMatrix::from_fn(|i, j| shot.end.v[i].d[j]), time)
 }
 
-/// How far from singular the slope is that has this inverse, in units of what the motion makes of velocities: like the sine of its
-/// [`Fold`], without allocation and exactly that for `N = 1`.
+/// The distance from singularity of the derivative with this inverse, in units of the variation of the end: like the
+/// sine of its [`Fold`], but without allocation. For `N = 1` they agree up to a factor of at most `sqrt 2`.
 fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time: f64) -> f64 {
     let entries = |i: usize, j: usize| max_or_nan(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
     let size = (0..N * N).fold(0.0, |size, k| max_or_nan(size, entries(k / N, k % N)));
@@ -53,7 +54,7 @@ fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time
 pub(super) struct Found<const N: usize> {
     pub retraction: Retraction<N>,
     pub inverse: SMatrix<f64, N, N>,
-    /// [How far from singular](regularity) the slope is.
+    /// The [distance from singularity](regularity) of the derivative.
     regularity: f64,
 }
 
@@ -63,8 +64,9 @@ pub(super) fn smallest<const N: usize>(inverse: &SMatrix<f64, N, N>) -> f64 {
 }
 
 impl<L> ContactExponential<L> {
-    /// The motion by collocation on one panel with both positions given, from a guess of the initial velocity and of the
-    /// inverse of `dq1/dv0`; if the iteration contracts and the error is below round-off. With it the factor of contraction.
+    /// The motion by collocation on one panel with both positions given, from a guess of the initial velocity and of
+    /// the inverse of `dq1/dv0`, with the contraction factor of the iteration. `None` unless the iteration contracts
+    /// and the error is below round-off.
     pub(super) fn by_collocation<const N: usize>(
         &self,
         t: f64,
@@ -90,7 +92,7 @@ impl<L> ContactExponential<L> {
                     end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
                     action: panel.change.z,
                     b: panel.change.b,
-                    // The iteration contracts before the first conjugate point only.
+                    // The iteration contracts only before the first conjugate point.
                     conjugate: None,
                     route: RetractionRoute::Collocation,
                     evaluations,
@@ -101,7 +103,7 @@ impl<L> ContactExponential<L> {
         })
     }
 
-    /// A retraction with the time by which its motion has met a conjugate point.
+    /// The retraction completed by the time by which its motion has met a conjugate point.
     pub(super) fn marked<const N: usize>(&self, t: f64, found: Retraction<N>) -> Result<Retraction<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
@@ -117,7 +119,7 @@ impl<L> ContactExponential<L> {
         Ok(Retraction { conjugate: None, ..found })
     }
 
-    /// The motion with its derivatives in the initial velocity, to an accuracy.
+    /// The motion with its derivatives with respect to the initial velocity, to an accuracy.
     fn shot<const N: usize>(
         &self,
         t: f64,
@@ -133,8 +135,8 @@ impl<L> ContactExponential<L> {
         integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy, work)
     }
 
-    /// The inverse of `dq1/dv0` along the motion from a start, to the accuracy of a guess; none where it is nearly singular, or the
-    /// motion not defined.
+    /// The inverse of `dq1/dv0` along the motion from a start, to [`ROUGH`] accuracy; `None` where the derivative is
+    /// nearly singular or the motion is not defined.
     pub(super) fn slope_inverse<const N: usize>(
         &self,
         t: f64,
@@ -148,7 +150,8 @@ impl<L> ContactExponential<L> {
         slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > NEARLY)
     }
 
-    /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
+    /// Newton's method on `exp_h`, first to a few digits. Further digits are computed by collocation with the
+    /// derivative found, or else by continuing Newton's method.
     pub(super) fn by_newton<const N: usize>(
         &self,
         t: f64,
@@ -163,7 +166,7 @@ impl<L> ContactExponential<L> {
         let near = rough.retraction.start.v;
         let regular = rough.regularity > NEARLY;
         if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
-            // Still the motion that Newton's method has found, not another one.
+            // Accept only the motion that Newton's method has found.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
                 return Ok(Retraction { route: RetractionRoute::Newton, ..found });
             }
@@ -171,8 +174,8 @@ impl<L> ContactExponential<L> {
         Ok(self.shoot(t, x, &near, (self.h, ACCURACY), work)?.retraction)
     }
 
-    /// Newton's method on `exp_h` with the slope `dq1/dv0` of the variational equation. A change that takes the motion out of
-    /// its domain, or farther from the second point, is halved.
+    /// Newton's method on `exp_h` with the derivative `dq1/dv0` of the variational equation. A change is halved if the
+    /// motion then leaves its domain, or ends more than twice as far from the second point.
     pub(super) fn shoot<const N: usize>(
         &self,
         t: f64,
@@ -215,7 +218,7 @@ impl<L> ContactExponential<L> {
                 break;
             }
             let now = change.amax();
-            // The next change is about now^3 / before^2 or, at round-off, what moves no position.
+            // The next change is about now^3 / before^2 or, at round-off, too small to change any position.
             let predicted = last_correction(now, before, 2.0 * accuracy * size.max(now));
             let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
             let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
@@ -238,7 +241,7 @@ impl<L> ContactExponential<L> {
             });
         };
         let (smallest, fold) = (singular_values(&slope).smallest, fold(&shot, h));
-        // Newton's method is slow, and its limit ill determined, where the slope nearly vanishes.
+        // Newton's method is slow, and its limit ill determined, where the derivative nearly vanishes.
         Err(if fold.sine <= f64::EPSILON.sqrt() && !fold.decayed {
             ExactError::ConjugatePoint { last: start, residual, smallest }
         } else {
@@ -246,8 +249,8 @@ impl<L> ContactExponential<L> {
         })
     }
 
-    /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s from small to 1, each the guess for
-    /// the next.
+    /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s increasing to 1, where each
+    /// is the guess for the next.
     pub(super) fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, work: &mut Work) -> Option<Found<N>>
     where
         L: Lagrangian<N>,
@@ -272,7 +275,8 @@ impl<L> ContactExponential<L> {
     }
 }
 
-/// The motion after the last small change of its initial velocity, to first order in it: no further pass is needed.
+/// The motion after the last small change of its initial velocity, to first order in the change, which makes another
+/// integration unnecessary.
 fn moved<const N: usize>(
     x: &DiscretePoint<N>,
     start: &VelocityPoint<N>,

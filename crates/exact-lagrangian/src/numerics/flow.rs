@@ -11,11 +11,11 @@ use contact_geom::{
 };
 use discrete_herglotz::checks::jumps_between;
 
-/// The evaluations of the vector field that a motion, or the search for one between two points, may take, about a second's: over
-/// duals of n entries each counts n times.
+/// The largest number of evaluations of the vector field for a motion, or for the search for one between two points:
+/// about one second of work. An evaluation on duals of n entries counts n times.
 pub const EVALUATIONS: u64 = 4_000_000;
 
-/// The relative error that a panel's end values may have by their estimate: half a unit of round-off.
+/// The tolerance for the estimated relative error of a panel's end values: half a unit of round-off.
 pub(crate) const ACCURACY: f64 = 0.5 * f64::EPSILON;
 
 /// Herglotz' equations `q'' = a`, `z' = L`, `b' = L_z`.
@@ -40,7 +40,8 @@ impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for Herglotz<'_, L
     }
 }
 
-/// The same where the steps of a run end on the jumps of L, and the rounding beyond one is nothing to be refused.
+/// The same equations without the check for jumps of L, for runs whose steps end on these jumps: passing one by a
+/// rounding must not be refused.
 pub(crate) struct BetweenJumps<'a, L>(pub Herglotz<'a, L>);
 
 impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for BetweenJumps<'_, L> {
@@ -50,7 +51,7 @@ impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for BetweenJumps<'
     }
 }
 
-/// See [`herglotz_flow`]; across jumps of L as if they were not there.
+/// [`herglotz_flow`] without the check for jumps of L.
 pub(crate) fn flow_between_jumps<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t0: f64,
@@ -61,20 +62,20 @@ pub(crate) fn flow_between_jumps<const N: usize>(
     integrate(&BetweenJumps(Herglotz(lagrangian)), t0, &from, duration, ACCURACY, &mut Work::default())
 }
 
-/// A motion: where it ends, and what has grown along it. Over duals, with the derivatives of all of it.
+/// A motion: its end, and the integrals along it. On dual numbers, with the derivatives of all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<const N: usize, T = f64> {
     /// The end `phi_t(q0, v0, z0)`.
     pub end: VelocityPoint<N, T>,
-    /// The displacement `q1 - q0`, to round-off of itself even where it is small beside the positions.
+    /// The displacement `q1 - q0`, to relative round-off even where it is small compared with the positions.
     pub displacement: SVector<T, N>,
-    /// The action `z1 - z0 = int L dt`, likewise.
+    /// The action `z1 - z0 = int L dt`, with the same accuracy.
     pub action: T,
     /// `b = int L_z dt`, the logarithm of the conformal factor; paper, section 4.2.
     pub b: T,
-    /// The panels that it took.
+    /// The number of panels.
     pub panels: u32,
-    /// The evaluations of the vector field that it took, refused panels and the looks between the nodes included.
+    /// The number of evaluations of the vector field, including refused panels and the checks between the nodes.
     pub evaluations: u64,
 }
 
@@ -85,28 +86,30 @@ impl<const N: usize, T: Scalar> Motion<N, T> {
     }
 }
 
-/// The motion `phi_t` of the Herglotz vector field `xi_L` from a start at time `t0` over a duration, negative to go back;
-/// paper, section 4.1. To round-off, for any regular L and over any [`Scalar`]: on duals it gives the first (and further)
-/// variational equations' solution.
+/// The flow `phi_t` of the Herglotz vector field `xi_L` from a start at time `t0` over a duration, which is negative to
+/// run backward in time; paper, section 4.1. It is computed to round-off, for any regular L and over any [`Scalar`]: on
+/// duals it gives the solution of the first (and higher) variational equations.
 ///
-/// Collocation at 4 to 24 Gauss points (order 8 to 48) on panels that are as long as the estimated error and the convergence of
-/// the iteration allow; the changes of all panels are added with compensation. The error stays within some units of round-off
-/// times the condition of the motion.
+/// The method is collocation at 4 to 24 Gauss points (order 8 to 48) on panels that are as long as the estimated error
+/// and the convergence of the iteration allow; the changes over all panels are added by compensated summation. The
+/// error is some units of round-off times the condition number of the motion.
 ///
-/// What is narrow may hide between the nodes. Each panel is compared with the equations at both ends and at 5 to 25 and more other
-/// places, in all at 160 and more of a motion that changes its position or its velocity by as much as they are. A force of
-/// Gauss' shape `exp(-(s/w)^2)` in position or time, which is felt over `8 w`, is found if w is above a hundredth of the part between
-/// two places: w = 1e-3 of the span as a rule. What is narrower still may not be seen; take shorter durations where it is known to
-/// be. A force that is small beside another and faster than the nodes is found by what it does in the mean. A jump of a force or of
-/// the drag is found by the panel's ends, and passed in a panel so short that it changes nothing but the last digit. Across a jump of L itself, which
-/// its [switching functions](Lagrangian::switching_functions) tell, there is no flow of a vector field: it is refused there, and a
-/// [`Run`](discrete_herglotz::Run) goes on by the corner conditions.
+/// Narrow features may be missed by the nodes. Each panel is therefore compared with the equations at both ends and at
+/// 5 to 25 or more other points, a total of 160 or more for a motion that changes its position or its velocity by as
+/// much as they are. A force of Gaussian shape `exp(-(s/w)^2)` in position or time, which is noticeable over `8 w`, is
+/// as a rule detected if w is at least 1e-3 of the span. Narrower features may be missed; use shorter durations where
+/// such features are known. A force that is small compared with another and too fast for the nodes is detected by its
+/// mean effect. A jump of a force or of the drag is detected at the ends of the panels, and passed in a panel so short
+/// that only the last digit is affected. Across a jump of L itself, which its
+/// [switching functions](Lagrangian::switching_functions) indicate, the vector field has no flow: the motion is refused
+/// there, while a [`Run`](discrete_herglotz::Run) continues by the corner conditions.
 ///
-/// Of numbers below the smallest normal one the last digit is the smallest number of all.
+/// The last digit of a subnormal number is the smallest positive number.
 ///
 /// # Errors
-/// [`ExactError::Input`] for a non-finite argument or a W that is singular at the start; [`ExactError::OutsideDomain`] where the
-/// motion is not defined up to the end, with the state reached; [`ExactError::Unfinished`] after [`EVALUATIONS`].
+/// [`ExactError::Input`] for a non-finite argument or a W that is singular at the start; [`ExactError::OutsideDomain`]
+/// where the motion is not defined up to the end, with the state reached; [`ExactError::Unfinished`] after
+/// [`EVALUATIONS`].
 pub fn herglotz_flow<T: Scalar, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t0: f64,
@@ -117,7 +120,7 @@ pub fn herglotz_flow<T: Scalar, const N: usize>(
     integrate(&Herglotz(lagrangian), t0, &from, duration, ACCURACY, &mut Work::default())
 }
 
-/// A sum whose rounding errors are carried along, after Kahan.
+/// A compensated sum, after Kahan.
 #[derive(Clone, Copy)]
 struct Sum<T> {
     value: T,
@@ -138,8 +141,8 @@ impl<T: Scalar> Sum<T> {
     }
 }
 
-/// The sums along a motion. The state is summed up from the start's, so that what decays keeps its digits; the displacement
-/// and the action from 0, so that what is small beside the state keeps its own.
+/// The sums along a motion. The state is summed from its initial value, so that decaying quantities keep their digits;
+/// the displacement and the action from 0, so that they keep their digits where they are small compared with the state.
 struct Sums<const N: usize, T> {
     q: [Sum<T>; N],
     v: [Sum<T>; N],
@@ -182,7 +185,7 @@ impl<const N: usize, T: Scalar> Sums<N, T> {
     }
 }
 
-/// The work that is left of [`EVALUATIONS`].
+/// The number of evaluations that remain of [`EVALUATIONS`].
 pub(crate) struct Work(u64);
 
 impl Default for Work {
@@ -192,7 +195,7 @@ impl Default for Work {
 }
 
 impl Work {
-    /// Whether it is done.
+    /// Whether none remain.
     pub fn is_done(&self) -> bool {
         self.0 == 0
     }
@@ -202,27 +205,28 @@ impl Work {
     }
 }
 
-/// The factor by which a panel of order `2 nodes` should be made longer.
+/// The factor by which the panel after one of order `2 nodes` should be longer.
 fn stretch<const N: usize, T>(panel: &Panel<N, T>, accuracy: f64) -> f64 {
     0.9 * (accuracy / max_or_nan(panel.error, 1e-300)).powf(0.5 / panel.nodes as f64)
 }
 
-/// The same state but for the last digit of each coordinate, up and down in turn.
+/// The state with the last digit of each coordinate changed, alternately up and down.
 fn with_last_digits_changed<const N: usize, T: Scalar>(x: &State<N, T>) -> State<N, T> {
     let [up, down] = [1.0 + f64::EPSILON, 1.0 - f64::EPSILON];
-    // Of numbers below the smallest normal one the last digit is the smallest of all.
+    // The last digit of a subnormal number is the smallest positive number.
     let changed = |x: T, factor: f64| x * factor + if x.pivot_size() < f64::MIN_POSITIVE { SMALLEST } else { 0.0 };
     let of = |x: &SVector<T, N>, even, odd| SVector::from_fn(|i, _| changed(x[i], if i % 2 == 0 { even } else { odd }));
     State { q: of(&x.q, up, down), v: of(&x.v, down, up), z: changed(x.z, up), b: x.b }
 }
 
-/// Refusals after which the way to the end of the panel refused is halved, and after which the panels are
-/// [narrow](Problem::narrow); and where it is given up, farther than from any length to a rounding of it.
+/// Numbers of refusals: after `HALVING` the distance to the end of the refused panel is halved, after `NARROW` the
+/// panels are [narrow](Problem::narrow), and after `CLOSED` the motion is given up; `CLOSED` exceeds the number of
+/// halvings from any length to a rounding of it.
 const HALVING: u32 = 8;
 const NARROW: u32 = 14;
 const CLOSED: u32 = 250;
 
-/// Refuses what is not finite.
+/// Returns an error if an entry is not finite.
 fn finite<T: Scalar>(what: &'static str, entries: &[T]) -> Result<(), GeometryError> {
     match entries.iter().position(|e| !e.extent().is_finite()) {
         Some(index) => Err(GeometryError::NonFinite { what, index, value: entries[index].re() }),
@@ -230,8 +234,8 @@ fn finite<T: Scalar>(what: &'static str, entries: &[T]) -> Result<(), GeometryEr
     }
 }
 
-/// Integrates equations of motion over a duration by panels. In the result `b` is that of the last state, grown from
-/// `from.b`.
+/// Integrates equations of motion over a duration by panels. In the result `b` is that of the final state; its initial
+/// value is `from.b`.
 pub(crate) fn integrate<T: Scalar, const N: usize>(
     rates: &dyn Rates<N, T>,
     t0: f64,
@@ -249,17 +253,19 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
     let mut sums = Sums::new(from);
     let (mut done, mut panels, mut evaluations) = (Sum::from(0.0), 0, 1);
     let mut start = rates.at(t0, from)?;
-    // The longest panel that seems possible, and the collocation for it.
+    // The length of the longest panel that seems possible.
     let mut longest = duration.abs();
-    // Refusals since a panel has come past the nearest end that was refused, and how far that is.
+    // The number of refusals since a panel has passed the nearest refused end, and the distance to that end.
     let (mut refusals, mut wall) = (0, f64::INFINITY);
-    // The length of the first of these; and how far it is to a place at which a panel has missed something, which no other may pass.
+    // The length of the first refused panel; and the distance to a point at which a panel has missed something, which
+    // the following panels may not pass.
     let (mut usual, mut suspect) = (longest, f64::INFINITY);
-    // The longest panel until here.
+    // The longest panel so far.
     let mut scale: f64 = 0.0;
-    // What rounding makes of the rates, and the largest velocity and action until here.
+    // The effect of rounding on the rates, and the largest velocity and action so far.
     let (mut floor, mut units) = (Floor::default(), [Size::default(); 3]);
-    // What the rounding of the time makes of them: far from t = 0 it is all that is known of a force in time.
+    // The effect on the rates of rounding the time: far from t = 0 it limits the accuracy of a force that depends on
+    // time.
     let mut of_time = Floor::default();
     let mut cause = None;
     let mut at = *from;
@@ -291,7 +297,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
         }
         units = [units[0].or(Size::of(&at.v)), units[1].or(Size::of([&at.z])), Size([1.0, f64::INFINITY])];
         let narrow = (refusals >= NARROW).then_some(units);
-        // At rest velocities are known to the rounding of the positions in the time of a panel.
+        // At rest, velocities are determined up to the rounding of the positions over the time of a panel.
         let time = if panels == 0 { duration.abs() } else { scale };
         let at_rest = [units[0].or(Size::of(&at.q).times(1.0 / time)), units[1], units[2]];
         let part = h / duration;
@@ -318,7 +324,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                 done.add(h);
                 ended = ends;
                 start = panel.last;
-                // Beyond some twenty sweeps two panels of half the length are cheaper.
+                // Beyond some twenty iterations two panels of half the length are less expensive.
                 let slow = if panel.sweeps > 20 { 0.7 } else { f64::INFINITY };
                 longest = h.abs() * stretch(&panel, accuracy).min(slow).clamp(0.5, 3.0);
                 suspect = if h.abs() >= 0.999 * suspect { f64::INFINITY } else { suspect - h.abs() };
@@ -338,7 +344,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                     usual = h.abs();
                 }
                 if refusals == 0 || refusals >= HALVING {
-                    // What rounding makes of the rates here, which no panel can resolve.
+                    // The effect of rounding on the rates here, which no panel can resolve.
                     counted += 3;
                     let later = t + 2.0 * f64::EPSILON * t.abs();
                     of_time = match (rates.at(t, &at), rates.at(later, &at)) {

@@ -10,7 +10,7 @@ pub(crate) const MOST: usize = 24;
 /// The numbers of nodes that a panel may have: few for a short one, many for a long one.
 const SIZES: [usize; 4] = [4, 8, 14, MOST];
 
-/// The golden ratio less one: the fractional parts of its multiples are the most evenly spread of all numbers'.
+/// The golden ratio minus one: of all numbers, the fractional parts of its multiples are the most evenly distributed.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Gauss collocation with `s` nodes on `[0, 1]`, for systems `q' = v, v' = a`.
@@ -29,28 +29,30 @@ pub(crate) struct Gauss {
     pub end: [f64; MOST],
     /// The functionals that give the last two Legendre coefficients of a function from its values at the nodes.
     pub tail: [[f64; MOST]; 2],
-    /// The functionals of the two coefficients half-way to the last.
+    /// The functionals that give the two coefficients halfway to the last.
     pub middle: [[f64; MOST]; 2],
-    /// The values at the nodes of the next larger collocation of the polynomial with given values at these nodes.
+    /// The interpolation matrix: from the values at these nodes to the values of their polynomial at the nodes of the
+    /// next larger collocation.
     pub refine: [[f64; MOST]; MOST],
-    /// The value at 0 of the polynomial with given values at the nodes.
+    /// The weights of the value at 0 of the polynomial with given values at the nodes.
     pub start: [f64; MOST],
-    /// Places apart from the nodes at which a solution is compared with its equations: the end; the Gauss points of one node more;
-    /// and those of the golden ratio's multiples, of which any number of the first are spread evenly.
+    /// The points other than the nodes at which a solution is compared with its equations: the end; the Gauss points of
+    /// one node more; and multiples of the golden ratio modulo 1, of which any number of the first are evenly
+    /// distributed.
     pub probes: Vec<Probe>,
 }
 
-/// A place on `[0, 1]` apart from the nodes, with the weights that continue a solution there from its values at the nodes.
+/// A point of `[0, 1]` other than the nodes, with the weights that give a solution there from its values at the nodes.
 pub(crate) struct Probe {
-    /// The place.
+    /// The point.
     pub c: f64,
-    /// Its weight in Gauss' quadrature with one node more; 0 apart from that.
+    /// Its weight in Gauss quadrature with one more node; 0 if it is not a node of that.
     pub weight: f64,
-    /// Of the rates themselves.
+    /// The weights of the rates.
     pub value: [f64; MOST],
-    /// Of their integral from 0.
+    /// The weights of the integral of the rates from 0.
     pub once: [f64; MOST],
-    /// Of its integral.
+    /// The weights of the integral of that integral.
     pub twice: [f64; MOST],
 }
 
@@ -60,10 +62,10 @@ pub(crate) const PROBES: usize = 128;
 /// The number of probes of the collocation with fewest nodes.
 pub(crate) const PROBES_STILL: usize = 1024;
 
-/// The Legendre polynomials that any number of nodes asks for.
+/// The number of Legendre polynomials that is sufficient for any number of nodes.
 const POLYNOMIALS: usize = MOST + 2;
 
-/// Gauss' weight for `[0, 1]` of a node x among s on `[-1, 1]`.
+/// The Gauss weight on `[0, 1]` of a node x, one of s nodes on `[-1, 1]`.
 fn weight(s: usize, x: f64) -> f64 {
     let below = s as f64 * legendre_polynomials::<_, POLYNOMIALS>(s, x)[s - 1];
     (1.0 - x * x) / (below * below)
@@ -77,7 +79,8 @@ impl Gauss {
             if i >= s {
                 return 0.0;
             }
-            // Tricomi's guess, then Newton: quadratic, so that five steps are more than enough.
+            // Tricomi's approximation, then Newton's method, which converges quadratically: five steps are more than
+            // enough.
             let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n + 0.5)).cos();
             for _ in 0..5 {
                 let p = legendre_polynomials::<_, POLYNOMIALS>(s, x);
@@ -92,8 +95,8 @@ impl Gauss {
         let polynomials: [_; MOST] = from_fn(|j| legendre_polynomials::<_, POLYNOMIALS>(s, nodes[j]));
         let c = from_fn(|j| (1.0 + nodes[j]) * 0.5);
         let rough: [f64; MOST] = from_fn(|j| if j < s { weight(s, nodes[j]) } else { 0.0 });
-        // The closed formula amplifies the nodes' rounding. One correction by the Legendre polynomials, whose integrals the
-        // weights must give, brings all of them to the last digit.
+        // The closed formula amplifies the rounding of the nodes. The exact integrals of the Legendre polynomials are
+        // known; one correction by them makes all weights accurate to the last digit.
         let defects: [f64; MOST] = from_fn(|k| {
             let sum: f64 = (0..s).map(|j| rough[j] * polynomials[j][k]).sum();
             if k == 0 { 1.0 - sum } else { -sum }
@@ -102,7 +105,8 @@ impl Gauss {
             let p = polynomials[j];
             rough[j] * (1.0 + (0..s).map(|k| (2 * k + 1) as f64 * p[k] * defects[k]).sum::<f64>())
         });
-        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
+        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k is a difference of
+        // two Legendre polynomials.
         let integrals = |x: f64| -> [f64; MOST] {
             let at = legendre_polynomials::<_, POLYNOMIALS>(s, x);
             from_fn(|j| {
@@ -149,7 +153,7 @@ impl Gauss {
     }
 }
 
-/// The tables, made once.
+/// The tables, computed once.
 static TABLES: LazyLock<[Gauss; 4]> =
     LazyLock::new(|| from_fn(|i| Gauss::new(SIZES[i], *SIZES.get(i + 1).unwrap_or(&SIZES[i]))));
 
@@ -162,8 +166,8 @@ pub(crate) fn collocations() -> &'static [Gauss; 4] {
 mod tests {
     use super::*;
 
-    /// Weights integrate all polynomials of degree `2s - 1`, the matrix those of degree `s - 1`; both to a few units of
-    /// round-off, the sums being of positive terms or of terms below one.
+    /// The weights integrate all polynomials of degree `2s - 1` and the matrix those of degree `s - 1`, both to a few
+    /// units of round-off, since the sums have positive terms or terms below one.
     #[test]
     fn the_coefficients_integrate_polynomials() {
         let eps = 4.0 * f64::EPSILON;
@@ -183,8 +187,9 @@ mod tests {
         }
     }
 
-    /// The weights between the nodes integrate what the collocation cannot see: the polynomial of degree s that vanishes at its
-    /// nodes, and all to degree `2s + 1`. Their closed formula amplifies the rounding of the nodes, some hundred times.
+    /// The weights of the probes integrate all polynomials up to degree `2s + 1`, also the polynomial of degree s that
+    /// vanishes at the nodes, which the collocation does not detect. Their closed formula amplifies the rounding of the
+    /// nodes some hundred times.
     #[test]
     fn the_weights_between_the_nodes_integrate_polynomials() {
         for g in collocations() {
@@ -195,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Polynomials of degree `s - 1` are carried to the next nodes.
+    /// Polynomials of degree `s - 1` are interpolated exactly at the next nodes.
     #[test]
     fn refinement_is_interpolation() {
         for pair in collocations().windows(2) {
@@ -207,7 +212,7 @@ mod tests {
         }
     }
 
-    /// On Legendre polynomials themselves.
+    /// Checked on the Legendre polynomials themselves.
     #[test]
     fn the_tail_is_the_last_two_legendre_coefficients() {
         for g in collocations() {

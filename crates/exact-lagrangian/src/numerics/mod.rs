@@ -1,4 +1,4 @@
-//! The flow of Herglotz' field to round-off: panels of Gauss collocation that follow the motion.
+//! The flow of the Herglotz vector field to round-off, by Gauss collocation on panels that adapt to the motion.
 
 pub(crate) mod flow;
 pub(crate) mod gauss;

@@ -1,11 +1,11 @@
-//! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
+//! One panel of a motion: collocation at Gauss points, solved by fixed-point iteration to round-off.
 
 use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{GeometryError, Scalar};
 
-/// The state of a motion `q'' = a`, with two more quantities that grow along it.
+/// The state of a motion `q'' = a`, with two more quantities that are integrated along it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<const N: usize, T = f64> {
     pub q: SVector<T, N>,
@@ -29,7 +29,7 @@ impl<const N: usize, T: Scalar> Rate<N, T> {
         Rate { a: SVector::from_element(T::zero()), z: T::zero(), b: T::zero() }
     }
 
-    /// The sum of the nodes' rates with these weights.
+    /// The sum of the rates at the nodes with these weights.
     #[inline(always)]
     fn sum(nodes: &[Self], weights: &[f64; MOST]) -> Self {
         let mut sum = Self::zero();
@@ -44,8 +44,9 @@ impl<const N: usize, T: Scalar> Rate<N, T> {
     }
 }
 
-/// The equations of a motion over the scalar T: what Herglotz' equations, Chetaev's, and the action along a given curve have in
-/// common. As an object, so that the integration is compiled once for all of them: a call is little beside the rates.
+/// Equations of motion over the scalar T: the common interface of Herglotz' equations, Chetaev's equations, and the
+/// action along a given curve. It is used as a trait object, so that the integration is compiled once for all of them;
+/// the cost of a call is small compared with that of the rates.
 pub(crate) trait Rates<const N: usize, T> {
     /// The rates at a time and a state.
     ///
@@ -53,13 +54,13 @@ pub(crate) trait Rates<const N: usize, T> {
     /// A [`GeometryError`] where they are not defined.
     fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError>;
 
-    /// Whether the motion cannot go on from one state to another since what it follows jumps between them.
+    /// Whether the Lagrangian jumps between two states, so that the motion cannot be continued from one to the other.
     fn jumps_between(&self, _ends: [(f64, &State<N, T>); 2]) -> bool {
         false
     }
 }
 
-/// A panel that has been solved: the velocity at its start, what changes along it, and how exactly.
+/// A solved panel: the velocity at its start, the changes along it, and their error.
 pub(crate) struct Panel<const N: usize, T> {
     pub v0: SVector<T, N>,
     pub displacement: SVector<T, N>,
@@ -68,24 +69,25 @@ pub(crate) struct Panel<const N: usize, T> {
     pub last: Rate<N, T>,
     /// The estimated relative error of the end values.
     pub error: f64,
-    /// The largest factor by which a sweep after the second reduced the changes.
+    /// The largest contraction factor of the changes after the second iteration.
     pub contraction: f64,
     /// The number of nodes.
     pub nodes: usize,
-    /// The sweeps that were made with the last number of nodes.
+    /// The number of iterations with the last number of nodes.
     pub sweeps: u32,
 }
 
 /// The position at a panel's end, where it is given instead of the velocity at the start.
 pub(crate) struct End<'a, const N: usize, T> {
     pub displacement: &'a SVector<T, N>,
-    /// The inverse of `dq1/dv0`, or what is known of it: `1/h` is that of a free motion, and good enough in a short time.
+    /// The inverse of `dq1/dv0`, or an approximation of it: `1/h` is that of a free motion, and sufficient for short
+    /// times.
     pub inverse: &'a SMatrix<f64, N, N>,
-    /// The factor of contraction above which the iteration is given up, for want of a better inverse.
+    /// The contraction factor above which the iteration is given up, because a better inverse is needed.
     pub patience: f64,
 }
 
-/// Why a panel could not be solved; a shorter one may be.
+/// The reason why a panel could not be solved; a shorter panel may succeed.
 pub(crate) enum Refused {
     /// The iteration does not contract.
     Slow,
@@ -93,25 +95,25 @@ pub(crate) enum Refused {
     NonFinite,
     /// The rates are not defined at a node.
     Undefined(GeometryError),
-    /// The nodes miss something: at this part of the panel the rates are not those of the polynomial.
+    /// The nodes miss a feature: at this fraction of the panel the rates differ from their polynomial.
     Hidden(f64),
 }
 
-/// The smallest positive number, by which all below [`f64::MIN_POSITIVE`] are rounded.
+/// The smallest positive number, which is the spacing of the numbers below [`f64::MIN_POSITIVE`].
 pub(crate) const SMALLEST: f64 = f64::MIN_POSITIVE * f64::EPSILON;
 
-/// The sweeps after which an iteration counts as not contracting.
+/// The number of iterations after which the iteration counts as not contracting.
 const SWEEPS: u32 = 40;
 
-/// The largest size, of the values alone and of the values with their differentials: over duals both must converge, and
-/// neither may hide behind the other.
+/// The largest absolute value, of the values alone and of the values with their differentials. On duals both must
+/// converge; they are kept apart so that neither masks the other.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Size(pub [f64; 2]);
 
 impl Size {
     #[inline(always)]
     fn see<T: Scalar>(&mut self, x: T) {
-        // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
+        // Comparisons instead of `f64::max`: an extent is never NaN, and for a plain number it is the modulus.
         let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
         let modulus = if plain { extent } else { x.pivot_size() };
         if modulus > self.0[0] {
@@ -129,7 +131,8 @@ impl Size {
         size
     }
 
-    /// The larger of the two quotients; infinite where a size is, and 0 where it is not above a floor, as it is for 0/0.
+    /// The larger of the two quotients; infinite where a size is infinite, and 0 where a size does not exceed its
+    /// floor, also for 0/0.
     #[inline]
     fn over(self, scale: Size, floor: Size) -> f64 {
         let quotient = |i: usize| match self.0[i] {
@@ -140,26 +143,26 @@ impl Size {
         max_or_nan(quotient(0), quotient(1))
     }
 
-    /// The same multiple of both.
+    /// Both sizes times a factor.
     #[inline]
     pub fn times(self, factor: f64) -> Size {
         Size(self.0.map(|s| s * factor))
     }
 
-    /// The larger of each.
+    /// The larger of each pair of sizes.
     #[inline]
     pub fn or(self, other: Size) -> Size {
         Size([max_or_nan(self.0[0], other.0[0]), max_or_nan(self.0[1], other.0[1])])
     }
 }
 
-/// Sizes of rates that are nothing, of a, z and b: what rounding alone makes of them, and what lets none of the changes along a
-/// panel be a normal number.
+/// The sizes of the rates a, z and b below which they are negligible: changes of this size are caused by rounding
+/// alone, or change no quantity along a panel by a normal number.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Floor([Size; 3]);
 
 impl Floor {
-    /// From the rates at a state and at the same state with its last digits changed.
+    /// Computed from the rates at a state and at the same state with its last digits changed.
     pub fn between<const N: usize, T: Scalar>(one: &Rate<N, T>, other: &Rate<N, T>) -> Self {
         let of = |d: T| Size::of([&d]);
         let a = (0..N).fold(Size::default(), |size, i| size.or(of(one.a[i] - other.a[i])));
@@ -167,20 +170,20 @@ impl Floor {
         Floor([a, of(one.z - other.z), of(one.b - other.b)].map(finite))
     }
 
-    /// At most what changes velocity, action and b by four roundings of these units along a panel: where rounding makes more,
-    /// the motion is not determined by its rounded state.
+    /// The floor, limited to rates that change velocity, action and b by four roundings of these units along a panel.
+    /// Where rounding has a larger effect, the motion is not determined by its rounded state.
     pub fn below(self, units: &[Size; 3], h: f64) -> Self {
         let most = |i: usize, k: usize| 4.0 * f64::EPSILON * units[i].0[k] / h.abs();
         Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(most(i, k))))))
     }
 
-    /// The larger of two.
+    /// The larger of each pair of sizes.
     pub fn or(self, other: Self) -> Self {
         Floor(std::array::from_fn(|i| self.0[i].or(other.0[i])))
     }
 
-    /// A multiple of what rounding makes, and at least what changes nothing by more than some of the smallest numbers along a panel
-    /// of this length.
+    /// The floor times a factor, and at least the rates that change nothing by more than some of the smallest numbers
+    /// along a panel of this length.
     #[inline]
     fn over(&self, h: f64, factor: f64) -> [Size; 3] {
         let least = SMALLEST * factor / f64::min(h.abs(), 1.0);
@@ -188,7 +191,7 @@ impl Floor {
     }
 }
 
-/// Changes of a sweep and the scales to compare them with, for velocity, action and b.
+/// The changes of the rates in one iteration and the scales to compare them with, for velocity, action and b.
 #[derive(Default)]
 struct Sweep {
     changes: [Size; 3],
@@ -208,7 +211,8 @@ impl Sweep {
         self.scales[2].see(new.b);
     }
 
-    /// The largest relative change: of the velocity in units of the velocity, of the rates of z and b in units of them.
+    /// The largest relative change: that of the velocity relative to the velocity, those of the rates of z and b
+    /// relative to the rates.
     #[inline]
     fn max_abs_or_nan(&self, h: f64, floor: &[Size; 3]) -> f64 {
         let over = |i: usize| self.changes[i].over(self.scales[i], floor[i]);
@@ -216,28 +220,30 @@ impl Sweep {
     }
 }
 
-/// A panel from a state at a time over a duration; where the end is given, the initial velocity is an unknown, and `from.v` not read.
+/// The problem of a panel, from a state at a time over a duration. If the end is given, the initial velocity is an
+/// unknown, and `from.v` is not used.
 pub(crate) struct Problem<'a, const N: usize, T> {
     pub t: f64,
     pub h: f64,
     pub from: &'a State<N, T>,
     pub end: Option<End<'a, N, T>>,
-    /// The relative error that is wanted; half a unit of round-off at least.
+    /// The requested relative error, at least half a unit of round-off.
     pub accuracy: f64,
-    /// What is nothing beside the rates.
+    /// The sizes below which rates are negligible.
     pub floor: Floor,
-    /// The part of the whole motion that the panel is.
+    /// The length of the panel relative to the whole motion.
     pub part: f64,
-    /// Where a panel has been refused again and again: the largest velocity and action of the motion until here, and the unit of b.
-    /// Then few nodes are tried, and a jump of the rates is passed where it changes none of these by more than a rounding.
+    /// Set after repeated refusals: the largest velocity and action of the motion so far, and the unit of b. Few nodes
+    /// are then tried, and a jump of the rates is passed where it changes none of these by more than a rounding.
     pub narrow: Option<[Size; 3]>,
 }
 
-/// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion. A
-/// solution is then compared with the equations between its nodes.
+/// Solves a panel, first with few nodes. As long as they do not resolve the motion, more nodes are used, starting from
+/// the solution with fewer. A solution is then compared with the equations between its nodes.
 ///
-/// `v0` is the initial velocity, or a guess of it that is improved upon, also if the panel is refused. A panel that the most nodes
-/// do not resolve is returned with its error. The evaluations of the rates are counted in `evaluations`.
+/// `v0` is the initial velocity, or a guess that is improved, also if the panel is refused. A panel that the largest
+/// number of nodes does not resolve is returned with its error. The evaluations of the rates are counted in
+/// `evaluations`.
 pub(crate) fn collocate<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
@@ -269,12 +275,12 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
     Err(Refused::Slow)
 }
 
-/// Compares a solution with its equations at the panel's ends and between its nodes, where something narrow may hide; the rates at
-/// the end.
+/// Compares a solution with its equations at the panel's ends and between its nodes, where narrow features may be
+/// missed. Returns the rates at the end.
 ///
-/// There are so many probes that a motion is looked at in all at [`PROBES`] places and more if it is long, which is to say, if it
-/// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) if there is no
-/// force at all.
+/// The number of probes is such that a long motion, which changes its position or its velocity by as much as they are,
+/// is checked at [`PROBES`] points or more in total; a motion without any force is checked at
+/// [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) points.
 #[expect(clippy::too_many_arguments, reason = "the panel, its rates, and what is counted")]
 fn between_nodes<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
@@ -295,7 +301,7 @@ fn between_nodes<const N: usize, T: Scalar>(
     let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
     let floor = problem.floor.over(h, 64.0);
     let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, max_or_nan);
-    // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
+    // The defect of a rate that is accepted: the polynomial's own error, and what changes the state by roundings.
     let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
     let allowed: [f64; 3] = std::array::from_fn(|i| {
         let rounding = max_or_nan(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
@@ -313,7 +319,7 @@ fn between_nodes<const N: usize, T: Scalar>(
     }
     let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, max_or_nan);
     let still = largest[0] == 0.0;
-    // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
+    // For a motion of many panels the change of the velocity also counts: the motion may have come to rest.
     let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
     let share = if still { 1.0 } else { max_or_nan(moved / max_or_nan(position, moved), faster).min(1.0) };
     let places = if still { g.probes.len() } else { PROBES };
@@ -342,8 +348,9 @@ fn between_nodes<const N: usize, T: Scalar>(
         }
         last = last.or(Some(rate));
     }
-    // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
-    // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
+    // The mean of the polynomial's own error vanishes, up to an order beyond that of the panel, and so does its first
+    // moment. Those of a force that is too small to exceed this error, and too fast for the nodes, both vanish only by
+    // an unlikely coincidence.
     let mean = std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(largest[i], state[i] / h.abs()) + floor[i].0[0]);
     if !missed.iter().all(|missed| within(missed, &mean)) {
         return Err(Refused::Hidden(0.0));
@@ -351,12 +358,12 @@ fn between_nodes<const N: usize, T: Scalar>(
     Ok(last.unwrap_or(panel.last))
 }
 
-/// Solves the collocation equations by iteration, from the rates in `nodes` and the velocity `v0`, and leaves the solution
-/// there.
+/// Solves the collocation equations by fixed-point iteration, from the rates in `nodes` and the velocity `v0`, which
+/// are overwritten with the solution.
 ///
-/// A sweep evaluates the rates node by node, each from the latest. The iteration ends when the next change, predicted from
-/// the last two, is below the accuracy, when changes within round-off no longer fall, or when it is clear that the nodes do
-/// not resolve the motion.
+/// Each iteration evaluates the rates node by node, from the latest values. It ends when the next change, predicted
+/// from the last two, is below the accuracy, when changes within round-off no longer decrease, or when it is clear that
+/// the nodes do not resolve the motion.
 fn sweeps<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
@@ -406,7 +413,8 @@ fn sweeps<const N: usize, T: Scalar>(
         }
         let change = seen.max_abs_or_nan(h, &nothing);
         if !change.is_finite() {
-            // After a first guess of zero rates a scale may be zero; one sweep later a value is not a number.
+            // After a first guess of zero rates a scale may be zero; in later iterations the reason is a value that is
+            // not finite.
             if sweep > 1 {
                 return Err(Refused::NonFinite);
             }
@@ -418,10 +426,10 @@ fn sweeps<const N: usize, T: Scalar>(
         if sweep > 2 && above_noise {
             contraction = contraction.max(ratio);
         }
-        // The first ratio compares with the change from a guess, and may be far below those that follow.
+        // The first ratio involves the change from a guess, and may be far below those that follow.
         let expected = if sweep < 3 { ratio.max(1e-3) } else { ratio };
         let predicted = change * expected <= 0.5 * accuracy;
-        // After few sweeps a larger change may still be one that is on its way.
+        // After few iterations a larger change may still decrease.
         let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
         let stagnant =
             before.is_finite() && ratio >= 1.0 && (change <= noise || seen.max_abs_or_nan(h, &rounding) == 0.0);
@@ -455,11 +463,12 @@ fn sweeps<const N: usize, T: Scalar>(
 
 /// The estimated relative error of the changes over a panel, from the rates at its nodes.
 ///
-/// The interpolation of the rates misses a part of the size of their last Legendre coefficients; Gauss' weights annihilate
-/// it up to a product with the like part of the adjoint motion. So the error is the square of the relative tail; for
-/// `v' = c v` this is exactly the error of the Padé approximation, up to the factor `1 / (2s + 1)` that is applied. That holds
-/// where the coefficients fall geometrically, so that the tail is the square of what is half-way to it: of a function with a kink
-/// they fall by a power only, and the second factor is that from half-way to the end.
+/// The interpolation error of the rates has the size of their last Legendre coefficients. The Gauss weights annihilate
+/// it up to a product with the corresponding error of the adjoint motion, so that the error is the square of the
+/// relative tail; for `v' = c v` this is exactly the error of the Padé approximation, up to the factor `1 / (2s + 1)`
+/// that is applied. This holds where the coefficients decrease geometrically, so that the tail is the square of the
+/// relative size of the coefficients halfway to it. For a function with a kink they decrease algebraically; the second
+/// factor is then the square of their decrease from halfway to the end.
 fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N, T>], seen: &Sweep, g: &Gauss) -> f64 {
     let h = problem.h;
     let floor = problem.floor.over(h, 32.0);
@@ -472,7 +481,7 @@ fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N,
     let relative: [f64; 3] = std::array::from_fn(|i| {
         let tail = tails[i].over(scales[i], floor[i]);
         let fall = tails[i].over(middle[i], floor[i]);
-        // Below some roundings the coefficients do not fall.
+        // Below some roundings the coefficients do not decrease.
         if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * max_or_nan(tail, (fall * fall).min(1.0)) }
     });
     let velocity = match relative[0] {

@@ -1,4 +1,4 @@
-//! Herglotz' principle: the action of a curve, and how it changes with the curve.
+//! Herglotz' principle: the action of a curve, and its derivative with respect to the curve.
 
 use crate::numerics::flow::{ACCURACY, Work, integrate};
 use crate::numerics::panel::{Rate, Rates, State};
@@ -11,13 +11,13 @@ use std::cell::RefCell;
 ///
 /// Any function of time that returns both is a curve; it must be smooth between its [`breaks`](Self::breaks).
 pub trait Curve<const N: usize> {
-    /// Position and velocity a time s after the start.
+    /// Position and velocity at the time s after the start.
     ///
     /// # Errors
     /// A [`GeometryError`] where the curve is not defined.
     fn at(&self, s: f64) -> Result<(SVector<f64, N>, SVector<f64, N>), GeometryError>;
 
-    /// The times, in their order, at which the curve is not smooth: the nodes of a spline.
+    /// The times, in ascending order, at which the curve is not smooth, such as the nodes of a spline.
     fn breaks(&self) -> &[f64] {
         &[]
     }
@@ -54,7 +54,7 @@ pub struct VariedCurve<'a, C, V> {
     pub curve: &'a C,
     /// The variation; its breaks must be among the curve's.
     pub variation: &'a V,
-    /// The multiple.
+    /// The factor of the variation.
     pub by: f64,
 }
 
@@ -82,8 +82,8 @@ pub struct CurveAction {
 /// `z' = L(t0 + s, q(s), q'(s), z)`, `z(0) = z0`; paper, section 2.2.1.
 ///
 /// # Errors
-/// [`ExactError::Input`] for non-finite arguments; those of the curve; [`ExactError::OutsideDomain`] where the action is not
-/// defined up to the end, with what was reached.
+/// [`ExactError::Input`] for non-finite arguments; those of the curve; [`ExactError::OutsideDomain`] where the action
+/// is not defined up to the end, with the state reached.
 pub fn action<C: Curve<N>, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     curve: &C,
@@ -96,8 +96,8 @@ pub fn action<C: Curve<N>, const N: usize>(
 }
 
 /// The derivative of the action of a curve along a variation of the curve and of `z0`: the solution at the end of
-/// `dz' = L_q dq + L_v dv + L_z dz`, `dz(t0) = dz0`. The ends are fixed if the variation vanishes there; then Herglotz' principle
-/// says that it is zero for every variation, with `dz0 = 0`, exactly if the curve solves Herglotz' equations; paper, section 2.2.1.
+/// `dz' = L_q dq + L_v dv + L_z dz`, `dz(t0) = dz0`. By Herglotz' principle it is zero for all variations that vanish
+/// at both ends, with `dz0 = 0`, if and only if the curve solves Herglotz' equations; paper, section 2.2.1.
 ///
 /// # Errors
 /// Those of [`action`].
@@ -112,22 +112,23 @@ pub fn action_derivative<const N: usize>(
     Ok(along.solve(duration, (z0, dz0))?.1)
 }
 
-/// The action along a curve as equations of motion whose position stays zero: `z' = L`, and `b' = L_z` or, with a variation, `b = dz`.
+/// The action along a curve, as equations of motion with position zero: `z' = L`, and `b' = L_z` or, with a variation,
+/// `b = dz`.
 struct AlongCurve<'a, L, C, V, const N: usize> {
     lagrangian: &'a L,
     curve: &'a C,
     /// The time at which the curve starts.
     t0: f64,
     variation: Option<&'a V>,
-    /// What was read of the curve and of its variation last, by the time: the sweeps of a panel come back to the same times, and a curve may be
-    /// a whole motion to compute.
+    /// The points of the curve and of its variation that were evaluated last, with their times: the iterations of a
+    /// panel return to the same times, and a point of a curve may require the computation of a whole motion.
     read: RefCell<Vec<(f64, [CurvePoint<N>; 2])>>,
 }
 
 /// Position and velocity on a curve.
 type CurvePoint<const N: usize> = (SVector<f64, N>, SVector<f64, N>);
 
-/// The times that are kept: those of a panel and of the one before.
+/// The number of times that are kept, sufficient for a panel and the one before.
 const KEPT: usize = 64;
 
 impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> for AlongCurve<'_, L, C, V, N> {
@@ -145,7 +146,7 @@ impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> f
 }
 
 impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> AlongCurve<'_, L, C, V, N> {
-    /// The curve and its variation at a time; 0 for one that is not there.
+    /// The curve and its variation at a time; 0 if there is no variation.
     fn read(&self, s: f64) -> Result<[CurvePoint<N>; 2], GeometryError> {
         let mut read = self.read.borrow_mut();
         if let Some((_, points)) = read.iter().rev().find(|(at, _)| at.to_bits() == s.to_bits()) {
@@ -177,7 +178,7 @@ impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> AlongCurve<'_, 
         Ok((z, b))
     }
 
-    /// The error with the curve's state put in.
+    /// The error with the state of the curve.
     fn located(&self, error: ExactError<N>) -> ExactError<N> {
         let on_curve = |s: f64, z: f64| {
             let (q, v) = self.curve.at(s).unwrap_or((SVector::zeros(), SVector::zeros()));

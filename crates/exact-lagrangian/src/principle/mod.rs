@@ -1,4 +1,4 @@
-//! Herglotz' principle for curves, and the constrained system that the paper proves its theorems with.
+//! Herglotz' principle for curves, and the constrained system used in the proofs of the paper.
 
 mod curve;
 mod nonholonomic;

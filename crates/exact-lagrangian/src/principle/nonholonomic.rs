@@ -31,12 +31,12 @@ impl<const N: usize, T: Scalar> ExtendedPoint<N, T> {
     }
 }
 
-/// The singular Lagrangian `L~ = L o pi` on T(Q x R) with the non-linear constraint `Phi = w - L(q, v, z) = 0`, the submanifold
-/// `M_L`; paper, section 4.1.
+/// The singular Lagrangian `L~ = L o pi` on T(Q x R) with the non-linear constraint `Phi = w - L(q, v, z) = 0`, the
+/// submanifold `M_L`; paper, section 4.1.
 ///
-/// Chetaev's principle gives its equations of motion, with a multiplier lambda:
-/// `d/dt L~_v - L~_q = lambda Phi_v`, `d/dt L~_w - L~_z = lambda Phi_w`, `Phi = 0`. The multiplier is solved for along with
-/// the accelerations; that it is `-L_z`, which makes these Herglotz' equations, is a theorem and not used.
+/// Chetaev's principle gives its equations of motion, with a multiplier lambda: `d/dt L~_v - L~_q = lambda Phi_v`,
+/// `d/dt L~_w - L~_z = lambda Phi_w`, `Phi = 0`. The multiplier is computed together with the accelerations. The
+/// theorem that it is `-L_z`, by which these are Herglotz' equations, is not used.
 #[derive(Clone, Copy, Debug)]
 pub struct NonHolonomic<L> {
     lagrangian: L,
@@ -56,14 +56,14 @@ pub struct Chetaev<const N: usize, T = f64> {
 /// A motion on `M_L`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExtendedMotion<const N: usize, T = f64> {
-    /// Where it ends.
+    /// The end of the motion.
     pub end: ExtendedPoint<N, T>,
-    /// The largest defect `|w - L|` of the constraint at the ends of eight parts of the motion, relative to `1 + |L|`. The flow
-    /// keeps to `M_L` by its equations alone; nothing projects.
+    /// The largest defect `|w - L|` of the constraint at the ends of eight parts of the motion, relative to `1 + |L|`.
+    /// The flow stays on `M_L` by its equations alone, without projection.
     pub defect: f64,
 }
 
-/// The parts of a motion after which the constraint is looked at.
+/// The number of parts of a motion, at whose ends the constraint is checked.
 const PARTS: usize = 8;
 
 impl<L> NonHolonomic<L> {
@@ -80,8 +80,9 @@ impl<L> NonHolonomic<L> {
         ExtendedPoint { q: x.q, z: x.z, v: x.v, w: self.lagrangian.value(T::from(t), &x.q, &x.v, x.z) }
     }
 
-    /// Chetaev's equations solved for accelerations and multiplier: `N + 2` linear equations, the last the constraint's
-    /// derivative in time. Defined on all of T(Q x R), tangent to the sets `Phi = const`.
+    /// Chetaev's equations solved for accelerations and multiplier: `N + 2` linear equations, of which the last is the
+    /// time derivative of the constraint. They are defined on all of T(Q x R), and the solution is tangent to the sets
+    /// `Phi = const`.
     ///
     /// # Errors
     /// [`GeometryError::Singular`] where W is singular, [`GeometryError::Undefined`] where a term is not finite.
@@ -106,7 +107,7 @@ impl<L> NonHolonomic<L> {
         let time = moving(T::from(t), T::one());
         let value = self.lagrangian.value(time, &y.q, &y.v, y.z);
         let g = self.lagrangian.gradient(time, &y);
-        // Unknowns a, dw, lambda. L~ knows nothing of w; Phi_v = -L_v, Phi_w = 1.
+        // Unknowns a, dw, lambda. L~ does not depend on w; Phi_v = -L_v, Phi_w = 1.
         let mut matrix = DMatrix::from_element(N + 2, N + 2, T::zero());
         let mut right = DVector::from_element(N + 2, T::zero());
         for i in 0..N {
@@ -154,8 +155,9 @@ impl<L> NonHolonomic<L> {
         Ok(ExtendedMotion { end: at, defect })
     }
 
-    /// The differential of `exp_h^Gamma o (pi|M_L)^-1 : (q0, v0, z0) -> (q0, z0, q1, z1)`: `2N + 2` rows, `2N + 1` columns in the
-    /// order of TQ x R. Its columns span the tangent space of `M_d`, the image of the non-holonomic exponential map.
+    /// The differential of `exp_h^Gamma o (pi|M_L)^-1 : (q0, v0, z0) -> (q0, z0, q1, z1)`: `2N + 2` rows, `2N + 1`
+    /// columns in the order of TQ x R. Its columns span the tangent space of `M_d`, the image of the non-holonomic
+    /// exponential map.
     ///
     /// # Errors
     /// Those of [`flow`](Self::flow).
@@ -178,12 +180,12 @@ impl<L> NonHolonomic<L> {
         }))
     }
 
-    /// How regular `pr~_1 : (q0, z0, q1, z1) -> (q0, q1, z0)` restricted to `M_d` is: the singular values of its restriction to the
-    /// tangent space of `M_d`, in an orthonormal basis of that; paper, section 4.1, lemma.
+    /// The regularity of `pr~_1 : (q0, z0, q1, z1) -> (q0, q1, z0)` restricted to `M_d`: the singular values of its
+    /// restriction to the tangent space of `M_d`, in an orthonormal basis of that space; paper, section 4.1, lemma.
     ///
-    /// `M_d` is a graph over Q x Q x R, of `z1 = z0 + L_h^e`. So the smallest is
-    /// `(1 + |D1 L_h^e|^2 + |D2 L_h^e|^2 + sigma_d^2)^(-1/2)` wherever the exponential map is an embedding, and never vanishes
-    /// there: a conjugate point is where that map itself folds, and `M_d` has no tangent space.
+    /// `M_d` is the graph of `z1 = z0 + L_h^e` over Q x Q x R. Hence the smallest singular value is
+    /// `(1 + |D1 L_h^e|^2 + |D2 L_h^e|^2 + sigma_d^2)^(-1/2)` wherever the exponential map is an embedding, and does
+    /// not vanish there. At a conjugate point the exponential map itself has a fold, and `M_d` has no tangent space.
     ///
     /// # Errors
     /// Those of [`flow`](Self::flow).
@@ -202,7 +204,7 @@ impl<L> NonHolonomic<L> {
 }
 
 impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for NonHolonomic<L> {
-    /// The second quantity that grows along the motion is w.
+    /// The second integrated quantity, `b`, is w.
     fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
         let solved = self.chetaev(t, &ExtendedPoint { q: x.q, z: x.z, v: x.v, w: x.b })?;
         Ok(Rate { a: solved.a, z: x.b, b: solved.dw })

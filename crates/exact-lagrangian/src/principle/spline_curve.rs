@@ -6,8 +6,8 @@ use contact_geom::nalgebra::SVector;
 use cubic_splines::{BoundaryCondition, Spline};
 use discrete_herglotz::InputError;
 
-/// The cubic spline through points of Q at given times, counted from the curve's start: a [`Curve`] from measured or computed nodes, twice continuously
-/// differentiable. Defined between the first time and the last.
+/// The cubic spline through points of Q at given times, counted from the curve's start: a [`Curve`] from measured or
+/// computed nodes, twice continuously differentiable. Defined between the first time and the last.
 #[derive(Clone, Debug)]
 pub struct SplineCurve<const N: usize> {
     times: Vec<f64>,
@@ -15,12 +15,13 @@ pub struct SplineCurve<const N: usize> {
 }
 
 impl<const N: usize> SplineCurve<N> {
-    /// The spline through these points. With the velocities at both ends its error is of order four in the distance of the
-    /// times; without (`None`) it bends nowhere at the ends, which costs two orders there.
+    /// The spline through these points. With the velocities at both ends its error is of order four in the spacing of
+    /// the times; without them (`None`) the second derivative is zero at the ends, which reduces the order there by
+    /// two.
     ///
     /// # Errors
-    /// [`InputError::Count`] for fewer than three nodes or as many times as points, [`InputError::Geometry`] where a number is
-    /// not finite, or a time not later than the one before.
+    /// [`InputError::Count`] for fewer than three nodes; [`InputError::Geometry`] where the numbers of times and points
+    /// differ, a number is not finite, or the times do not increase.
     pub fn new(
         times: &[f64],
         points: &[SVector<f64, N>],
@@ -70,7 +71,7 @@ impl<const N: usize> Curve<N> for SplineCurve<N> {
             SVector::<f64, N>::from_iterator(self.coordinates.iter().map(|c| of(c, s)))
         };
         let (q, v) = (each(Spline::eval), each(Spline::eval_derivative));
-        // Nodes near the largest number overflow between them.
+        // Between nodes near the largest number the spline overflows.
         if !q.iter().chain(v.iter()).all(|c| c.is_finite()) {
             return Err(GeometryError::Undefined { what: "the spline" });
         }

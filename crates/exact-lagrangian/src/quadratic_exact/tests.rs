@@ -1,4 +1,4 @@
-//! Against the closed forms of the catalogue, and against the flow to round-off.
+//! Comparison with the closed forms of the catalogue, and with the flow to round-off.
 
 use super::*;
 use crate::herglotz_flow;
@@ -15,16 +15,16 @@ const EPS: f64 = f64::EPSILON;
 /// The largest errors of a comparison, in units of round-off.
 #[derive(Debug, Default)]
 struct Units {
-    /// Of q and v relative to the largest coordinate, of z to its square.
+    /// The error of q and v relative to the largest coordinate, and of z relative to its square.
     motion: f64,
-    /// Of the action from and to given points, relative to itself.
+    /// The error of the action between given points, relative to the action.
     value: f64,
-    /// Of the momenta that are its derivatives, relative to the largest.
+    /// The error of the momenta, which are its derivatives, relative to the largest.
     momenta: f64,
 }
 
 impl Units {
-    /// Takes in what is found for the motion from a start to an end known to round-off, with its action apart.
+    /// Includes the errors of the motion from a start to an end known to round-off; the action is given separately.
     fn compare<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -47,7 +47,7 @@ impl Units {
         let of_motion = ((motion.q - end.q).max_abs_or_nan().max_or_nan((motion.v - end.v).max_abs_or_nan()) / size)
             .max_or_nan((motion.z - end.z).abs() / end.z.abs().max_or_nan(size * size));
         let (p0, p1) = (lagrangian.gradient(0.0, start).y, lagrangian.gradient(0.0, end).y);
-        // A rounding of q0 moves the momenta by about p/|q1 - q0| times it, and the action by p times it.
+        // A rounding of q0 changes the momenta by about p/|q1 - q0| times itself, and the action by p times itself.
         let ill = start.q.max_abs_or_nan() / (end.q - start.q).max_abs_or_nan();
         let largest = p0.max_abs_or_nan().max_or_nan(p1.max_abs_or_nan());
         let of_momenta = (jet.d1 / jet.sigma() + p0).max_abs_or_nan().max_or_nan((jet.d2 - p1).max_abs_or_nan())
@@ -64,12 +64,12 @@ impl Units {
     }
 }
 
-/// The drags and steps; a strong drag with a shorter step.
+/// All pairs of drags and steps, with shorter steps for strong drag.
 fn cases() -> impl Iterator<Item = (f64, f64)> {
     GAMMAS.into_iter().flat_map(|gamma| STEPS.map(|h| (gamma, if gamma < -2.5 { h * 0.05 } else { h })))
 }
 
-/// Starts with and without an initial position and action. From the origin no digit of q1 - q0 is lost.
+/// Starts with and without an initial position and action. For a start at the origin no digit of q1 - q0 is lost.
 const STARTS: [[f64; 3]; 3] = [[0.0, 1.7, 0.0], [0.3, 1.7, -0.4], [-1.0, 0.5, 2.0]];
 
 #[test]
@@ -111,7 +111,7 @@ fn the_value_away_from_the_origin_keeps_all_digits_of_the_displacement() {
     let (mut worst, q0) = (0.0_f64, SVector::from([0.25, -0.5]));
     for (gamma, h) in cases() {
         let system = UniformField { field: [0.6, -1.3], gamma };
-        // Exact in binary, so that q1 - q0 is.
+        // Exact in binary, so that q1 - q0 is exact as well.
         let step = h.log2().floor().exp2();
         let q1 = q0 + SVector::from([1.5 * step, -0.75 * step]);
         let (ld, v0) = (QuadraticExact::new(&system, h), system.velocity_through(&q0, &q1, h));
@@ -130,7 +130,8 @@ fn the_small_part_that_the_start_has_in_the_displacement_is_not_lost() {
     for (gamma, h) in cases().filter(|(_, h)| *h <= 1e-5) {
         let (system, step) = (HarmonicOscillator { gamma }, h.log2().floor().exp2());
         let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!("{gamma}, {h}") };
-        // The displacement from 1 at rest, by the series of q'' = -q + gamma q'; that by a unit of velocity is closed.
+        // The displacement from q = 1 at rest, by the series of q'' = -q + gamma q'; that by a unit of velocity has a
+        // closed form.
         let of_start = -h * h * (0.5 + gamma * h / 6.0 + (gamma * gamma - 1.0) * h * h / 24.0);
         let by_velocity = system.solution(h, &VelocityPoint::new([0.0], [1.0], 0.0)).q[0];
         let Ok(jet) = ld.jet(0.0, &DiscretePoint::new([1.0], [1.0 + step], 0.0)) else { unreachable!("{gamma}, {h}") };
@@ -141,7 +142,7 @@ fn the_small_part_that_the_start_has_in_the_displacement_is_not_lost() {
     assert!(worst <= 16.0, "{worst}");
 }
 
-/// Every coefficient of degree two in the plane, W and C without symmetry but that which W must have.
+/// A quadratic Lagrangian in the plane with all coefficients non-zero; W is symmetric, and there is no other symmetry.
 struct General {
     gamma: f64,
 }
@@ -186,7 +187,7 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
     let start = VelocityPoint::new([0.3], [1.7], -0.4);
     let (mut oscillator, mut strong) = (Units::default(), Units::default());
     let weak = [-0.1, 0.0, 0.05].into_iter().flat_map(|gamma| [4.0, 20.0, 50.0].map(|h| (gamma, h)));
-    // What is left of these is far below the rounding of the start.
+    // These motions decay far below the rounding of the start.
     let decayed = [-1.0, -0.4].into_iter().flat_map(|gamma| [90.0, 300.0, 1000.0].map(|h| (gamma, h)));
     for (gamma, h) in weak.chain(decayed) {
         let system = HarmonicOscillator { gamma };
@@ -195,7 +196,7 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let (found, size) = (ld.motion(&start), end.q[0].hypot(end.v[0]));
         let error = (found.q - end.q).max_abs_or_nan().max_or_nan((found.v - end.v).max_abs_or_nan()) / size;
         oscillator.motion = oscillator.motion.max_or_nan(error / (EPS * (1.0 + h)));
-        // Between positions it is the same motion, as far as the action is above the smallest number.
+        // The motion between the positions is the same, as long as the action is above the smallest number.
         if gamma * h >= -300.0 {
             let Ok(jet) = ld.jet(0.0, &DiscretePoint { q0: start.q, q1: end.q, z0: start.z }) else { unreachable!() };
             let off = (jet.d2 - end.v).max_abs_or_nan() / size;
@@ -209,17 +210,18 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!("{gamma}, {h}") };
         let found = ld.motion(&start);
         strong.motion = strong.motion.max_or_nan(((found.q - end.q) / (end.q[0] * EPS)).max_abs_or_nan());
-        // What decays is known to the rounding of the exponent; below the smallest normal number, not relative to itself.
+        // Decaying quantities are accurate to the rounding of the exponent, but below the smallest normal number not
+        // relative to themselves.
         let decayed =
             [(found.v[0], end.v[0]), (found.z, end.z)].map(|(a, b)| (a - b).abs() / b.max_or_nan(f64::MIN_POSITIVE));
         strong.value = strong.value.max_or_nan(decayed[0].max_or_nan(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
     }
-    // In units of the rounded phase, and of the size of the slow motion that is left.
+    // In units of the rounding of the phase, and of the size of the remaining slow motion.
     oscillator.assert_below(8.0, 0.0, 8.0, "phase");
     strong.assert_below(16.0, 8.0, 0.0, "strong drag");
 }
 
-/// A Lagrangian with a claim of one's own.
+/// A Lagrangian with given coefficients and given claims.
 struct Claimed([f64; 5], Structure);
 
 impl Lagrangian<1> for Claimed {
@@ -264,10 +266,11 @@ fn a_conjugate_point_and_a_bad_step_are_refused() {
         let h = k * std::f64::consts::PI / ((1.0 - half) * (1.0 + half)).sqrt();
         let refused = QuadraticExact::new(&system, h).map(|_| ());
         let conjugate = matches!(refused, Err(InputError::FirstStep(StepError::ConjugatePoint { .. })));
-        // Below the smallest number over a rounding nothing can be told.
+        // Below the smallest normal number divided by a rounding no conjugate point can be detected.
         let decayed = half * h < -671.0 && matches!(refused, Err(InputError::Hypothesis { .. }));
         assert!(conjugate || decayed, "gamma = {gamma}, k = {k}: {refused:?}");
-        // And not beside it, unless all has decayed to zero: near the critical drag a rounding of gamma moves the phase by 1e3.
+        // A step beside it is accepted, unless the motion has decayed to zero: near critical drag the phase changes by
+        // 1e3 times a rounding of gamma.
         assert!(
             half * h < -671.0 || QuadraticExact::new(&system, h * (1.0 - 1e-9)).is_ok(),
             "gamma = {gamma}, k = {k}"
@@ -279,8 +282,9 @@ fn a_conjugate_point_and_a_bad_step_are_refused() {
     }
 }
 
-/// From a drag that leaves nothing to a growth by 5e21: the action between two points is that of the closed motion, in units of
-/// the rounding of the exponents; where it is below the smallest number the value is refused, and so is what is no number.
+/// From complete decay to growth by 5e21: the action between two points is that of the motion in closed form, in units
+/// of the rounding of the exponents. Where it is below the smallest number the value is refused, and so are NaN and
+/// infinite arguments.
 #[test]
 fn every_drag_over_the_step() {
     let start = VelocityPoint::new([0.0, 0.0], [1.7, -0.4], 0.3);
@@ -304,7 +308,7 @@ fn every_drag_over_the_step() {
             );
         }
         let ld = QuadraticExact::new(&FreeParticle { gamma: reach }, 1.0).unwrap();
-        // Its action without any at the start: v0^2/2 e^(gamma h) times an integral.
+        // The action from z0 = 0: v0^2/2 e^(gamma h) times an integral.
         match ld.value(0.0, &DiscretePoint::new([0.1], [0.4], 0.0)) {
             Ok(value) => assert!(reach > -740.0 && value > 0.0, "{reach}: {value}"),
             Err(cause) => {
@@ -320,7 +324,7 @@ fn every_drag_over_the_step() {
         }
         assert_eq!(ld.value(bad, &DiscretePoint::new([0.1], [0.2], 0.3)), Err(StepError::NonFinite));
     }
-    // A decayed motion is no conjugate one.
+    // A decayed motion is not reported as a conjugate point.
     let refused = QuadraticExact::new(&HarmonicOscillator { gamma: -1.0 }, 1500.0).map(|_| ());
     assert!(matches!(refused, Err(InputError::Hypothesis { .. })), "{refused:?}");
 }

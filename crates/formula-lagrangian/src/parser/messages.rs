@@ -1,4 +1,4 @@
-//! What is wrong with a text, with what to write instead.
+//! Error messages of the parser, with the correction to make.
 
 use super::*;
 
@@ -45,7 +45,7 @@ impl<'a> Parser<'a> {
         error
     }
 
-    /// What to write for all coordinates, or for all velocities.
+    /// The correction for a text that uses the name of all coordinates, or of all velocities, as a number.
     pub(super) fn all_of(&self, name: &str) -> String {
         let prime = if name == "v" { "'" } else { "" };
         let what = if name == "v" { "velocities" } else { "coordinates" };
@@ -56,7 +56,7 @@ impl<'a> Parser<'a> {
         format!("the {what} are {named} and so on, or `{name}[0]` to `{name}[n-1]`")
     }
 
-    /// What is said of the velocity of something that has none, where a prime follows its name.
+    /// The message for a prime after the name of a quantity that has no velocity.
     pub(super) fn has_no_velocity(&self, name: &str) -> Option<String> {
         if self.word(0).token != Token::Sign('\'') {
             return None;

@@ -5,7 +5,7 @@ use super::plan::momentum;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
-use runtime_herglotz::CONTACT;
+use herglotz::runtime::CONTACT;
 
 #[derive(Args)]
 pub(crate) struct Check {
@@ -34,9 +34,9 @@ impl Check {
     }
 }
 
-fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::Value {
-    let place = |place: &runtime_herglotz::Place| {
-        let of = |(name, m): (&String, &runtime_herglotz::MomentumSample)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
+fn of_json(check: &herglotz::runtime::Check, momenta: &[String]) -> serde_json::Value {
+    let place = |place: &herglotz::runtime::Place| {
+        let of = |(name, m): (&String, &herglotz::runtime::MomentumSample)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
         serde_json::json!({
             "t": json(place.t),
             "sigma_d": json(place.sigma),
@@ -46,7 +46,7 @@ fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::V
             "momenta": momenta.iter().zip(&place.momenta).map(of).collect::<Vec<_>>(),
         })
     };
-    let stated = |stated: &runtime_herglotz::StatementResidual| {
+    let stated = |stated: &herglotz::runtime::StatementResidual| {
         let statement = stated.statement;
         let (number, title) = (statement.number(), statement.title());
         serde_json::json!({
@@ -65,7 +65,7 @@ fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::V
     })
 }
 
-fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
+fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     let size = |x: f64| format!("{x:.1e}");
     let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     let mut header = words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"]);
@@ -86,7 +86,7 @@ fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
         (false, true) => "not contact, since sigma_d is 0 or not finite at a step",
         (false, false) => "not contact",
     };
-    let (defect, runtime_herglotz::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
+    let (defect, herglotz::runtime::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
     let mut parts = vec![
         format!(
             "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {CONTACT:.0e}",

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::Directory;
 use herglotz::Scene;
-use runtime_herglotz::{Plan, ResumeState};
+use herglotz::runtime::{Plan, ResumeState};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 

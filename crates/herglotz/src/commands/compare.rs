@@ -7,7 +7,7 @@ use crate::output::{Directory, Table, exact, json, print, print_json, short};
 use crate::peer::Dop853;
 use crate::plot;
 use clap::Args;
-use runtime_herglotz::{Comparison, Work};
+use herglotz::runtime::{Comparison, Work};
 use std::path::PathBuf;
 
 /// The errors for which the best integrator is reported.

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::{Directory, Table, json, print, print_json, short};
 use crate::plot;
 use herglotz::EndsScene;
-use runtime_herglotz::FoundPath;
+use herglotz::runtime::FoundPath;
 
 impl Run {
     /// Runs a scene with `[ends]`.

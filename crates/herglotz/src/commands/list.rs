@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::{print, print_json, table};
 use clap::{Args, ValueEnum};
-use runtime_herglotz::{AnyIntegrator, CATALOGUE, CatalogueEntry};
+use herglotz::runtime::{AnyIntegrator, CATALOGUE, CatalogueEntry};
 
 #[derive(Args)]
 pub(crate) struct List {

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::print;
 use clap::Args;
-use runtime_herglotz::{CatalogueEntry, velocity_name};
+use herglotz::runtime::{CatalogueEntry, velocity_name};
 
 #[derive(Args)]
 pub(crate) struct New {

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
 use herglotz::Scene;
-use runtime_herglotz::SeenSymmetry;
+use herglotz::runtime::SeenSymmetry;
 
 #[derive(Args)]
 pub(crate) struct Plan {
@@ -51,7 +51,7 @@ impl Plan {
         let proved = proved(&scene);
         let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
         if self.json {
-            let of = |item: &runtime_herglotz::PlanEntry| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
+            let of = |item: &herglotz::runtime::PlanEntry| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
             let proved: serde_json::Map<_, _> =
                 proved.iter().map(|(name, holds, _)| ((*name).to_owned(), (*holds).into())).collect();
             return print_json(&serde_json::json!({

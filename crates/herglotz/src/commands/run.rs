@@ -6,12 +6,12 @@ use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
-use herglotz::{EndsScene, LatticeScene, Scene};
-use indicatif::{ProgressBar, ProgressStyle};
-use runtime_herglotz::{
+use herglotz::runtime::{
     AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RunMonitor, RuntimeError, Status, StepControl, Steps,
     velocity_name,
 };
+use herglotz::{EndsScene, LatticeScene, Scene};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::PathBuf;

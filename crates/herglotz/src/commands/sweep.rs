@@ -7,8 +7,8 @@ use crate::output::{Directory, Table, exact, print, print_json};
 use crate::plot;
 use clap::Args;
 use herglotz::Scene;
+use herglotz::runtime::{Column, Ending, Ensemble, EnsembleMonitor, Event, MemberEnd, Status, Varied};
 use indicatif::ProgressBar;
-use runtime_herglotz::{Column, Ending, Ensemble, EnsembleMonitor, Event, MemberEnd, Status, Varied};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -193,7 +193,7 @@ impl Sweep {
                 }
             }
         }
-        let runtime_herglotz::Tally { completed, stopped, failed, unresolved, .. } = tally;
+        let herglotz::runtime::Tally { completed, stopped, failed, unresolved, .. } = tally;
         if self.json {
             let told = serde_json::json!({
                 "members": written, "completed": completed, "stopped": stopped, "failed": failed, "unresolved": unresolved,

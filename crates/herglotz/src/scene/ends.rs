@@ -4,7 +4,7 @@ use super::file::{SystemTable, place_of_table};
 use super::location::{Location, Named, Numbers, Span};
 use super::start::Ends;
 use super::{SceneError, check_used, check_version, entry, formula, integrator};
-use runtime_herglotz::{
+use crate::runtime::{
     AnyIntegrator, BoundaryProblem, Column, InputError, RuntimeError, System, in_words, velocity_name,
 };
 use schemars::JsonSchema;

@@ -1,7 +1,7 @@
 //! Errors of a scene, with their position.
 
 use super::location::Span;
-use runtime_herglotz::{ParseError, nearest_name};
+use crate::runtime::{ParseError, nearest_name};
 use std::fmt::{Display, Formatter};
 
 /// An error of a scene. Its text has file, line and column, the accepted input, and the line with the position marked

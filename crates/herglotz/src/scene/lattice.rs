@@ -4,7 +4,7 @@ use super::file::{RowsTable, RunTable, place_of_table};
 use super::location::{Location, Named, Span};
 use super::output::{RowTimes, of_formula};
 use super::{SceneError, check_version, finite, way};
-use runtime_herglotz::{
+use crate::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError,
     Start, StepControl, Steps, velocity_name,
 };

@@ -2,7 +2,7 @@
 
 use super::Knob;
 use super::sweep::{Slot, put};
-use runtime_herglotz::Start;
+use crate::runtime::Start;
 
 /// The members of a sweep by their index; the last swept quantity varies fastest.
 #[derive(Clone, Copy, Debug)]

@@ -17,13 +17,13 @@ pub use lattice::LatticeScene;
 pub use members::Members;
 pub use sweep::Knob;
 
-use file::{File, RunTable, SystemTable, VERSION};
-use location::{Location, Span};
-use output::{EventColumns, Events, RowTimes};
-use runtime_herglotz::{
+use crate::runtime::{
     AnyIntegrator, CatalogueEntry, Column, Crossing, Event, Formula, FormulaError, InputError, Motion, RuntimeError,
     Start, StepControl, Steps, System, check_parameters, in_words,
 };
+use file::{File, RunTable, SystemTable, VERSION};
+use location::{Location, Span};
+use output::{EventColumns, Events, RowTimes};
 use serde::Deserialize;
 
 /// A scene that has been read and validated.

@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::file::{DirectionName, EventTable, RowsTable};
 use super::location::{Location, Span};
-use runtime_herglotz::{
+use crate::runtime::{
     Column, Direction, Event, Expression, Formula, FormulaError, OutputTimes, RuntimeError, nearest_name, velocity_name,
 };
 

@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::file::File;
 use super::location::{Location, Named, Numbers};
-use runtime_herglotz::CatalogueEntry;
+use crate::runtime::CatalogueEntry;
 
 /// The source that errors of overrides name.
 const SOURCE: &str = "--set";

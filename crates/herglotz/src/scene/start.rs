@@ -2,7 +2,7 @@
 
 use super::SceneError;
 use super::location::{Location, Named, Numbers, Span};
-use runtime_herglotz::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
+use crate::runtime::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
 use std::ops::Range;
 
 /// A part of the initial state.

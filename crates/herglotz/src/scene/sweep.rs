@@ -4,7 +4,7 @@ use super::SceneError;
 use super::file::{RangeTable, Spacing, Swept, Values};
 use super::location::Location;
 use super::start::{Part, entry_of, single_names};
-use runtime_herglotz::{Formula, InitialVelocity, Start};
+use crate::runtime::{Formula, InitialVelocity, Start};
 
 /// The maximal number of members.
 const MOST: usize = 100_000_000;

@@ -1,14 +1,14 @@
-//! What is narrow, what is not smooth, what comes to rest, and what is hardly a number.
+//! Narrow forces, forces that are not smooth, motions that come to rest, and subnormal numbers.
 
 use super::*;
 use contact_geom::systems::Duffing;
 
-/// A free particle that meets something.
+/// A feature that a free particle meets.
 #[derive(Clone, Copy)]
 enum Thing {
-    /// A hill in its way.
+    /// A Gaussian hill of the potential.
     Hill,
-    /// The same of compact support.
+    /// A hill of compact support.
     Bump,
     /// A pulse of force in time.
     Kick,
@@ -22,7 +22,7 @@ enum Thing {
     Cusp,
 }
 
-/// A thing of a height and a width at a place, or time.
+/// A feature of height `c` and width `w` at a place or time `at`.
 struct Meeting {
     thing: Thing,
     c: f64,
@@ -53,13 +53,13 @@ fn motion(system: &impl Lagrangian<1>, [q, v, z]: [f64; 3], duration: f64) -> Re
     herglotz_flow(system, 0.0, &VelocityPoint::new([q], [v], z), duration)
 }
 
-/// Places that no grid has.
+/// Positions that do not lie on any grid.
 fn place(k: u32) -> f64 {
     1.0 + 8.0 * (f64::from(k) * std::f64::consts::SQRT_2).fract()
 }
 
-/// Forces and drags of widths down to a thousandth of the span, at a hundred places each: all are met but at most one, and none is
-/// refused. From a hill higher than its energy the particle comes back with the speed it had.
+/// Forces and drags of widths down to a thousandth of the span, at a hundred positions each: at most one of them is
+/// missed, and no motion is refused. From a hill higher than its energy the particle returns with its initial speed.
 #[test]
 fn what_is_narrow_is_met() {
     let root_pi = std::f64::consts::PI.sqrt();
@@ -78,20 +78,21 @@ fn what_is_narrow_is_met() {
                 let found = motion(&system, [0.0, v, 0.3], duration).unwrap().end.v[0];
                 if (found - v).abs() < 1e-12 { missed += 1 } else { worst = max_or_nan(worst, (found - end).abs()) }
             }
-            // A velocity turned round in a part w of the span is known to the rounding of the positions there: c / w of it.
+            // A velocity that is reversed within the width w is determined up to the rounding of the positions there,
+            // times c / w.
             assert!(missed <= 1 && worst < 64.0 * f64::EPSILON * 9.0 * 40.0 / w, "w = {w}: {missed} missed, {worst:e}");
         }
     }
 }
 
-/// A known limit: what is a hundred thousandth of the span lies between two places that are looked at.
+/// A known limitation: a hill of width 1e-5 on a span of 10 lies between two points that are checked.
 #[test]
 fn what_is_too_narrow_is_not_met() {
     let system = Meeting { thing: Thing::Hill, c: 40.0, at: 5.0 + 1e-3, w: 1e-5 };
     assert_eq!(motion(&system, [0.0, 1.0, 0.0], 10.0).unwrap().end.v[0], 1.0);
 }
 
-/// Jumps of a force are passed at round-off: falls under `|q|` are parabolas of period `4 sqrt 2`.
+/// Jumps of a force are passed to round-off: the motions in the potential `|q|` are parabolas of period `4 sqrt 2`.
 #[test]
 fn kinks_are_found() {
     let system = Meeting { thing: Thing::Kink, c: 1.0, at: 0.0, w: 1.0 };
@@ -102,7 +103,7 @@ fn kinks_are_found() {
             0.5 => [-1.0, 0.0],
             _ => [1.0, 0.0],
         };
-        // A dozen roundings in each half of a period, of a time that grows.
+        // A dozen roundings in each half of a period, of an increasing time.
         let found = found.unwrap();
         let apart = max_or_nan((found.end.q[0] - q).abs(), (found.end.v[0] - v).abs());
         assert!(apart < 128.0 * f64::EPSILON * (1.0 + periods), "{periods}: {apart:e}");
@@ -114,7 +115,7 @@ fn kinks_are_found() {
     assert!((energy - 1.0).abs() < 64.0 * f64::EPSILON, "{energy}");
 }
 
-/// A step that a rounded position does not resolve is refused, with the time; a wider one is climbed.
+/// A step of the potential that a rounded position does not resolve is refused, with the time; a wider one is passed.
 #[test]
 fn a_step_within_rounding_is_refused() {
     let step = |w: f64, c: f64| motion(&Meeting { thing: Thing::Step, c, at: 5.0, w }, [0.0, 1.0, 0.0], 10.0);
@@ -126,7 +127,7 @@ fn a_step_within_rounding_is_refused() {
             other => unreachable!("{other:?}"),
         }
     }
-    // Its acceleration is known to the rounding of the position in units of its width.
+    // The acceleration is determined up to the rounding of the position in units of the width.
     let climbed = step(1e-4, 0.3).unwrap().end.v[0];
     assert!((climbed - 0.4f64.sqrt()).abs() < 5.0 * f64::EPSILON / 1e-4, "{climbed}");
 }
@@ -139,7 +140,8 @@ impl Lagrangian<1> for Settling {
     }
 }
 
-/// A motion that comes to rest away from the origin ends, with a number of evaluations that grows with the time alone.
+/// A motion that comes to rest away from the origin is completed, with a number of evaluations that grows linearly with
+/// the time.
 #[test]
 fn a_motion_comes_to_rest() {
     for time in [15.8, 80.0, 300.0, 1000.0] {
@@ -164,13 +166,13 @@ impl Lagrangian<1> for Spring {
     }
 }
 
-/// From normal numbers into those below, whose last digit is the smallest number; and beyond the largest.
+/// Motions of normal and subnormal size, and one that overflows.
 #[test]
 fn hardly_numbers() {
     for size in [1e-150, 1e-160, 1e-290, 1e-305, 1e-310, 1e-320, 5e-324] {
         let found = motion(&Spring, [size, 0.0, 0.0], 10.0).unwrap();
         let apart = (found.end.q[0] - size * 10f64.cos()).abs();
-        // A dozen last digits a panel, of which there are a dozen.
+        // A dozen roundings to the smallest number in each of a dozen panels.
         assert!(apart <= 1e-13 * size + 128.0 * SMALLEST, "{size:e}: {apart:e}");
         assert!(found.evaluations < 4000, "{size:e}: {}", found.evaluations);
     }
@@ -179,7 +181,7 @@ fn hardly_numbers() {
     assert!(motion(&Spring, [1e200, 0.0, 0.0], 10.0).is_err());
 }
 
-/// `v^2/2 - k q^2/2 + cos q`: a spring with a ripple, which far from the origin is felt as a small part of the force.
+/// `v^2/2 - k q^2/2 + cos q`: a spring with a ripple, which far from the origin is a small part of the force.
 struct Rippled {
     k: f64,
 }
@@ -189,8 +191,8 @@ impl Lagrangian<1> for Rippled {
     }
 }
 
-/// A fast force that is small beside another is resolved, over a hundred of its periods and over ten thousand: where it is a part in a
-/// million of the other, and where it is less than what a polynomial of the other misses between its nodes.
+/// A fast force that is small compared with another is resolved, over a hundred of its periods and over ten thousand:
+/// where it is a millionth of the other force, and where it is below the interpolation error of the other force.
 #[test]
 fn a_ripple_on_a_spring_is_met() {
     let (q, v) = (5e5, 8e5);
@@ -198,7 +200,7 @@ fn a_ripple_on_a_spring_is_met() {
         let system = Rippled { k };
         for duration in [0.01 * longest, 0.1 * longest, longest] {
             let whole = motion(&system, [-q, v, 0.0], duration).unwrap().end;
-            // Parts of a sixth of a period of the ripple and less.
+            // Substeps of at most a sixth of a period of the ripple.
             let (fastest, mut x) = (v + q * k.sqrt(), [-q, v]);
             let parts = (duration * fastest).ceil();
             for _ in 0..parts as u32 {
@@ -206,20 +208,21 @@ fn a_ripple_on_a_spring_is_met() {
                 x = [end.q[0], end.v[0]];
             }
             let apart = max_or_nan((whole.q[0] - x[0]).abs() / q, (whole.v[0] - x[1]).abs() / fastest);
-            // Roundings of the parts' sums, which add up like a random walk; neighbours part no faster than q k.sqrt() a time.
+            // The roundings of the substeps add up like a random walk; neighbouring motions separate no faster than q
+            // k.sqrt() per unit of time.
             assert!(apart < 4.0 * f64::EPSILON * parts.sqrt(), "{k}, {duration}: {apart:e}");
         }
     }
 }
 
-/// However long the time, the work is bounded.
+/// The work is bounded, however long the time.
 #[test]
 fn the_work_is_bounded() {
     let found = motion(&Spring, [1.0, 0.0, 0.0], 1e9);
     assert!(matches!(found, Err(ExactError::Unfinished { t, .. }) if t > 1e3), "{found:?}");
 }
 
-/// A free particle below a step of the potential at q = 0.7, whose height is given.
+/// A particle with drag and a step of the potential at q = 0.7, whose height is given.
 struct Step(f64);
 
 impl Lagrangian<1> for Step {
@@ -233,7 +236,8 @@ impl Lagrangian<1> for Step {
     }
 }
 
-/// No vector field has a flow across a jump of L: it is refused, and a run goes on by the corner conditions. Without a jump nothing is refused.
+/// A vector field has no flow across a jump of L: the motion is refused, while a run continues by the corner
+/// conditions. A step of height zero is not refused.
 #[test]
 fn a_jump_of_the_lagrangian_is_refused() {
     use discrete_herglotz::{Problem, Steps, Until};
@@ -246,7 +250,7 @@ fn a_jump_of_the_lagrangian_is_refused() {
         let run = problem.by(crate::ExactFlow).steps(Steps::Count(4)).run(Until::Time(2.0)).unwrap();
         let eight = problem.accuracy(1e-12).run(Until::Time(2.0)).unwrap();
         assert!((run.q[0] - eight.q[0]).abs() <= 1e-11, "{height}: {} and {}", run.q[0], eight.q[0]);
-        // Up to the step the velocity falls with the drag, and the energy is what decides beyond it.
+        // Up to the step the drag reduces the velocity; the energy at the step decides whether the particle passes.
         assert!((run.q[0] > 0.7) == (height < 0.4), "{height}: {}", run.q[0]);
     }
     let flat = herglotz_flow(&Step(0.0), 0.0, &start, 2.0).unwrap();

@@ -1,13 +1,21 @@
-//! Recomputes the paper's figures, names its slips with numbers, and checks the statements of its sections 2 and 3.
+//! Shows what the project is for: an area in phase space that contracts by exactly the factor of the motion, the paper's figures, and the
+//! paper's statements of sections 2 and 3 as checks.
 //!
 //! ```text
 //! cargo run --release --bin paper [-- --out DIR]
 //! ```
 //!
-//! Writes the discrete solutions beside the true motions (`free_particle.csv`, `harmonic_oscillator.csv`), the curves that
-//! the paper calls exact by the formulas that produce them (`*_as_published.csv`), the figures as SVG, and
-//! `statements.csv`. Ends with 1 if a statement fails its check, with 2 if the output cannot be written.
+//! Writes, as CSV and as SVG,
+//!
+//! - `area`: an area in phase space, carried along by a contact splitting and by the classical Runge-Kutta method;
+//! - `free_particle`, `harmonic_oscillator`: the discrete solutions of the paper beside the true motions, with the curves that the paper
+//!   calls exact by the formulas that produce them (`*_as_published.csv`);
+//! - `conformal_factor`, `angular_momentum`: how these decay, and how the theorems predict it;
+//! - `statements.csv`: the residual of each statement on each system by each method.
+//!
+//! Ends with 1 if an area or a statement fails its check, with 2 if the output cannot be written.
 
+mod area;
 mod closed_exact;
 mod decay;
 mod explicit;
@@ -20,6 +28,7 @@ mod series;
 mod statements;
 mod tables;
 
+use area::Area;
 use clap::Parser;
 use contact_examples::{Directory, Failure, finish, number, print};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator};
@@ -29,7 +38,7 @@ use series::{GAMMA, Row, STEP};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Recomputes the figures of the paper and checks its statements.
+/// Draws an area that contracts with the motion, recomputes the figures of the paper and checks its statements.
 #[derive(Parser)]
 struct Arguments {
     /// The directory for tables and figures; created where it does not exist.
@@ -43,6 +52,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
+
+    let area = Area::new()?;
+    area.write(&out)?;
+    print(&area.report())?;
 
     let particle = FreeParticle { gamma: GAMMA };
     let rectangle = Rectangle::new::<1>(particle, STEP)?;
@@ -71,7 +84,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let columns = ["statement", "system", "method", "h", "residual", "tolerance"];
     out.table("statements.csv", &columns, checks.rows())?;
     print(&tables::theorems(&checks))?;
-    print(&format!("\nTables and figures are in {}.\n", out.path().display()))?;
+    print(&tables::summary(&area, &checks, out.path()))?;
+    area.verdict()?;
     checks.verdict()
 }
 

@@ -1,0 +1,348 @@
+//! The observer of a motion: rows, events, nodes, and polling for interruption.
+
+use super::coordinates;
+use crate::runtime::{
+    Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
+};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::{
+    Event, Events, InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal,
+    theory::legendre_inverse,
+};
+use formula_lagrangian::{Expression, FormulaLagrangian};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::rc::Rc;
+
+/// The number of steps between two polls.
+const POLL: usize = 256;
+
+/// Observes a motion on behalf of a [`RunMonitor`].
+pub(super) struct Recorder<'r, const N: usize> {
+    rows: Option<Rows<'r, N>>,
+    columns: &'r [Column],
+    /// The numbers of a row, in a buffer that is reused.
+    numbers: Vec<f64>,
+    crossings: Option<Crossings<'r, N>>,
+    nodes: bool,
+    needs: OutputRequest,
+    course: Option<RunInfo>,
+    dimension: usize,
+    watch: &'r mut dyn RunMonitor,
+}
+
+impl<'r, const N: usize> Recorder<'r, N> {
+    pub fn new(
+        lagrangian: &'r FormulaLagrangian<N>,
+        motion: &'r Motion,
+        watch: &'r mut dyn RunMonitor,
+    ) -> Result<Self, RuntimeError> {
+        let columns = motion.columns.as_slice();
+        let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
+        check_events(lagrangian, &motion.events)?;
+        let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
+        let needs = |of: Option<OutputRequest>| of.unwrap_or_default();
+        let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
+        let of_all = OutputRequest { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
+        Ok(Recorder {
+            rows,
+            columns,
+            numbers: Vec::with_capacity(columns.len()),
+            crossings,
+            nodes: motion.nodes,
+            needs: of_rows.and(of_all),
+            course: None,
+            dimension: lagrangian.formula().dimension(),
+            watch,
+        })
+    }
+
+    /// Passes on the rows, up to a time if one is given.
+    fn hand_on(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
+        let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
+        let backward = self.course.is_some_and(|course| course.t_end < course.t0);
+        let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
+        for row in rows.rows.drain(..).filter(|row| !beyond(row.t)) {
+            self.numbers.clear();
+            self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
+            if self.watch.row(&self.numbers).is_break() {
+                return ControlFlow::Break(Stop::here("its watch"));
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn see(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.nodes {
+            let PhasePoint { q, p, z } = &at.state;
+            // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
+            let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
+            self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
+        }
+        if at.k.is_multiple_of(POLL)
+            && let Some(RunInfo { t0, t_end, .. }) = self.course
+            && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
+        {
+            if let Some(interrupted) = at.resume_state() {
+                self.watch.interrupted(interrupted);
+            }
+            return ControlFlow::Break(Stop::here("its watch"));
+        }
+        if at.k.is_multiple_of(POLL)
+            && self.watch.wants_checkpoint()
+            && let Some(saved) = at.resume_state()
+            && self.watch.checkpoint(at.k, saved).is_break()
+        {
+            return ControlFlow::Break(Stop::here("its watch"));
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The rows that have the quantities of these columns.
+pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
+    let rows = match when {
+        OutputTimes::Every(stride) => Rows::every(*stride)?,
+        OutputTimes::At(times) => Rows::at(times.iter().copied())?,
+    };
+    let any = |of: fn(&Column) -> bool| columns.iter().any(of);
+    let velocity = any(|c| match c {
+        Column::Velocity(_) => true,
+        Column::Expression(e) => e.has_velocity(),
+        _ => false,
+    });
+    let action = any(|c| match c {
+        Column::Action => true,
+        Column::Expression(e) => e.has_action(),
+        _ => false,
+    });
+    let rows = if velocity { rows.with_velocity() } else { rows };
+    let rows = if any(|c| matches!(c, Column::Energy)) { rows.with_energy() } else { rows };
+    let rows = if any(Column::has_conformal_factor) { rows.with_conformal_factor() } else { rows };
+    Ok(if action { rows } else { rows.without_action() })
+}
+
+/// The value of a column in a row; NaN where the row does not have it.
+pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
+    let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+    match column {
+        Column::Time => row.t,
+        Column::Position(i) => of(Some(&row.q), *i),
+        Column::Velocity(i) => of(row.v.as_ref(), *i),
+        Column::Momentum(i) => of(Some(&row.p), *i),
+        Column::Action => row.z.unwrap_or(f64::NAN),
+        Column::Energy => row.energy.unwrap_or(f64::NAN),
+        Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
+        Column::Expression(e) => {
+            // An expression that does not contain v or z ignores the zeros here.
+            let v = row.v.unwrap_or_else(SVector::zeros);
+            let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
+            e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
+        }
+    }
+}
+
+/// Rejects events with the conformal factor where it is not known at all times, and terminal events that count from a
+/// given time.
+pub(super) fn check_events<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    events: &[crate::runtime::Event],
+) -> Result<(), RuntimeError> {
+    let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
+    if of_terminal {
+        let why = "is given for a terminal event, which counts from the start of the motion; leave one of them out";
+        return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
+    }
+    let has_factor = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_conformal_factor);
+    if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
+}
+
+/// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
+struct Beside<const N: usize> {
+    /// The initial time.
+    began: Cell<f64>,
+    /// The last velocity that was found, the initial guess for the next.
+    velocity: Cell<SVector<f64, N>>,
+}
+
+/// An expression as a function of time and of a state `(q, p, z)` of a motion.
+fn at_states<'r, const N: usize>(
+    lagrangian: &'r FormulaLagrangian<N>,
+    function: &'r Expression,
+    beside: Rc<Beside<N>>,
+) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
+    // `check_events` ensures that the rate is constant wherever it is needed.
+    let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
+    move |t, state| {
+        if function.has_velocity() {
+            match legendre_inverse(lagrangian, t, state, &beside.velocity.get()) {
+                Ok(x) => beside.velocity.set(x.v),
+                Err(_) => return f64::NAN,
+            }
+        }
+        let v = beside.velocity.get();
+        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - beside.began.get()))
+    }
+}
+
+/// The events of a motion, with the data needed to evaluate them.
+pub(super) struct Crossings<'r, const N: usize> {
+    events: Events<'r, N>,
+    /// The events as they were requested.
+    asked: &'r [crate::runtime::Event],
+    /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
+    rate: f64,
+    /// Whether an event or a column contains the action.
+    action: bool,
+    /// Whether an event contains the velocity.
+    velocity: bool,
+    beside: Rc<Beside<N>>,
+    backward: bool,
+    dimension: usize,
+}
+
+impl<'r, const N: usize> Crossings<'r, N> {
+    /// `None` where there are no events.
+    pub fn of(
+        lagrangian: &'r FormulaLagrangian<N>,
+        events: &'r [crate::runtime::Event],
+        start: Option<&Start>,
+    ) -> Option<Self> {
+        let numbers = match start.map(|start| &start.rate) {
+            Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
+            _ => &[],
+        };
+        let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
+        let beside = Rc::new(Beside { began: Cell::new(0.0), velocity: Cell::new(v) });
+        let action = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_action);
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, beside.clone())));
+        (!events.is_empty()).then(|| Crossings {
+            events: all(),
+            asked: events,
+            rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
+            action,
+            velocity: events.iter().any(|event| event.function.has_velocity()),
+            beside: beside.clone(),
+            backward: false,
+            dimension: lagrangian.formula().dimension(),
+        })
+    }
+
+    pub fn needs(&self) -> OutputRequest {
+        OutputRequest { action: self.action, ..OutputRequest::default() }
+    }
+
+    pub fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.beside.began.set(course.t0);
+        self.backward = course.t_end < course.t0;
+        self.events.prepare(course)
+    }
+
+    pub fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.velocity
+            && let Ok(v) = at.velocity()
+        {
+            self.beside.velocity.set(v);
+        }
+        self.events.start(at)
+    }
+
+    /// The terminal events, at which trial runs end.
+    pub fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.events.terminal()
+    }
+
+    /// Passes on the sign changes in a step; `Break` at a terminal event.
+    pub fn step(
+        &mut self,
+        at: &StepView<'_, N>,
+        mut hand_on: impl FnMut(Crossing) -> ControlFlow<()>,
+    ) -> ControlFlow<Stop<N>> {
+        let ended = self.events.step(at);
+        for crossing in self.events.crossings.drain(..) {
+            let asked = self.asked.get(crossing.event);
+            let (t, from) = (crossing.t, asked.and_then(|event| event.from));
+            if from.is_some_and(|from| if self.backward { t > from } else { t < from }) {
+                continue;
+            }
+            let PhasePoint { q, p, z } = crossing.state;
+            // The velocity at the end of the step is close enough as an initial guess.
+            let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let log_factor = self.rate * (t - self.beside.began.get());
+            let columns = asked.map_or(&[][..], |event| &event.columns).iter();
+            let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
+            let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
+            if hand_on(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
+                return ControlFlow::Break(Stop::here("its watch"));
+            }
+        }
+        ended
+    }
+}
+
+fn of<'r, const N: usize>(
+    lagrangian: &'r FormulaLagrangian<N>,
+    event: &'r crate::runtime::Event,
+    beside: Rc<Beside<N>>,
+) -> Event<'r, N> {
+    let found = Event::new(at_states(lagrangian, &event.function, beside));
+    let found = match event.direction {
+        Direction::Rising => found.rising(),
+        Direction::Falling => found.falling(),
+        Direction::Both => found,
+    };
+    if event.terminal { found.terminal() } else { found }
+}
+
+impl<const N: usize> Observer<N> for Recorder<'_, N> {
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.crossings.as_ref().and_then(Crossings::terminal)
+    }
+
+    fn needs(&self) -> OutputRequest {
+        self.needs
+    }
+
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.course = Some(*course);
+        if let Some(rows) = &mut self.rows {
+            rows.prepare(course)?;
+        }
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(course))
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        if self.nodes || self.crossings.is_some() {
+            return taken + 1;
+        }
+        let poll = (taken / POLL + 1) * POLL;
+        self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.start(at)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            crossings.start(at)?;
+        }
+        self.hand_on(None)?;
+        self.see(at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.step(at)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            let ended = crossings.step(at, |crossing| self.watch.crossing(&crossing));
+            if let ControlFlow::Break(stop) = ended {
+                self.hand_on(stop.at.map(|(t, _)| t))?;
+                return ControlFlow::Break(stop);
+            }
+        }
+        self.hand_on(None)?;
+        self.see(at)
+    }
+}

@@ -1,0 +1,60 @@
+//! Motions of Lagrangians whose formula and dimension are known at run time only.
+//!
+//! The libraries below this one are generic in the number of coordinates and in the Lagrangian. This crate has one type
+//! for all formulas in 1 to 16 coordinates, for which the generic code is compiled once. [`System`] is a formula with
+//! its integrators, [`Motion`] a request for one motion, [`Ensemble`] for many, and [`BoundaryProblem`] for a path
+//! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates.
+//!
+//! ```
+//! use herglotz::runtime::{Column, Motion, Start, System, StepControl, OutputTimes};
+//!
+//! let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
+//! let motion = Motion {
+//!     rows: Some(OutputTimes::At((0..=10).map(f64::from).collect())),
+//!     columns: vec![Column::Time, Column::parse("theta", pendulum.formula())?, Column::Energy],
+//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-10, by: None })
+//! };
+//! let (outcome, rows) = pendulum.record(&motion)?;
+//! println!("{}: {rows:?}", outcome.status);
+//! # Ok::<(), herglotz::runtime::RuntimeError>(())
+//! ```
+
+mod assembled;
+mod catalogue;
+mod check;
+mod column;
+mod compare;
+mod ensemble;
+mod error;
+mod geometry;
+mod interrupt;
+mod kernel;
+mod outcome;
+mod parameters;
+mod path;
+mod peer;
+mod request;
+mod system;
+
+pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
+pub use catalogue::{CATALOGUE, CatalogueEntry};
+pub use check::{CONTACT, Check, MomentumSample, Place, StatementResidual};
+pub use column::{Column, velocity_name};
+pub use compare::{Comparison, Work};
+pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
+pub use error::{RuntimeError, in_words};
+pub use geometry::Geometry;
+pub use interrupt::Interrupt;
+pub use outcome::{Crossing, Outcome, Plan, RunMonitor};
+pub use parameters::check_parameters;
+pub use path::{BoundaryProblem, FoundPath};
+pub use peer::{FirstOrder, Peer, PeerEnd};
+pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
+pub use system::{SeenSymmetry, System};
+
+pub use contact_geom::{Statement, Structure};
+pub use discrete_herglotz::{
+    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, Status, Steps, UnknownIntegrator,
+    UnresolvedStep, boundary::PathStatus, ensemble::Tally,
+};
+pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

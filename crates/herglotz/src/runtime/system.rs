@@ -1,0 +1,158 @@
+//! Systems given by a formula.
+
+use crate::runtime::kernel::{Kernel, kernel_of};
+use crate::runtime::outcome::KeptRows;
+use crate::runtime::{Check, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start};
+use contact_geom::Structure;
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState};
+use formula_lagrangian::Formula;
+use std::sync::Arc;
+
+/// A symmetry that is recognised in a formula; its momentum decays with the conformal factor.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SeenSymmetry {
+    /// L is invariant under translation of these coordinates by a common length.
+    Translation(Vec<usize>),
+    /// L is invariant under rotation of these pairs of coordinates by a common angle.
+    Rotation(Vec<(usize, usize)>),
+}
+
+/// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is inexpensive.
+///
+/// ```
+/// use herglotz::runtime::{Motion, Start, System, StepControl};
+/// let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
+/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, StepControl::Accuracy { wanted: 1e-10, by: None });
+/// println!("{}", pendulum.plan(&motion)?.text);
+/// println!("theta = {}", pendulum.run(&motion, &mut ())?.q[0]);
+/// # Ok::<(), herglotz::runtime::RuntimeError>(())
+/// ```
+#[derive(Clone)]
+pub struct System {
+    pub(crate) kernel: Arc<dyn Kernel>,
+}
+
+impl System {
+    /// The system of a formula.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Formula`] where it is too large.
+    pub fn new(formula: &Formula) -> Result<Self, RuntimeError> {
+        Ok(System { kernel: kernel_of(formula)? })
+    }
+
+    /// The system of a formula that is parsed from a text over coordinates and parameters; see [`Formula::parse`].
+    ///
+    /// # Errors
+    /// [`RuntimeError::Formula`] with the position in the text.
+    pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, RuntimeError> {
+        Self::new(&Formula::parse(text, coordinates, parameters)?)
+    }
+
+    /// The same system with other values of some parameters; the formula is not parsed or differentiated again.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Formula`] where there is no such parameter, or a value is not finite.
+    pub fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Self, RuntimeError> {
+        Ok(System { kernel: self.kernel.with_parameters(values)? })
+    }
+
+    /// The formula, with the current values of its parameters.
+    pub fn formula(&self) -> &Formula {
+        self.kernel.formula()
+    }
+
+    /// The number of coordinates.
+    pub fn dimension(&self) -> usize {
+        self.formula().dimension()
+    }
+
+    /// The structure of L that is proved from its formula.
+    pub fn structure(&self) -> Structure {
+        self.kernel.structure()
+    }
+
+    /// Whether L has neither kinks nor jumps.
+    pub fn is_smooth(&self) -> bool {
+        self.kernel.is_smooth()
+    }
+
+    /// The symmetries that are recognised.
+    pub fn symmetries(&self) -> Vec<SeenSymmetry> {
+        self.kernel.symmetries()
+    }
+
+    /// The same Lagrangian as a Rust source file, for use beyond what a formula allows; see
+    /// [`FormulaLagrangian::to_rust`](formula_lagrangian::FormulaLagrangian::to_rust).
+    ///
+    /// # Errors
+    /// [`RuntimeError::Formula`] where `name` is not a valid type name.
+    pub fn to_rust(&self, name: &str) -> Result<String, RuntimeError> {
+        Ok(self.kernel.to_rust(name)?)
+    }
+
+    /// Checks whether the system satisfies the hypotheses of an integrator.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Input`] with the claim that is missing.
+    pub fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
+        self.kernel.check_integrator(integrator)
+    }
+
+    /// Checks a motion, chooses its step and numerical method, and describes what will be computed and what is skipped.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] for invalid input.
+    pub fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
+        self.kernel.plan(motion)
+    }
+
+    /// Runs a motion. A failure during the run is reported in the status of the outcome.
+    ///
+    /// # Errors
+    /// Those of [`plan`](Self::plan).
+    pub fn run(&self, motion: &Motion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
+        self.kernel.run(motion, watch, None)
+    }
+
+    /// Continues an interrupted motion; the result is bitwise that of an uninterrupted run. Events and rows from there
+    /// on are reported. With `OutputTimes::Every` rows start with the step at which the motion continues, with
+    /// `OutputTimes::At` after it.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run); [`InputError::AnotherRun`].
+    pub fn resume(
+        &self,
+        motion: &Motion,
+        from: ResumeState,
+        watch: &mut dyn RunMonitor,
+    ) -> Result<Outcome, RuntimeError> {
+        self.kernel.run(motion, watch, Some(from))
+    }
+
+    /// Runs a motion and keeps its rows.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn record(&self, motion: &Motion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
+        let mut kept = KeptRows::default();
+        let outcome = self.run(motion, &mut kept)?;
+        Ok((outcome, kept.0))
+    }
+
+    /// The contact geometry at a time and a point of TQ x R.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] where L is not defined or not regular there.
+    pub fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
+        self.kernel.geometry(at)
+    }
+
+    /// Checks at this number of places along a motion whether its steps are contact transformations.
+    ///
+    /// # Errors
+    /// Those of [`plan`](Self::plan).
+    pub fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
+        self.kernel.check(motion, places)
+    }
+}
