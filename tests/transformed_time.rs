@@ -5,7 +5,7 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
 use contact_geom::{
-    Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre, numbers::MaxOrNan,
+    Hints, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre, numbers::MaxOrNan,
 };
 use discrete_herglotz::{
     AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, Until,
@@ -296,7 +296,7 @@ struct Transformed {
 }
 
 impl Lagrangian<1> for Transformed {
-    const HAS_TIME_TRANSFORMATION: bool = true;
+    const HINTS: Hints = Hints { time_transformation: true, ..Hints::NONE };
 
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - z * 0.1

@@ -4,8 +4,8 @@ use crate::common::lagrangians::{Bratu, Explosive, Massless};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{
-    DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, TimeTransformation,
-    VelocityPoint, herglotz_field, support::linear,
+    DiscretePoint, GeometryError, Hints, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry,
+    TimeTransformation, VelocityPoint, herglotz_field, support::linear,
 };
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, DiscreteLagrangian, DividedGauss, Event, Events, InputError, Integrator, Interrupt,
@@ -55,7 +55,7 @@ enum Switching {
 }
 
 impl Lagrangian<1> for Switching {
-    const HAS_SWITCHING_FUNCTIONS: bool = true;
+    const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
 
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
         v[0] * v[0] * 0.5 + q[0] - v[0].if_less(T::from(0.5), T::zero(), T::from(5.0))
@@ -263,7 +263,7 @@ fn input_errors() {
         InputError::SwitchingUnstated => {
             let problem = Problem::new(&Unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
             problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
-        }, ["switching_functions", "HAS_SWITCHING_FUNCTIONS: bool = true"];
+        }, ["switching_functions", "Hints { switching_functions: true"];
         InputError::Hypothesis { .. } => {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()

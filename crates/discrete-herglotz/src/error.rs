@@ -156,7 +156,9 @@ pub enum InputError {
         size: f64,
     },
     /// A Lagrangian has switching functions, and does not say so.
-    #[error("the Lagrangian has `switching_functions`; state them by `const HAS_SWITCHING_FUNCTIONS: bool = true`")]
+    #[error(
+        "the Lagrangian has `switching_functions`; state them by `const HINTS: Hints = Hints {{ switching_functions: true, ..Hints::NONE }}`"
+    )]
     SwitchingUnstated,
     /// A method rests on a hypothesis that this Lagrangian does not satisfy.
     #[error("the method needs {hypothesis}; take another method or another Lagrangian")]

@@ -4,7 +4,7 @@ use crate::derived::Derived;
 use crate::evaluation::{At, whole, whole_vector};
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, Hessian, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint};
+use contact_geom::{ChartVector, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint};
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with its gradient and its second derivatives in closed form and with its
 /// structure proved. All formulas of one dimension are one type: integrators are compiled for it once.
@@ -121,9 +121,7 @@ fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> ChartVector
 }
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
-    const PROVED: bool = true;
-    const INTERPRETED: bool = true;
-    const HAS_SWITCHING_FUNCTIONS: bool = true;
+    const HINTS: Hints = Hints { switching_functions: true, proved: true, interpreted: true, ..Hints::NONE };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

@@ -50,7 +50,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
         let g = match self.closed_gradient(t, &base) {
             Some(g) => g,
-            None if const { Self::PROVED } => missing(),
+            None if const { Self::HINTS.proved } => missing(),
             None => return self.value(Dual::constant(t), &x.q, &x.v, x.z),
         };
         let mut d = x.z.d.each(|a| a * g.z);
@@ -65,7 +65,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         if let Some(both) = self.closed_with_gradient(t, x) {
             return both;
         }
-        if const { Self::PROVED } {
+        if const { Self::HINTS.proved } {
             return (T::from(f64::NAN), missing());
         }
         if const { N > BLOCK } {
@@ -88,7 +88,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         if let Some(both) = self.closed_with_force(t, x) {
             return both;
         }
-        if const { Self::PROVED } {
+        if const { Self::HINTS.proved } {
             return (T::from(f64::NAN), missing::<T, N>().x);
         }
         if const { N > BLOCK } {
@@ -115,7 +115,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         if let Some(rate) = self.closed_rate(t, x) {
             return rate;
         }
-        if const { Self::PROVED } {
+        if const { Self::HINTS.proved } {
             return T::from(f64::NAN);
         }
         let mut z = KernelDual::<T, SVector<T, 1>>::constant(x.z);
@@ -128,7 +128,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         if let Some(w) = self.closed_mass_matrix(t, x) {
             return w;
         }
-        if const { Self::PROVED } {
+        if const { Self::HINTS.proved } {
             return SMatrix::from_element(T::from(f64::NAN));
         }
         if const { N > BLOCK } {
@@ -158,7 +158,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> ChartVector<N, T> {
         match self.closed_gradient(t, x) {
             Some(gradient) => gradient,
-            None if const { Self::PROVED } => missing(),
+            None if const { Self::HINTS.proved } => missing(),
             None => derived_gradient(self, t, x),
         }
     }
@@ -167,7 +167,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
         match self.closed_hessian(t, x) {
             Some(hessian) => hessian,
-            None if const { Self::PROVED } => {
+            None if const { Self::HINTS.proved } => {
                 let ChartVector { x, y, z } = missing();
                 let matrix = SMatrix::from_element(z);
                 Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x, vz: y, zz: z }

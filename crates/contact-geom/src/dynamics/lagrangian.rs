@@ -3,6 +3,32 @@
 use crate::{ChartVector, Hessian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
+/// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
+///
+/// ```
+/// use contact_geom::Hints;
+/// const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
+/// assert!(HINTS.switching_functions && !HINTS.time_transformation);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hints {
+    /// Whether it has a time transformation: [`Lagrangian::dt_dtau`] is overridden.
+    pub time_transformation: bool,
+    /// Whether it has [switching functions](Lagrangian::switching_functions).
+    pub switching_functions: bool,
+    /// Whether the [structure](Lagrangian::structure) and all closed derivatives are provided and derived from the formula of L, as by the
+    /// crate `formula-lagrangian`. They are then not checked numerically, and automatic differentiation is not compiled.
+    pub proved: bool,
+    /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
+    pub interpreted: bool,
+}
+
+impl Hints {
+    /// Nothing to rely on.
+    pub const NONE: Hints =
+        Hints { time_transformation: false, switching_functions: false, proved: false, interpreted: false };
+}
+
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
 ///
 /// The motion makes the final value of the action critical, where `zdot = L(t, q, qdot, z)`. With the usual sign
@@ -28,21 +54,8 @@ use nalgebra::{SMatrix, SVector};
 /// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```
 pub trait Lagrangian<const N: usize> {
-    /// Whether this Lagrangian has a time transformation, that is, whether [`dt_dtau`](Self::dt_dtau) is overridden.
-    /// The transformation is evaluated and compiled only in this case.
-    const HAS_TIME_TRANSFORMATION: bool = false;
-
-    /// Whether [`structure`](Self::structure) and all closed derivatives are provided and derived from the formula of
-    /// L, as by the crate `formula-lagrangian`. They are then not checked numerically, and automatic differentiation is
-    /// not compiled.
-    const PROVED: bool = false;
-
-    /// Whether this Lagrangian has [switching functions](Self::switching_functions). They are evaluated, and the code
-    /// that ends steps on their zeros is compiled, only in this case.
-    const HAS_SWITCHING_FUNCTIONS: bool = false;
-
-    /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
-    const INTERPRETED: bool = false;
+    /// What integrators may rely on at compile time; see [`Hints`]. By default nothing.
+    const HINTS: Hints = Hints::NONE;
 
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
@@ -104,13 +117,13 @@ pub trait Lagrangian<const N: usize> {
     /// reflected according to the Weierstrass-Erdmann corner conditions (the momentum changes along the normal, the
     /// energy does not change). By default there are none: L is smooth.
     ///
-    /// Set [`HAS_SWITCHING_FUNCTIONS`](Self::HAS_SWITCHING_FUNCTIONS) as well. For example, a spring that only pushes,
+    /// Set [`Hints::switching_functions`] as well. For example, a spring that only pushes,
     /// `q.if_less(0, q^2/2, 0)`, has the single switching function q.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
 
     /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) in which steps of equal
     /// length suit this motion, for autonomous Lagrangians. It must be positive and should decrease where the motion
-    /// gets faster. Set [`HAS_TIME_TRANSFORMATION`](Self::HAS_TIME_TRANSFORMATION) as well; by default tau is the time
+    /// gets faster. Set [`Hints::time_transformation`] as well; by default tau is the time
     /// itself.
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
@@ -124,8 +137,7 @@ pub trait Lagrangian<const N: usize> {
 pub struct WithoutClosedDerivatives<L>(pub L);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivatives<L> {
-    const HAS_TIME_TRANSFORMATION: bool = L::HAS_TIME_TRANSFORMATION;
-    const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
+    const HINTS: Hints = Hints { proved: false, interpreted: false, ..L::HINTS };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
@@ -144,10 +156,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivative
 }
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
-    const HAS_TIME_TRANSFORMATION: bool = L::HAS_TIME_TRANSFORMATION;
-    const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
-    const PROVED: bool = L::PROVED;
-    const INTERPRETED: bool = L::INTERPRETED;
+    const HINTS: Hints = L::HINTS;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

@@ -23,7 +23,7 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
-pub use lagrangian::{Lagrangian, WithoutClosedDerivatives};
+pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
 pub use probe::check_closed_derivatives;
 pub use rounding::gradient_rounding;
 pub use structure::{Defect, Defects, Structure};

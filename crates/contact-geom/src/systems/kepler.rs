@@ -1,7 +1,9 @@
 //! Kepler's problem with drag, in any dimension.
 
 use super::{System, between};
-use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint};
+use crate::{
+    ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint,
+};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: for `mu = 1`, lengths are
@@ -24,7 +26,7 @@ impl<const D: usize> Default for Kepler<D> {
 }
 
 impl<const D: usize> Lagrangian<D> for Kepler<D> {
-    const HAS_TIME_TRANSFORMATION: bool = true;
+    const HINTS: Hints = Hints { time_transformation: true, ..Hints::NONE };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {

@@ -113,9 +113,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
         check_stages(self.stages)?;
-        if const { !L::HAS_TIME_TRANSFORMATION } {
+        if const { !L::HINTS.time_transformation } {
             return Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a time transformation (`HAS_TIME_TRANSFORMATION`, `dt_dtau`)",
+                hypothesis: "a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`)",
             });
         }
         if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
@@ -129,7 +129,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
         // Compiled only where there is a time transformation; the check has refused the rest.
-        if const { L::HAS_TIME_TRANSFORMATION } {
+        if const { L::HINTS.time_transformation } {
             Ok(Box::new(self.run(problem, h)?))
         } else {
             Err(InputError::NoIntegrator)

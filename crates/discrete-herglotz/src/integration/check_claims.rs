@@ -20,7 +20,7 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
     let structure = lagrangian.structure();
-    if const { L::PROVED } {
+    if const { L::HINTS.proved } {
         let value = lagrangian.value(t, &start.q, &start.v, start.z);
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
@@ -50,7 +50,7 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Option<Defect> {
-    if const { L::PROVED } {
+    if const { L::HINTS.proved } {
         return None;
     }
     let structure = lagrangian.structure();
@@ -69,7 +69,7 @@ pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
     start: &VelocityPoint<N>,
     times: usize,
 ) -> Result<(), InputError> {
-    if const { L::PROVED } {
+    if const { L::HINTS.proved } {
         return Ok(());
     }
     let structure = lagrangian.structure();

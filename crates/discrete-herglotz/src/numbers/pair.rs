@@ -155,9 +155,9 @@ macro_rules! over_registers {
     ($this:ident.$method:ident($($argument:expr),*); $l:ident, $s:ident, $left:expr) => {{
         use $crate::numbers::{lanes::Lanes, pair};
         let left = $left;
-        if const { $l::INTERPRETED && pair::by_four::<$s>() } && left >= 4 {
+        if const { $l::HINTS.interpreted && pair::by_four::<$s>() } && left >= 4 {
             $this.$method::<$s, pair::Four<$s>>($($argument),*)
-        } else if const { $l::INTERPRETED && pair::by_two::<$s>() } && left >= 2 {
+        } else if const { $l::HINTS.interpreted && pair::by_two::<$s>() } && left >= 2 {
             $this.$method::<$s, pair::Two<$s>>($($argument),*)
         } else {
             $this.$method::<$s, Lanes<$s>>($($argument),*)

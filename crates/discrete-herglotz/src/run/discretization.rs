@@ -69,7 +69,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         watched: bool,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let options = StepperOptions { action: self.needs.action, watched };
-        if const { L::HAS_SWITCHING_FUNCTIONS } && self.switches && !self.info.divides {
+        if const { L::HINTS.switching_functions } && self.switches && !self.info.divides {
             return of_integrator(self.integrator.clone(), problem, h, options);
         }
         self.integrator.stepper(problem, h, options)

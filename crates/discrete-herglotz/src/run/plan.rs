@@ -101,7 +101,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// # Errors
     /// [`InputError::FalseClaim`] with the first claim that is violated.
     pub(crate) fn check_first_steps(&self) -> Result<(), InputError> {
-        if const { L::PROVED } {
+        if const { L::HINTS.proved } {
             return Ok(());
         }
         let Discretization { problem, count, t_end, .. } = self.steps;
@@ -147,7 +147,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
         });
         let what = "probes of the structure";
-        entries.push(if const { L::PROVED } {
+        entries.push(if const { L::HINTS.proved } {
             PlanEntry::skipped(what, "it is proved from the formula of L")
         } else if structure == Structure::default() {
             PlanEntry::skipped(what, "nothing is claimed of L")

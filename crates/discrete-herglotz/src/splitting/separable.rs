@@ -21,7 +21,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        Self::read_of(lagrangian, h, t, state, L::PROVED)
+        Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
     /// The same of a Lagrangian whose claims may be known to hold: probes cost as much as a hundred steps.
@@ -68,7 +68,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
             return Ok(());
         }
         // It is known of one that is proved.
-        if const { L::PROVED } {
+        if const { L::HINTS.proved } {
             return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
         }
         for i in 0..3 {

@@ -27,7 +27,7 @@ pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
     lagrangian.switching_functions(t, x, &mut values);
     match values.is_empty() {
         true => Ok(false),
-        false if const { L::HAS_SWITCHING_FUNCTIONS } => Ok(true),
+        false if const { L::HINTS.switching_functions } => Ok(true),
         false => Err(InputError::SwitchingUnstated),
     }
 }

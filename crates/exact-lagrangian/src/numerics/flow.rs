@@ -30,7 +30,7 @@ impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for Herglotz<'_, L
     }
 
     fn jumps_between(&self, ends: [(f64, &State<N, T>); 2]) -> bool {
-        if !const { L::HAS_SWITCHING_FUNCTIONS } {
+        if !const { L::HINTS.switching_functions } {
             return false;
         }
         jumps_between(

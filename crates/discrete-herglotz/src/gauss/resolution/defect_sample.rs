@@ -292,7 +292,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             }
             let (value, g) = match other.take() {
                 Some(other) => other,
-                None if const { L::INTERPRETED && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
+                None if const { L::HINTS.interpreted && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
                     let pair = VelocityPoint {
                         q: vector(|d| Two::<S>::of(&q[d], r)),
                         v: vector(|d| Two::of(&v[d], r)),

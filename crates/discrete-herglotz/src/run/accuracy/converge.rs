@@ -250,7 +250,7 @@ pub(crate) fn beside_nodes<L: Lagrangian<N>, const N: usize>(
     fine: &Track<N>,
 ) -> Result<Option<f64>, InputError> {
     let structure = &trials.request.problem.structure;
-    if const { L::PROVED } || matches!(compared, Compared::Times) || structure.quadratic && structure.autonomous {
+    if const { L::HINTS.proved } || matches!(compared, Compared::Times) || structure.quadratic && structure.autonomous {
         return Ok(None);
     }
     Ok(match trials.gauss(stages, k + 1, &ComparisonGrid::of(k + 1), false, false)? {

@@ -93,10 +93,11 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
 ) -> Result<StepSelection<'p, L, N>, InputError> {
     let gauss = |stages: usize| -> Shared<'p, L, N> { Arc::new(GaussCollocation { stages }) };
     let mut stages = stages_along(trials.request, trials.wanted);
-    trials.watches_transformation = const { L::HAS_TIME_TRANSFORMATION } && trials.request.problem.structure.autonomous;
+    trials.watches_transformation =
+        const { L::HINTS.time_transformation } && trials.request.problem.structure.autonomous;
     trials.watches_newton = stages > DEFAULT_STAGES;
     // Parts that end where a kink is hidden would agree on a wrong motion: only where all kinks are known are steps divided.
-    let divides = const { L::PROVED || L::HAS_SWITCHING_FUNCTIONS };
+    let divides = const { L::HINTS.proved || L::HINTS.switching_functions };
     trials.watches_uneven = divides;
     let mut found = by_equal_steps(trials, &gauss(stages), stages);
     trials.watches_newton = false;

@@ -231,7 +231,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let (problem, h) = (self.request.problem, self.step(count, marks));
         let points = if closely { POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
         let course = TrialSettings { count, marks, points, narrow, price: EvaluationCost::of::<N>(stages) };
-        if const { L::HAS_TIME_TRANSFORMATION } && matches!(marks, ComparisonGrid::Times) {
+        if const { L::HINTS.time_transformation } && matches!(marks, ComparisonGrid::Times) {
             let mut stepper = match (TransformedGauss { stages }).run(problem, h) {
                 Ok(stepper) => stepper,
                 Err(error) => return halted_at_the_start(error),
@@ -240,7 +240,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             return Ok(ending.with_tau(stepper.tau()));
         }
         let gauss = GaussCollocation { stages };
-        if const { L::HAS_SWITCHING_FUNCTIONS }
+        if const { L::HINTS.switching_functions }
             && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?
         {
             let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| gauss.run(problem, h, StepperOptions::default());
@@ -307,7 +307,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             let (look, newton_steps) = look(run, *points);
             cost = run.evaluations() + newton_steps * price.newton;
             let spent = |looks: u64| cost + looks * price.look;
-            if const { L::HAS_TIME_TRANSFORMATION }
+            if const { L::HINTS.time_transformation }
                 && watches_transformation
                 && uneven.profit(lagrangian.dt_dtau(&run.state().q)) > PROFIT
             {

@@ -62,7 +62,7 @@ impl<const N: usize> Constants<N> {
 impl<const N: usize> ClaimMonitor<N> {
     /// That of a run whose Lagrangian claims something that is constant, and has not proved it.
     pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>) -> Option<Self> {
-        if const { L::PROVED } {
+        if const { L::HINTS.proved } {
             return None;
         }
         let problem = steps.problem;

@@ -77,7 +77,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
     pub fn of(steps: &'r Discretization<'p, L, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
         let given = steps.error.is_none();
         let suspects = given && !steps.info.in_transformed_time;
-        let linear = const { L::PROVED } && steps.problem.structure.quadratic;
+        let linear = const { L::HINTS.proved } && steps.problem.structure.quadratic;
         let energy = EnergyMonitor::of(steps, constant_rate);
         Checks {
             steps,

@@ -1,6 +1,7 @@
 //! Narrow forces, forces that are not smooth, motions that come to rest, and subnormal numbers.
 
 use super::*;
+use contact_geom::Hints;
 use contact_geom::systems::Duffing;
 
 /// A feature that a free particle meets.
@@ -226,7 +227,7 @@ fn the_work_is_bounded() {
 struct Step(f64);
 
 impl Lagrangian<1> for Step {
-    const HAS_SWITCHING_FUNCTIONS: bool = true;
+    const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
 
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - q[0].if_less(T::from(0.7), T::zero(), T::from(self.0)) - z * 0.1
