@@ -32,7 +32,8 @@ impl Aligned {
         aligned
     }
 
-    /// The unknowns, padded with one fixed place at each end; the first unknown is at the beginning of a cache line.
+    /// The unknowns, padded with one fixed component at each end; the first unknown is at the beginning of a cache
+    /// line.
     pub fn between_fixed(x: &[f64]) -> Self {
         let mut aligned = Self::zeros(x.len() + 2, 1);
         if let Some(inner) = aligned.get_mut(1..=x.len()) {

@@ -51,7 +51,7 @@ impl<const K: usize, const P: usize> Batch<K, P> {
             let places = std::array::from_fn(|k| std::array::from_fn(|lane| place(of(lane), k)));
             Group { places, parameters: std::array::from_fn(|p| std::array::from_fn(|lane| parameter(of(lane), p))) }
         });
-        // Fixed places and unknowns of other blocks are skipped.
+        // Fixed components and unknowns of other blocks are skipped.
         let inside = block * BLOCK + 1..((block + 1) * BLOCK).min(unknowns) + 1;
         let mut all = Vec::new();
         for (i, e) in numbers.iter().enumerate() {

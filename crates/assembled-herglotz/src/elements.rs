@@ -142,7 +142,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         for (number, run) in self.runs.iter().enumerate() {
             let number = number as u32;
             cut(run, number, unknowns, &mut pieces);
-            // The fixed place before the first unknown belongs to the first block.
+            // The fixed component before the first unknown belongs to the first block.
             let block_of = |e: usize| (run.start[0] + e).saturating_sub(1).min(unknowns - 1) / BLOCK;
             let mut from = 0;
             while from < run.len {
@@ -191,7 +191,7 @@ fn check(
 
 /// Divides the unknowns on which a run acts where a slot begins or ends, and at the ends of blocks.
 fn cut<const K: usize>(run: &Run<K>, number: u32, unknowns: usize, pieces: &mut Vec<(u32, Piece)>) {
-    // The unknowns of a slot, without fixed places.
+    // The unknowns of a slot, without fixed components.
     let slot = |k: usize| (run.start[k].max(1) - 1)..(run.start[k] + run.len - 1).min(unknowns);
     let mut cuts: Vec<usize> = (0..K).flat_map(|k| [slot(k).start, slot(k).end]).collect();
     cuts.sort_unstable();

@@ -26,7 +26,7 @@ pub(crate) struct Then<'a> {
 
 /// A list of potentials with any number of unknowns per element.
 pub(crate) trait PotentialList: Send + Sync {
-    /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` is padded with one fixed place at each end.
+    /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` is padded with one fixed component at each end.
     ///
     /// Returns whether the drift was applied as well. This is done while the velocities are in registers, if all
     /// unknowns have the same mass and one piece of a run covers the whole block with all its slots.
@@ -47,7 +47,7 @@ pub(crate) trait PotentialList: Send + Sync {
     fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]);
 
     /// Adds the product of the second derivatives with a vector x. The vectors q, x and the product are padded with one
-    /// fixed place at each end.
+    /// fixed component at each end.
     fn hessian_times(&self, t: f64, q: &[f64], x: &[f64], product: &mut [f64]);
 }
 

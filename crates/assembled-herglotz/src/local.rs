@@ -11,8 +11,8 @@ use contact_geom::{ChartVector, Dual, Scalar, support::seed};
 /// the whole system, with `P` parameters.
 ///
 /// A [`Potential`](crate::Potential) is the special case `l = -V(t, q; c)`, and less expensive. As there, select values
-/// with [`Scalar::if_less`] and similar functions, never with `if`, since eight elements are evaluated at once. At a
-/// [`FIXED`](crate::FIXED) place q and v are 0.
+/// with [`Scalar::if_less`] and similar functions, never with `if`, since eight elements are evaluated at once. For a
+/// [`FIXED`](crate::FIXED) unknown q and v are 0.
 ///
 /// ```
 /// use assembled_herglotz::LocalLagrangian;
@@ -33,7 +33,8 @@ pub trait LocalLagrangian<const K: usize, const P: usize = 0>: Send + Sync + 'st
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, K>, v: &SVector<T, K>, z: T, c: &[T; P]) -> T;
 }
 
-/// The point at which a Lagrangian is evaluated. Positions and velocities are padded with one fixed place at each end.
+/// The point at which a Lagrangian is evaluated. Positions and velocities are padded with one fixed component at each
+/// end, so that the first unknown has the padded index 1.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a> {
     pub t: f64,
@@ -132,7 +133,7 @@ impl<const K: usize, const P: usize> SimdBatch<K, P> {
         ChartVector { x: self.gather(at.q), y: self.gather(at.v), z: Lanes::splat(at.z) }
     }
 
-    /// Adds the values to a vector over the unknowns, which has no entries for fixed places.
+    /// Adds the values to a vector over the unknowns, which has no entries for fixed components.
     #[inline(always)]
     fn scatter(&self, values: &SVector<Lanes, K>, sums: &mut [f64]) {
         for k in 0..K {
@@ -220,7 +221,7 @@ impl<V: LocalLagrangian<K, P>, const K: usize, const P: usize> LocalList for Loc
             for (lane, places) in (0..pack.count).zip(&mut places) {
                 for (place, [qq, qv, vq, vv]) in places.iter().zip(matrices.iter().flatten()) {
                     let place = *place as usize;
-                    // Rows and columns of fixed places have no entry in the matrix.
+                    // Rows and columns of fixed components have no entry in the matrix.
                     if place < sums.qq.len() {
                         sums.qq[place] += qq[lane];
                         sums.qv[place] += qv[lane];

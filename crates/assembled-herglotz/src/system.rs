@@ -10,7 +10,7 @@ use crate::pass::{SHARED, sum_of_squares};
 use crate::{AssemblyError, LocalLagrangian, Potential};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
-/// The maximum number of unknowns: padded indices have 32 bits, and there is one fixed place at each end.
+/// The maximum number of unknowns: padded indices have 32 bits, and there is one fixed component at each end.
 const MOST: usize = u32::MAX as usize - 2;
 
 /// A system of any size,

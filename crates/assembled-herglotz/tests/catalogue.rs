@@ -65,8 +65,8 @@ fn a_membrane_with_consistent_masses() {
         let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: Some(0.0) };
         let mut motion = AssembledGauss::new(&system, 2, t / 30.0, start, None).unwrap();
         motion.advance(30).unwrap();
-        // For a constant rate sigma_d is the diagonal Padé approximation of the exponential, with an error of (gamma
-        // h)^5/720 = 4e-15.
+        // For a constant rate sigma_d is the diagonal Padé approximation of the exponential, with an error of
+        // `(gamma h)^5/720 = 4e-15`.
         assert!((motion.sigma() - (gamma * t / 30.0).exp()).abs() < 1e-14, "{}", motion.sigma());
         (motion.q()[q.len() / 2] - amplitude).abs()
     };

@@ -140,7 +140,7 @@ impl Lagrangian<4> for Whole {
     }
 }
 
-/// Unequal masses, parameters, a fixed place, a time-dependent force, and two lists.
+/// Unequal masses, parameters, a fixed component, a time-dependent force, and two lists.
 #[test]
 fn elements_of_any_kind() {
     let large = AssembledSystem::new(4)

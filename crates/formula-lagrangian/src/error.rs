@@ -1,4 +1,4 @@
-//! What can be wrong with a formula.
+//! Errors of formulas.
 
 use std::fmt::{Display, Formatter};
 use thiserror::Error;
@@ -6,22 +6,22 @@ use thiserror::Error;
 /// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian).
 pub const MOST_COORDINATES: usize = 16;
 
-/// Bad input to a formula.
+/// Invalid input to a formula.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum FormulaError {
     /// The text is not a formula.
     #[error(transparent)]
     Parse(#[from] ParseError),
-    /// A name of a coordinate or of a parameter cannot be one.
+    /// The name of a coordinate or of a parameter is invalid.
     #[error("the name {name:?} {why}")]
     Name {
         /// The name.
         name: String,
-        /// What is wrong with it.
+        /// The reason.
         why: &'static str,
     },
-    /// The number of coordinates is not one that is compiled in.
+    /// The number of coordinates is outside the range that is compiled.
     #[error(
         "{found} coordinates, where 1 to {MOST_COORDINATES} are possible; any number may have a lattice by the formulas of a site and of a bond, or bodies: \
          `lattice` and `bodies` in Python, [lattice] in a scene"
@@ -30,12 +30,12 @@ pub enum FormulaError {
         /// The number of coordinates.
         found: usize,
     },
-    /// A Lagrangian was asked for with another dimension than that of the formula.
+    /// A Lagrangian was requested with a dimension other than that of the formula.
     #[error("the formula has {found} coordinates, not {asked}: ask for FormulaLagrangian<{found}>")]
     OtherDimension {
         /// The number of coordinates of the formula.
         found: usize,
-        /// The dimension that was asked for.
+        /// The requested dimension.
         asked: usize,
     },
     /// There is no parameter of this name.
@@ -43,20 +43,20 @@ pub enum FormulaError {
     UnknownParameter {
         /// The name.
         name: String,
-        /// What there is.
+        /// The parameters that exist.
         known: String,
     },
-    /// A graph has a coordinate or a parameter that was not given a name.
+    /// A graph has a coordinate or a parameter without a name.
     #[error("the graph has a {what} of index {index}, where {count} are named")]
     Unknown {
         /// A coordinate, a velocity or a parameter.
         what: &'static str,
         /// Its index.
         index: usize,
-        /// How many there are.
+        /// The number of named ones.
         count: usize,
     },
-    /// A formula was built of symbols that do not belong together.
+    /// A formula was built from symbols of different graphs.
     #[error("symbols of different graphs were mixed: take all that a formula is made of from the same `Symbols`")]
     Mixed,
     /// A parameter has a value that is not finite.
@@ -75,12 +75,13 @@ pub enum FormulaError {
     },
 }
 
-/// A place in a text that cannot be read, with the reason. Printed, it shows the line with a mark below.
+/// A position in a text that cannot be parsed, with the reason. `Display` shows the line, with the position marked
+/// below.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParseError {
-    /// What is wrong, with the remedy where there is one.
+    /// The reason, and the correction if one is known.
     pub message: String,
-    /// The nearest known name, where a name is unknown.
+    /// The nearest known name, if a name is unknown.
     pub nearest: Option<String>,
     /// The line, counted from 1.
     pub line: usize,
@@ -90,15 +91,15 @@ pub struct ParseError {
     pub length: usize,
     /// The text of the line.
     pub text: String,
-    /// Where the marked part begins in the text of the line, in characters from 0.
+    /// The start of the marked part in the text of the line, in characters from 0.
     pub mark: usize,
 }
 
-/// The characters of a line that are shown before and after the marked place.
+/// The number of characters of a line that are shown before and after the marked position.
 const AROUND: usize = 60;
 
 impl ParseError {
-    /// The error at the bytes `start .. end` of a text: for those, too, who read files in which formulas are.
+    /// The error at the bytes `start .. end` of a text. Also for programs that read files with formulas in them.
     pub fn at(source: &str, (start, end): (usize, usize), message: impl Into<String>) -> Self {
         let start = (0..=start.min(source.len())).rev().find(|i| source.is_char_boundary(*i)).unwrap_or(0);
         let (before, rest) = source.split_at(start);
@@ -116,7 +117,8 @@ impl ParseError {
         }
     }
 
-    /// The same error of a text that is a part of another, such as a file: shown with the line and the column of its own.
+    /// The same error for a text that is part of another one, such as a file: `line` and `column` are the position of
+    /// the text in it.
     pub fn moved_to(mut self, line: usize, column: usize) -> Self {
         if self.line == 1 {
             self.column += column.saturating_sub(1);
@@ -138,7 +140,7 @@ impl Display for ParseError {
         let at = (*mark).min(width);
         let first = at.saturating_sub(AROUND);
         let shown: String = text.chars().skip(first).take(2 * AROUND).collect();
-        // Tabs stay, so that the mark is below its place.
+        // Tabs are kept, so that the mark is below its position.
         let indent: String = shown.chars().take(at - first).map(|c| if c == '\t' { c } else { ' ' }).collect();
         let mark = "^".repeat((*length).clamp(1, AROUND));
         write!(f, "\n  {shown}\n  {indent}{mark}")

@@ -1,4 +1,4 @@
-//! A tape at work on numbers of any kind.
+//! Evaluation of a tape on numbers of any scalar type.
 
 use crate::Function;
 use crate::functions::{atan2, hypot};
@@ -6,15 +6,15 @@ use crate::tape::{Code, InputRegisters, Instruction, PREVIOUS, Tape};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. They are cleared before each evaluation, so
-/// that a short tape has few.
+/// The sizes of the register arrays on the stack; a tape that needs more registers has them on the heap. The registers
+/// are cleared before each evaluation, so that a short tape has a small array.
 const TINY: usize = 4;
 const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;
 
-/// The coordinates up to which numbers are moved in and out by the caller of an interpreter, which knows how many they are: of more that is
-/// slow to compile.
+/// The dimension up to which inputs and results are copied in the caller of the interpreter, which knows their number
+/// at compile time. In higher dimensions that is slow to compile.
 const FEW: usize = 2;
 
 /// The point at which a tape is evaluated.
@@ -33,15 +33,17 @@ impl<'a, T: Scalar> At<'a, T> {
     }
 }
 
-/// Registers on the stack, each of a vector's in cache lines of its own: one that lies across two is slow to read after it was written.
+/// Registers on the stack, aligned so that a register that holds a SIMD vector does not straddle two cache lines. One
+/// that does is slow to load after it was stored.
 #[repr(align(64))]
 struct OnStack<T, const R: usize>([T; R]);
 
 impl Tape {
-    /// Evaluates it over N coordinates, or over any number of them where N is 0, and writes the results to slices, one after the other.
+    /// Evaluates the tape over N coordinates, or over any number of them if N is 0, and writes the results to slices,
+    /// one after the other.
     #[inline(always)]
     pub fn evaluate<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        // Nothing that takes many steps evaluates nested duals.
+        // Nested dual numbers are not evaluated in long computations, so that their registers may be on the heap.
         if T::NESTED || self.registers > LARGE {
             self.interpret::<T, N>(at, &mut vec![T::zero(); self.registers], results);
         } else if self.registers <= TINY {
@@ -55,13 +57,13 @@ impl Tape {
         }
     }
 
-    /// A frame of the stack by itself.
+    /// A separate function, so that the large array is in a stack frame of its own.
     #[inline(never)]
     fn evaluate_large<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         self.interpret::<T, N>(at, &mut OnStack([T::zero(); LARGE]).0, results);
     }
 
-    /// What is moved in and out is part of the caller where it is little.
+    /// The copying of inputs and results is inlined into the caller if there are few of them.
     #[inline(always)]
     fn interpret<T: Scalar, const N: usize>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
         if const { N == 0 || N > FEW } {
@@ -75,7 +77,8 @@ impl Tape {
         self.leave(registers, results);
     }
 
-    /// One copy of the code for each kind of numbers, whatever the dimension and the number of registers: it is long.
+    /// One copy of the code for each scalar type, shared by all dimensions and numbers of registers, since the code is
+    /// long.
     #[inline(always)]
     fn interpret_apart<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
         T::apart(
@@ -88,7 +91,7 @@ impl Tape {
         );
     }
 
-    /// Moves the inputs to their registers.
+    /// Copies the inputs to their registers.
     #[inline(always)]
     fn enter<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T]) {
         let InputRegisters { q, v, z, t } = self.inputs;
@@ -106,7 +109,7 @@ impl Tape {
         }
     }
 
-    /// Moves the results to where they are wanted.
+    /// Copies the results from their registers to the slices.
     #[inline(always)]
     fn leave<T: Scalar>(&self, registers: &[T], results: &mut [&mut [T]]) {
         let mut places = self.results.iter();
@@ -119,7 +122,7 @@ impl Tape {
     }
 }
 
-/// The same of the instructions alone.
+/// Performs only the instructions, as a separate function.
 #[inline(always)]
 fn run_apart<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     T::apart(
@@ -128,7 +131,8 @@ fn run_apart<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     );
 }
 
-/// Performs the instructions. It returns no number: that would have the place of the result before, which then is not in a register.
+/// Performs the instructions. It returns nothing: a return value would occupy the memory of the previous result, which
+/// would then not be kept in a register.
 #[inline(always)]
 fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     let mut previous = T::zero();
@@ -138,20 +142,20 @@ fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     }
 }
 
-/// A number as it is, moved as a number. A vector that is only moved the compiler takes for bytes, and moves by halves where it prefers those; who
-/// reads the whole then waits until both are written.
+/// Returns a number unchanged, but moved as a number. If a SIMD vector is only moved, the compiler may treat it as
+/// bytes and move it in halves; a load of the whole vector then waits until both halves are stored.
 #[inline(always)]
 pub(crate) fn whole<T: Scalar>(x: T) -> T {
     -(-x)
 }
 
-/// The same of a vector's.
+/// The same for each component of a vector.
 #[inline(always)]
 pub(crate) fn whole_vector<T: Scalar, const N: usize>(x: &SVector<T, N>) -> SVector<T, N> {
     SVector::from_fn(|i, _| whole(x[i]))
 }
 
-/// Numbers to the registers from the first on.
+/// Copies numbers to consecutive registers, starting at `first`.
 #[inline(always)]
 fn copy<T: Scalar>(registers: &mut [T], first: u16, from: &[T]) {
     let first = usize::from(first);
@@ -162,7 +166,7 @@ fn copy<T: Scalar>(registers: &mut [T], first: u16, from: &[T]) {
     }
 }
 
-/// A register by its number, which is right by construction; what is not there would be not a number.
+/// The value of a register. Its number is valid by construction; the value would be NaN otherwise.
 #[inline(always)]
 fn get<T: Scalar>(registers: &[T], register: u16) -> T {
     registers.get(usize::from(register)).copied().unwrap_or_else(|| T::from(f64::NAN))
@@ -228,7 +232,8 @@ fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -
     }
 }
 
-/// A function of one number. Those that are rare in mechanics are a piece of code of their own, so that what is read most often stays short.
+/// The value of a function of one number. Functions that are rare in mechanics are compiled separately, so that the
+/// frequently used code stays short.
 #[inline(always)]
 fn value<T: Scalar>(function: Function, x: T) -> T {
     match function {
@@ -245,8 +250,8 @@ fn value<T: Scalar>(function: Function, x: T) -> T {
     }
 }
 
-/// Work on a number as a function of its own. What that writes to is a place of its own too: one that others see is not kept in a register,
-/// and the result of the instruction before would be in it.
+/// Applies a function to a number in separate code. The function writes to a local variable: if it wrote to the
+/// variable of the previous result, that one would be kept in memory instead of a register.
 #[inline(always)]
 fn apart<T: Scalar>(mut x: T, work: impl FnOnce(T) -> T) -> T {
     T::apart(
@@ -256,7 +261,7 @@ fn apart<T: Scalar>(mut x: T, work: impl FnOnce(T) -> T) -> T {
     x
 }
 
-/// `x^a`; a parameter may be an integer, with which the power of a negative number is defined.
+/// `x^a`; the exponent may be a parameter with an integer value, for which powers of negative numbers are defined.
 #[inline(always)]
 fn power<T: Scalar>(x: T, a: f64) -> T {
     if a.fract() == 0.0 && a.abs() <= 1e9 { x.powi(a as i32) } else { x.powf(a) }

@@ -1,4 +1,4 @@
-//! Expressions beside the Lagrangian: columns and events.
+//! Expressions in addition to the Lagrangian: output columns and events.
 
 use crate::evaluation::At;
 use crate::formula::index;
@@ -9,12 +9,13 @@ use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, MOST_COORDINATES};
 use contact_geom::Scalar;
 
-/// An expression over the names of a formula, to be evaluated along a motion; made by [`Formula::expression`].
+/// An expression over the names of a formula, evaluated along a motion; made by [`Formula::expression`].
 ///
-/// Beside these names there are, unless a coordinate, a parameter or a definition has the name: `energy`, which is `v L_v - L` and so
-/// holds all of `L`, its terms in z too (`-gamma*z` for a drag `gamma*z`); `p_x`, the momentum `L_v` of a coordinate `x`
-/// (`p_q[0]` in an array); `log_factor`, the integral of `L_z` along the motion since its start, and `sigma`, its exponential: the
-/// conformal factor. The last two are no functions of the state, see [`at_factor`](Self::at_factor).
+/// The following names are available as well, unless a coordinate, a parameter or a definition has the name: `energy`,
+/// which is `v L_v - L` and contains all terms of `L`, also those in z (`-gamma*z` for a drag `gamma*z`); `p_x`, the
+/// momentum `L_v` of a coordinate `x` (`p_q[0]` in an array); `log_factor`, the integral of `L_z` along the motion
+/// since its start; and `sigma`, its exponential, the conformal factor. The last two are not functions of the state,
+/// see [`at_factor`](Self::at_factor).
 ///
 /// ```
 /// use formula_lagrangian::Formula;
@@ -47,13 +48,13 @@ impl Expression {
         Ok(expression)
     }
 
-    /// The value at a time and a state, over any number. Not a number where a slice has fewer entries than there are coordinates, or where
-    /// the expression has the [conformal factor](Self::has_conformal_factor).
+    /// The value at a time and a state, for any scalar type. It is NaN if a slice has fewer entries than there are
+    /// coordinates, or if the expression depends on the [conformal factor](Self::has_conformal_factor).
     pub fn at<T: Scalar>(&self, t: T, q: &[T], v: &[T], z: T) -> T {
         self.at_factor(t, (q, v, z), T::from(f64::NAN))
     }
 
-    /// The same at a state `(q, v, z)` of a motion with the logarithm of the conformal factor since its start.
+    /// The same at a state `(q, v, z)` of a motion, with the logarithm of the conformal factor since its start.
     ///
     /// ```
     /// use formula_lagrangian::Formula;
@@ -73,7 +74,7 @@ impl Expression {
             evaluate(q, v);
             return value;
         }
-        // It has the place of one more coordinate.
+        // The logarithm is passed as one more coordinate.
         let (mut wide_q, mut wide_v) = ([T::zero(); MOST_COORDINATES + 1], [T::zero(); MOST_COORDINATES + 1]);
         if let (Some(to_q), Some(to_v)) = (wide_q.get_mut(..=n), wide_v.get_mut(..=n)) {
             for (to, from) in to_q.iter_mut().zip(q).chain(to_v.iter_mut().zip(v)) {
@@ -87,22 +88,22 @@ impl Expression {
         value
     }
 
-    /// Whether it depends on the conformal factor of the motion, `sigma` or `log_factor`.
+    /// Whether the expression depends on the conformal factor of the motion, `sigma` or `log_factor`.
     pub fn has_conformal_factor(&self) -> bool {
         self.log_factor
     }
 
-    /// Whether it depends on velocities.
+    /// Whether the expression depends on velocities.
     pub fn has_velocity(&self) -> bool {
         self.inputs.meets(Inputs::VELOCITY)
     }
 
-    /// Whether it depends on the action.
+    /// Whether the expression depends on the action.
     pub fn has_action(&self) -> bool {
         self.inputs.meets(Inputs::ACTION)
     }
 
-    /// Gives a parameter another value, without reading the text anew.
+    /// Sets the value of a parameter, without parsing the text again.
     ///
     /// # Errors
     /// [`FormulaError::UnknownParameter`], [`FormulaError::ParameterValue`].

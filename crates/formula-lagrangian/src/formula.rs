@@ -1,13 +1,14 @@
-//! Formulas: a graph with the names of what it is made of.
+//! Formulas: an expression graph with the names of its coordinates and parameters.
 
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser};
 use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
 
-/// A Lagrangian `L(t, q, v, z)` that is known when the program runs: an expression of coordinates, velocities, z, t and parameters, all
-/// with names of the user's.
+/// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
+/// parameters, with names chosen by the user.
 ///
-/// The language is in the [crate's documentation](crate). [`lagrangian`](Self::lagrangian) makes what integrators run.
+/// The language is described in the [crate's documentation](crate). [`lagrangian`](Self::lagrangian) returns the
+/// Lagrangian for integrators.
 ///
 /// ```
 /// use formula_lagrangian::Formula;
@@ -26,11 +27,12 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Reads a text over coordinates, of which `"q[3]"` is an array of three, and parameters with their values.
+    /// Parses a text over coordinates and over parameters with their values. The coordinate `"q[3]"` is an array of
+    /// three.
     ///
     /// # Errors
-    /// [`FormulaError::Parse`] with the place in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
-    /// [`FormulaError::ParameterValue`] where a name, the number of coordinates or a value is not possible.
+    /// [`FormulaError::Parse`] with the position in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
+    /// [`FormulaError::ParameterValue`] if a name, the number of coordinates or a value is invalid.
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let names = Names::new(coordinates, parameters)?;
         let mut graph = Graph::new();
@@ -39,7 +41,8 @@ impl Formula {
         Ok(Formula { names, graph, root, values })
     }
 
-    /// A formula that was built by a program: a node of a graph, in which coordinates and parameters are known by their indices.
+    /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
+    /// indices.
     ///
     /// ```
     /// use formula_lagrangian::{Formula, Graph, Operation};
@@ -52,8 +55,8 @@ impl Formula {
     /// ```
     ///
     /// # Errors
-    /// Those of [`parse`](Self::parse) but for the text; [`FormulaError::TooLarge`]; [`FormulaError::Unknown`] where the graph has
-    /// a coordinate or a parameter beyond those given.
+    /// Those of [`parse`](Self::parse) except for the text; [`FormulaError::TooLarge`]; [`FormulaError::Unknown`] if
+    /// the graph has a coordinate or a parameter beyond those given.
     pub fn from_graph(
         graph: Graph,
         root: Id,
@@ -72,8 +75,8 @@ impl Formula {
         Ok(Formula { names, graph, root, values })
     }
 
-    /// The Lagrangian for integrators, with its derivatives and what is proved of its structure. It is compiled once for each
-    /// dimension, whatever the formula.
+    /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for
+    /// each dimension, for all formulas.
     ///
     /// # Errors
     /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`].
@@ -81,8 +84,9 @@ impl Formula {
         FormulaLagrangian::new(self)
     }
 
-    /// The same with at least as many coordinates: each beyond those of the formula is that of a free particle of mass 1, by itself, so that
-    /// it stays at rest where it starts so. For programs that are not compiled for each dimension.
+    /// The same with at least as many coordinates. Each coordinate beyond those of the formula is that of an uncoupled
+    /// free particle of mass 1, which stays at rest if it starts at rest. For programs that are not compiled for each
+    /// dimension.
     ///
     /// ```
     /// use formula_lagrangian::Formula;
@@ -92,12 +96,12 @@ impl Formula {
     /// ```
     ///
     /// # Errors
-    /// [`FormulaError::OtherDimension`] where the formula has more than `N` coordinates, [`FormulaError::TooLarge`].
+    /// [`FormulaError::OtherDimension`] if the formula has more than `N` coordinates, [`FormulaError::TooLarge`].
     pub fn lagrangian_within<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
         FormulaLagrangian::within(self)
     }
 
-    /// Another expression over the same names, such as a function whose zeros are events.
+    /// Another expression over the same names, such as the function of an event.
     ///
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
@@ -105,7 +109,7 @@ impl Formula {
         Expression::parse(self, text, false)
     }
 
-    /// The same where the value may be given a name, as in `E = x'^2/2 + x^2/2`: one that is not taken.
+    /// The same, where the value may have a name that is not in use, as in `E = x'^2/2 + x^2/2`.
     ///
     /// # Errors
     /// Those of [`expression`](Self::expression).
@@ -118,7 +122,7 @@ impl Formula {
         self.names.dimension
     }
 
-    /// The names of the coordinates in their order: `x`, or `q[0]`.
+    /// The names of the coordinates in their order, such as `x` or `q[0]`.
     pub fn coordinates(&self) -> Vec<String> {
         self.names.coordinates().collect()
     }
@@ -138,7 +142,7 @@ impl Formula {
         self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
     }
 
-    /// Gives a parameter another value.
+    /// Sets the value of a parameter.
     ///
     /// # Errors
     /// [`FormulaError::UnknownParameter`], [`FormulaError::ParameterValue`].
@@ -151,7 +155,7 @@ impl Formula {
     }
 }
 
-/// The index of a parameter that gets a value.
+/// The index of a parameter that is set to a value; both are checked.
 pub(crate) fn index(names: &Names, parameter: &str, value: f64) -> Result<usize, FormulaError> {
     let Some(i) = names.parameters.iter().position(|name| name == parameter) else {
         let known = match names.parameters.as_slice() {

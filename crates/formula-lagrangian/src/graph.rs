@@ -1,12 +1,13 @@
-//! Expressions as one graph, in which equal ones are one node.
+//! Expressions as one graph, in which equal expressions are one node.
 
 use crate::FormulaError;
 use crate::node::{Function, Id, Inputs, Node, Operation};
 use std::collections::HashMap;
 
-/// Hash-consed expressions: what is built twice is one node. Each is simplified as it is built, in ways that are exact but for the sign
-/// of zeros and for numbers that are not finite: constants are folded, `x + 0`, `1 x`, `0 x`, `x - x` and double signs vanish, factors
-/// that are powers of two are gathered. Nothing is reordered that would change a rounding.
+/// Hash-consed expressions: an expression that is built twice is one node. Each is simplified as it is built, in ways
+/// that are exact except for the sign of zeros and for numbers that are not finite: constants are folded; `x + 0`,
+/// `1 x`, `0 x`, `x - x` and double signs are simplified; factors that are powers of two are collected. No operations
+/// are reordered in a way that changes rounding.
 ///
 /// ```
 /// use formula_lagrangian::{Function, Graph, Operation};
@@ -42,17 +43,17 @@ impl Graph {
         self.nodes.is_empty()
     }
 
-    /// What a node is; the number 0 for one that is not of this graph.
+    /// The content of a node; the number 0 for a node that is not of this graph.
     pub fn node(&self, id: Id) -> Node {
         self.nodes.get(id.index()).copied().unwrap_or(Node::Number(0))
     }
 
-    /// What a node depends on.
+    /// The inputs on which a node depends.
     pub(crate) fn inputs(&self, id: Id) -> Inputs {
         self.inputs.get(id.index()).copied().unwrap_or(Inputs::NONE)
     }
 
-    /// Whether a node is made of numbers and parameters alone.
+    /// Whether a node consists only of numbers and parameters.
     pub fn is_constant(&self, id: Id) -> bool {
         self.inputs(id) == Inputs::NONE
     }
@@ -86,7 +87,7 @@ impl Graph {
         id
     }
 
-    /// What is known of the values of a node.
+    /// The known properties of the values of a node.
     pub(crate) fn shape(&self, id: Id) -> Shape {
         self.shapes.get(id.index()).copied().unwrap_or_default()
     }
@@ -129,17 +130,17 @@ impl Graph {
 
     /// A number.
     pub fn number(&mut self, x: f64) -> Id {
-        // One zero, and one NaN.
+        // Zeros of both signs are one node, and all NaN are one node.
         let x = if x == 0.0 { 0.0 } else { x };
         self.intern(Node::Number(if x.is_nan() { f64::NAN } else { x }.to_bits()))
     }
 
-    /// The parameter of an index.
+    /// The parameter with this index.
     pub fn parameter(&mut self, index: u32) -> Id {
         self.intern(Node::Parameter(index))
     }
 
-    /// The coordinate of an index.
+    /// The coordinate with this index.
     pub fn position(&mut self, index: u32) -> Id {
         self.intern(Node::Position(index))
     }
@@ -174,7 +175,7 @@ impl Graph {
             }
             (Function::Recip, Node::Unary(Function::Recip, b)) => b,
             (Function::Abs, _) if self.shape(a).squares => a,
-            // Roots of powers, which have derivatives where the root has none.
+            // Roots of powers are simplified, since the results have derivatives where the root has none.
             (Function::Sqrt, Node::Binary(Operation::Mul, b, c)) if b == c => self.unary(Function::Abs, b),
             (Function::Sqrt, Node::Powi(b, n)) if n % 2 == 0 => {
                 let base = if n % 4 == 0 { b } else { self.unary(Function::Abs, b) };
@@ -192,7 +193,7 @@ impl Graph {
         }
     }
 
-    /// A function of two nodes. A power with an exponent that depends on the state is `e^(b ln a)`.
+    /// A function of two nodes. A power whose exponent depends on the state is `e^(b ln a)`.
     pub fn binary(&mut self, operation: Operation, a: Id, b: Id) -> Id {
         match operation {
             Operation::Add => self.add(a, b),
@@ -216,7 +217,7 @@ impl Graph {
         self.unary(Function::Recip, a)
     }
 
-    /// The operand of a change of sign.
+    /// The operand of a node that is a change of sign.
     fn negated(&self, a: Id) -> Option<Id> {
         match self.node(a) {
             Node::Unary(Function::Neg, b) => Some(b),
@@ -224,7 +225,7 @@ impl Graph {
         }
     }
 
-    /// The two nodes of a commutative operation in their order: numbers last.
+    /// The operands of a commutative operation in canonical order: numbers last.
     fn ordered(&self, a: Id, b: Id) -> (Id, Id) {
         let key = |id: Id| (self.as_number(id).is_some(), id);
         if key(a) <= key(b) { (a, b) } else { (b, a) }
@@ -270,7 +271,7 @@ impl Graph {
         }
     }
 
-    /// The square of an absolute value or of a length, without a kink.
+    /// The square of an absolute value, of a root or of a length, simplified to an expression without a kink.
     fn square_of(&mut self, a: Id) -> Option<Id> {
         match self.node(a) {
             Node::Unary(Function::Abs, b) => Some(self.mul(b, b)),
@@ -300,7 +301,7 @@ impl Graph {
                     let minus = self.number(-y);
                     return self.mul(a, minus);
                 }
-                // One of two factors is a power of two: their product is exact.
+                // If one of two factors is a power of two, their product is exact.
                 if let Some((c, x)) = self.scaled(a)
                     && (is_power_of_two(x) || is_power_of_two(y))
                     && (x * y).is_normal()
@@ -328,7 +329,7 @@ impl Graph {
         self.intern(Node::Binary(Operation::Mul, a, b))
     }
 
-    /// A product with a number.
+    /// The node and the number of a product with a number.
     fn scaled(&self, a: Id) -> Option<(Id, f64)> {
         match self.node(a) {
             Node::Binary(Operation::Mul, b, c) => self.as_number(c).map(|x| (b, x)),
@@ -388,7 +389,7 @@ impl Graph {
         }
     }
 
-    /// A power: products for an integer exponent, powers of the root for half of an integer.
+    /// A power: a product for an integer exponent, a power of the square root for half of an odd integer.
     fn power(&mut self, a: Id, b: Id) -> Id {
         match (self.as_number(a), self.as_number(b)) {
             (Some(x), Some(y)) => self.number(Operation::Power.value(x, y)),
@@ -406,7 +407,7 @@ impl Graph {
         }
     }
 
-    /// `then` where `a < b`, else `otherwise`.
+    /// `then` if `a < b`, else `otherwise`.
     pub fn select(&mut self, [a, b, then, otherwise]: [Id; 4]) -> Id {
         if then == otherwise {
             return then;
@@ -418,7 +419,7 @@ impl Graph {
         }
     }
 
-    /// Checks that it has no coordinates and parameters but so many.
+    /// Checks that the indices of coordinates and parameters are within the given numbers.
     pub(crate) fn check(&self, dimension: usize, parameters: usize) -> Result<(), FormulaError> {
         for node in &self.nodes {
             let (what, index, count) = match *node {
@@ -434,7 +435,7 @@ impl Graph {
         Ok(())
     }
 
-    /// The values of all constant nodes for values of the parameters, with 0 for the others.
+    /// The values of all constant nodes for given values of the parameters; 0 for the other nodes.
     pub(crate) fn constants(&self, parameters: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
         for (node, inputs) in self.nodes.iter().zip(&self.inputs) {
@@ -455,14 +456,15 @@ impl Graph {
     }
 }
 
-/// What is known of the values of a node, as it is written.
+/// Known properties of the values of a node, from its expression.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shape {
-    /// It and its derivatives are finite wherever its inputs are, but for overflow.
+    /// The node and its derivatives are finite wherever its inputs are, except for overflow.
     pub bounded: bool,
-    /// It is a sum of squares of bounded nodes, so not negative.
+    /// The node is a sum of squares of bounded nodes, and so not negative.
     pub squares: bool,
-    /// The same but for factors that are parameters: its gradient is 0 where it is 0, at most of the size of its root beside it.
+    /// The same up to factors that are parameters: the gradient is 0 where the node is 0, and at most of the size of
+    /// the root of the node nearby.
     pub flat: bool,
 }
 

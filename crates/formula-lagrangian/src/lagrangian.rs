@@ -6,8 +6,8 @@ use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{ChartVector, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint};
 
-/// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with its gradient and its second derivatives in closed form and with its
-/// structure proved. All formulas of one dimension are one type: integrators are compiled for it once.
+/// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with gradient and second derivatives in closed form and with
+/// a proved structure. All formulas of one dimension have the same type, so that integrators are compiled for it once.
 ///
 /// ```
 /// use contact_geom::VelocityPoint;
@@ -54,7 +54,7 @@ impl<const N: usize> FormulaLagrangian<N> {
         &self.derived.formula
     }
 
-    /// Gives a parameter another value. Nothing is read or derived anew.
+    /// Sets the value of a parameter, without parsing or differentiating again.
     ///
     /// # Errors
     /// [`FormulaError::UnknownParameter`], [`FormulaError::ParameterValue`].
@@ -62,27 +62,28 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.derived.set(parameter, value)
     }
 
-    /// What is proved of the structure of L; the same as [`structure`](Lagrangian::structure).
+    /// The proved structure of L; the same as [`structure`](Lagrangian::structure).
     pub fn proved(&self) -> &Structure {
         &self.derived.structure
     }
 
-    /// Whether L has neither kinks nor jumps: no function of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`. Integrators reach their
-    /// order where a motion does not meet one.
+    /// Whether L has neither kinks nor jumps: it contains none of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`.
+    /// Integrators reach their order where the motion does not meet a kink or a jump.
     pub fn is_smooth(&self) -> bool {
         self.derived.smooth
     }
 
-    /// `L_z` where it is proved to be one number, so that the conformal factor of a time T is its exponential `e^(L_z T)`.
+    /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
     pub fn constant_rate(&self) -> Option<f64> {
         let Derived { formula, structure, partials, .. } = &self.derived;
         let rate = partials.last().filter(|_| structure.constant_rate || structure.z_free)?;
         formula.graph.constants(&formula.values).get(rate.index()).copied()
     }
 
-    /// The symmetries that are seen, whose momenta decay as the conformal factor: moving along a coordinate on which L does not depend, and
-    /// turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`; and moving or turning bodies
-    /// together, whose coordinates are those with differences in L, as `x1 - x2` and `y1 - y2`, in their order.
+    /// The detected symmetries, whose momenta are multiplied by the conformal factor: translations along a coordinate
+    /// on which L does not depend; rotations of two coordinates that occur in L only in squares of lengths, scalar
+    /// products and areas, such as `x^2 + y^2`; and common translations and rotations of bodies, whose coordinates are
+    /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along =
             |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
@@ -107,7 +108,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     }
 }
 
-/// What results are written to.
+/// Zeros, into which results are written.
 #[inline(always)]
 fn blank<T: Scalar, const N: usize>() -> ChartVector<N, T> {
     let zero = SVector::from_fn(|_, _| T::zero());
@@ -190,7 +191,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         self.derived.structure
     }
 
-    /// The arguments of `abs` and `sign`, and the differences by which `min`, `max` and `if` choose.
+    /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
         let (tape, first) = (&self.derived.switching, values.len());
         if !tape.results.is_empty() {

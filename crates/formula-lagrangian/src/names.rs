@@ -3,10 +3,10 @@
 use crate::functions::{FUNCTIONS, OPERATIONS};
 use crate::{FormulaError, MOST_COORDINATES};
 
-/// The names with a meaning of their own.
+/// The names with a fixed meaning.
 const RESERVED: [&str; 6] = ["t", "z", "sum", "if", "asin", "acos"];
 
-/// A coordinate by the user's name: a number, or so many of an array.
+/// A coordinate as named by the user: a number, or an array.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Block {
     pub name: String,
@@ -55,7 +55,7 @@ impl Names {
         Ok(names)
     }
 
-    /// Checks that a new name is one, and is not taken.
+    /// Checks that a new name is valid and not in use.
     fn check(&self, name: &str) -> Result<(), FormulaError> {
         let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
         if !(first && name.chars().all(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_')) {
@@ -70,24 +70,25 @@ impl Names {
         Ok(())
     }
 
-    /// The names of the single coordinates: `x`, or `q[0]`.
+    /// The names of the single coordinates, such as `x` or `q[0]`.
     pub fn coordinates(&self) -> impl Iterator<Item = String> {
         self.blocks.iter().flat_map(|Block { name, count, .. }| {
             (0..count.unwrap_or(1)).map(move |i| if count.is_some() { format!("{name}[{i}]") } else { name.clone() })
         })
     }
 
-    /// The name nearest to one that is unknown, of those that are known and of others.
+    /// The name that is nearest to an unknown one, among the known names and `others`.
     pub fn nearest(&self, name: &str, others: &[String]) -> Option<String> {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
         let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
-        // What is known and cannot stand here is no remedy for itself.
+        // A known name that is invalid at this position is not suggested as its own correction.
         nearest_name(name, known.filter(|other| *other != name)).map(str::to_owned)
     }
 }
 
-/// The one of some names that is nearest to another, where it is near enough to be meant: at most three letters differ, and at most a third.
+/// The name that is nearest to a given one, if it is close enough to be intended: at most three characters differ, and
+/// at most a third of them.
 ///
 /// ```
 /// assert_eq!(formula_lagrangian::nearest_name("keplr", ["pendulum", "kepler"]), Some("kepler"));
@@ -99,7 +100,7 @@ pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
     near.filter(|(distance, _)| *distance <= limit).map(|(_, other)| other)
 }
 
-/// Whether a name has a meaning of its own everywhere.
+/// Whether a name has a fixed meaning everywhere.
 pub(crate) fn is_reserved(name: &str) -> bool {
     RESERVED.contains(&name) || FUNCTIONS.iter().any(|f| f.0 == name) || OPERATIONS.iter().any(|o| o.0 == name)
 }
@@ -108,8 +109,8 @@ fn bad(name: &str, why: &'static str) -> FormulaError {
     FormulaError::Name { name: name.to_owned(), why }
 }
 
-/// The number of characters to change, to put in or to take out, or of neighbours to exchange (Damerau and Levenshtein), of
-/// the first characters of long names. The case of letters counts half as little as nothing: it is not counted.
+/// The number of characters to change, insert or delete, or of neighbouring characters to exchange (Damerau-Levenshtein
+/// distance), for the first characters of long names. Case is ignored.
 fn distance(a: &str, b: &str) -> usize {
     const LONGEST: usize = 40;
     let letters = |s: &str| s.chars().take(LONGEST).flat_map(char::to_lowercase).collect::<Vec<_>>();
@@ -127,6 +128,6 @@ fn distance(a: &str, b: &str) -> usize {
         }
         rows.push(row);
     }
-    // Names that differ in case alone are nearest, and not equal.
+    // Names that differ only in case have distance 0.
     rows.last().and_then(|row| row.last().copied()).unwrap_or(usize::MAX)
 }

@@ -1,4 +1,4 @@
-//! From a text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
+//! A parser from text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
 
 mod messages;
 
@@ -9,22 +9,22 @@ use crate::quantities::Quantity;
 use crate::token::{Token, Word, words};
 use crate::{Formula, Function, Graph, Id, Operation, ParseError};
 
-/// The longest text, in bytes.
+/// The maximum length of a text, in bytes.
 pub const LONGEST_TEXT: usize = 1 << 16;
-/// The deepest nesting of brackets and signs.
+/// The maximum nesting depth of brackets, signs and powers.
 pub const DEEPEST_NESTING: usize = 200;
-/// The most nodes that a text may give.
+/// The maximum number of nodes of a text.
 pub const MOST_NODES: usize = 20_000;
-/// The words that may be read in all, those of sums as often as there are terms.
+/// The maximum number of words that are read; those of a sum count once for each of its terms.
 const MOST_WORDS: usize = 1_000_000;
 
-/// How strongly operators bind: sums, products, signs, powers.
+/// The precedence of operators: sums, products, signs, powers.
 const SUM: u8 = 1;
 const PRODUCT: u8 = 3;
 const SIGN: u8 = 5;
 const POWER: u8 = 8;
 
-/// A text that is being read.
+/// The state of the parser.
 pub(crate) struct Parser<'a> {
     text: &'a str,
     words: Vec<Word<'a>>,
@@ -35,24 +35,24 @@ pub(crate) struct Parser<'a> {
     locals: Vec<(&'a str, Id)>,
     depth: usize,
     read: usize,
-    /// Inside of brackets lines do not end.
+    /// The depth of brackets, within which lines do not end.
     brackets: usize,
-    /// Whether the value may have any name that is free, in place of `L`.
+    /// Whether the value may have any unused name, instead of `L`.
     named: bool,
-    /// The Lagrangian beside which an expression stands: with it there are its energy, momenta and conformal factor.
+    /// The Lagrangian of an expression, whose energy, momenta and conformal factor the expression may use.
     beside: Option<&'a Formula>,
 }
 
 type Parsed<T> = Result<T, ParseError>;
 
 impl<'a> Parser<'a> {
-    /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without; with any name
-    /// where it is `named`.
+    /// Parses a text into a node of a graph. The text consists of definitions, one per line, and the value at the end,
+    /// with or without `L =`; if `named`, the value may have any name.
     pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph, named: bool) -> Parsed<Id> {
         Self::parse_beside(None, text, names, graph, named)
     }
 
-    /// The same beside a Lagrangian, whose energy, momenta and conformal factor may be in it.
+    /// The same for an expression that may use the energy, momenta and conformal factor of a Lagrangian.
     pub fn parse_beside(
         beside: Option<&'a Formula>,
         text: &'a str,
@@ -87,7 +87,7 @@ impl<'a> Parser<'a> {
             let (first, second) = (self.word(0), self.word(1));
             if let (Token::Name(name), Token::Sign('=')) = (first.token, second.token) {
                 self.at += 2;
-                // A value that has a name is the last one.
+                // A named value is the last one, unless more lines follow.
                 let value = self.expression(0)?;
                 let more = self.ends_line()?;
                 if !more {
@@ -112,7 +112,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The end of a line: whether there is more after it.
+    /// Expects the end of a line, and returns whether more text follows.
     fn ends_line(&mut self) -> Parsed<bool> {
         let word = self.word(0);
         match word.token {
@@ -145,7 +145,7 @@ impl<'a> Parser<'a> {
         word.copied().unwrap_or(Word { token: Token::End, span: end })
     }
 
-    /// Takes the next word.
+    /// Consumes the next word.
     fn next(&mut self) -> Parsed<Word<'a>> {
         if self.brackets > 0 {
             self.skip_lines();
@@ -166,7 +166,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Takes a sign that has to be there.
+    /// Consumes a required sign.
     fn expect(&mut self, sign: char) -> Parsed<()> {
         let word = self.word(0);
         if word.token == Token::Sign(sign) {
@@ -180,7 +180,7 @@ impl<'a> Parser<'a> {
         ParseError::at(self.text, word.span, message)
     }
 
-    /// An expression whose operators bind more strongly than `weakest`.
+    /// An expression whose operators have a higher precedence than `weakest`.
     fn expression(&mut self, weakest: u8) -> Parsed<Id> {
         if self.depth >= DEEPEST_NESTING {
             let message = format!("nested more than {DEEPEST_NESTING} deep; give a part a name");
@@ -202,7 +202,7 @@ impl<'a> Parser<'a> {
                 '-' => (Operation::Sub, SUM, SUM),
                 '*' => (Operation::Mul, PRODUCT, PRODUCT),
                 '/' => (Operation::Div, PRODUCT, PRODUCT),
-                // To the right.
+                // Right-associative.
                 '^' => (Operation::Power, POWER, POWER - 1),
                 _ => return Ok(left),
             };
@@ -217,12 +217,12 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A line does not end with an operator.
+    /// Lines continue after an operator.
     fn after_operator(&mut self) {
         self.skip_lines();
     }
 
-    /// Refuses numbers that are not finite, such as `1/0`.
+    /// Rejects numbers that are not finite, such as `1/0`.
     fn check_number(&self, id: Id, word: Word<'a>) -> Parsed<()> {
         match self.graph.as_number(id) {
             Some(x) if !x.is_finite() => Err(self.error(word, format!("this is {x}, where a finite number is needed"))),
@@ -248,7 +248,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// What stands in brackets, of which the first is taken.
+    /// The content of brackets, the first of which is already consumed.
     fn bracketed<T>(&mut self, inside: impl FnOnce(&mut Self) -> Parsed<T>, close: char) -> Parsed<T> {
         self.brackets += 1;
         let value = inside(self).and_then(|value| self.expect(close).map(|()| value));
@@ -300,7 +300,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A quantity of the motion, beside a Lagrangian.
+    /// A quantity of the motion of the Lagrangian to which the expression belongs.
     fn quantity(&mut self, name: &'a str, word: Word<'a>) -> Parsed<Id> {
         let mut error = self.unknown(name, word, "name");
         let Some(formula) = self.beside else { return Err(error) };
@@ -321,7 +321,7 @@ impl<'a> Parser<'a> {
         found.ok_or_else(|| self.error(word, format!("`{name}` has more parts than an expression may have")))
     }
 
-    /// Whether a name has a value, so that a bracket after it is a forgotten product.
+    /// Whether a name has a value, so that a bracket after it is a product with a missing `*`.
     fn is_value(&self, name: &str) -> bool {
         let known = self.names.blocks.iter().map(|b| b.name.as_str());
         let known = known.chain(self.names.parameters.iter().map(String::as_str)).chain(["t", "z", "pi", "n"]);
@@ -342,7 +342,7 @@ impl<'a> Parser<'a> {
         Ok(if prime { self.graph.velocity(index) } else { self.graph.position(index) })
     }
 
-    /// Takes a prime, if there is one.
+    /// Consumes a prime, if there is one.
     fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
         let sign = Token::Sign('\'');
         if self.word(0).token != sign {
@@ -360,7 +360,7 @@ impl<'a> Parser<'a> {
         Ok(true)
     }
 
-    /// The index of an entry in brackets, as that of a coordinate: a number when the formula is read.
+    /// The index of an entry in brackets, as that of a coordinate. It is a number at parse time.
     fn index(&mut self, block: &Block) -> Parsed<u32> {
         let (name, count) = (&block.name, block.count.unwrap_or(1));
         let open = self.word(0);
@@ -376,7 +376,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// An integer that is known when the formula is read.
+    /// An integer that is known at parse time.
     fn whole(&mut self) -> Parsed<i64> {
         let word = self.word(0);
         let id = self.expression(0)?;
@@ -431,7 +431,8 @@ impl<'a> Parser<'a> {
         Ok(arguments)
     }
 
-    /// `asin x`, or `acos x`, by the angle of the point `(sqrt((1 - x)(1 + x)), x)`, or of that with its coordinates exchanged.
+    /// `asin x` is the angle of the point `(sqrt((1 - x)(1 + x)), x)`, and `acos x` that of the point with these
+    /// coordinates exchanged.
     fn inverse(&mut self, sine: bool, x: Id) -> Id {
         let one = self.graph.number(1.0);
         let (below, above) = (self.graph.sub(one, x), self.graph.add(x, one));
@@ -458,7 +459,7 @@ impl<'a> Parser<'a> {
         Ok(self.graph.select([a, b, then, otherwise]))
     }
 
-    /// `sum(i, first, last, term)`: the term is read anew for each index.
+    /// `sum(i, first, last, term)`: the term is parsed again for each index.
     fn sum(&mut self) -> Parsed<Id> {
         let word = self.next()?;
         let Token::Name(index) = word.token else {
@@ -498,7 +499,7 @@ impl<'a> Parser<'a> {
         Ok(sum.unwrap_or_else(|| self.graph.number(0.0)))
     }
 
-    /// Goes on to the bracket that closes the present one: an empty sum has no term that could be read.
+    /// Skips to the bracket that closes the present one, since the term of an empty sum cannot be parsed.
     fn skip_argument(&mut self) {
         let mut open = 0_usize;
         while let Some(word) = self.words.get(self.at) {

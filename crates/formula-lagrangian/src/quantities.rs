@@ -1,14 +1,16 @@
-//! Quantities of a motion by name, for expressions beside a Lagrangian: energy, momenta, and the conformal factor.
+//! Quantities of a motion by name, for expressions that belong to a Lagrangian: energy, momenta, and the conformal
+//! factor.
 
 use crate::names::Names;
 use crate::node::{Function, Id, Node, Operation};
 use crate::parser::MOST_NODES;
 use crate::{Formula, Graph};
 
-/// The most nodes that an expression has with the derivatives of L in it.
+/// The maximum number of nodes of an expression with the derivatives of L in it.
 const MOST_WITH_DERIVATIVES: usize = 10 * MOST_NODES;
 
-/// What a name stands for beside those of a formula. Coordinates, parameters and definitions of the same name come first.
+/// The meaning of a name in addition to those of a formula. Coordinates, parameters and definitions of the same name
+/// take precedence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Quantity {
     /// `energy`: `v . L_v - L`.
@@ -17,16 +19,16 @@ pub(crate) enum Quantity {
     LogFactor,
     /// `sigma`: the conformal factor.
     Sigma,
-    /// `p_x`: the momentum `L_v` of a coordinate of this index.
+    /// `p_x`: the momentum `L_v` of the coordinate with this index.
     Momentum(u32),
 }
 
-/// The names but those of momenta.
+/// The names except those of momenta.
 const NAMES: [(&str, Quantity); 3] =
     [("energy", Quantity::Energy), ("log_factor", Quantity::LogFactor), ("sigma", Quantity::Sigma)];
 
 impl Quantity {
-    /// That of a name which is not that of a momentum.
+    /// The quantity with this name, except for momenta.
     pub fn of(name: &str) -> Option<Self> {
         NAMES.iter().find(|(known, _)| *known == name).map(|(_, quantity)| *quantity)
     }
@@ -37,7 +39,7 @@ impl Quantity {
         NAMES.iter().map(|(name, _)| (*name).to_owned()).chain(momenta)
     }
 
-    /// Its node in the graph of an expression; `None` where the graph would be too large.
+    /// The node of the quantity in the graph of an expression; `None` if the graph would be too large.
     pub fn node(self, formula: &Formula, graph: &mut Graph) -> Option<Id> {
         let log_factor = log_factor(graph, formula.names.dimension);
         let (first, count) = match self {
@@ -61,7 +63,8 @@ impl Quantity {
     }
 }
 
-/// The node of the logarithm of the conformal factor, which is no function of the state: it has the place of one more coordinate.
+/// The node of the logarithm of the conformal factor. It is not a function of the state, and is represented by one more
+/// coordinate.
 fn log_factor(graph: &mut Graph, dimension: usize) -> Id {
     graph.position(dimension as u32)
 }
@@ -74,7 +77,7 @@ impl Graph {
         nodes.any(|node| node == Node::Position(dimension as u32))
     }
 
-    /// A node of another graph with all that it is made of.
+    /// Copies a node of another graph with all nodes on which it depends.
     fn copied(&mut self, from: &Graph, root: Id) -> Id {
         let zero = self.number(0.0);
         let needed = from.needed(root);

@@ -1,12 +1,12 @@
-//! Symmetry under rotations of pairs of coordinates, seen in an expression.
+//! Detection of symmetry under rotations of pairs of coordinates.
 
 use crate::{Function, Graph, Id, Node, Operation};
 
-/// A vector of the plane that turns: a sum of those of the pairs and of their velocities, each `(pair, is a velocity, factor)`, in their order and
-/// in units of the first factor.
+/// A vector in the plane of rotation: a linear combination of the vectors of the pairs and of their velocities. Each
+/// term is `(pair, is a velocity, factor)`; they are ordered, and their factors are in units of the first.
 type Vector = Vec<(usize, bool, f64)>;
 
-/// A number times a component of a vector that turns: its first, or its second.
+/// A number times the first or the second component of a rotating vector.
 #[derive(Clone, Debug)]
 struct Component {
     number: f64,
@@ -24,7 +24,7 @@ impl Component {
         (self.number != 0.0 && self.number.is_finite()).then_some(self)
     }
 
-    /// The sum of two of one kind.
+    /// The sum of two components that are both first or both second.
     fn plus(&self, other: &Component) -> Option<Self> {
         if self.second != other.second {
             return None;
@@ -46,7 +46,8 @@ impl Component {
     }
 }
 
-/// A summand: a number times two components of vectors that turn, times what does not turn, by the sorted nodes of its factors and divisors.
+/// A summand: a number times two components of rotating vectors, times invariant factors, given by the sorted nodes of
+/// its factors and divisors.
 #[derive(Default)]
 struct Summand {
     number: f64,
@@ -56,8 +57,8 @@ struct Summand {
 }
 
 impl Summand {
-    /// Whether this one and the other make up a form of two vectors u and w that does not turn: the product `u1 w1 + u2 w2`, or the area
-    /// `u1 w2 - u2 w1`.
+    /// Whether the two summands make up an invariant form of two vectors u and w: the scalar product `u1 w1 + u2 w2`,
+    /// or the area `u1 w2 - u2 w1`.
     fn completes(&self, other: &Summand) -> bool {
         let [a, b] = self.turning.as_slice() else { return false };
         let turned = [(&a.0, !a.1), (&b.0, !b.1)];
@@ -71,7 +72,7 @@ impl Summand {
     }
 }
 
-/// The components that the nodes are, where they are some.
+/// The component that each node is, if it is one.
 struct Components(Vec<Option<Component>>);
 
 impl Components {
@@ -81,8 +82,9 @@ impl Components {
 }
 
 impl Graph {
-    /// Whether a node is seen to be invariant where pairs of coordinates and their velocities are turned together: where all that it is made of
-    /// is, or is a sum of products of the vectors that turn, or of their areas. What is not seen, as in `(x + y)^2 + (x - y)^2`, is not claimed.
+    /// Whether a node is invariant under a common rotation of pairs of coordinates and of their velocities, as far as
+    /// its expression shows: all its operands must be invariant, or it must be a sum of scalar products or areas of
+    /// rotating vectors. Invariance may hold without being detected, as in `(x + y)^2 + (x - y)^2`.
     pub(crate) fn turns_into_itself(&self, of: Id, pairs: &[(usize, usize)]) -> bool {
         let turns = |a: u32| pairs.iter().any(|(i, j)| a as usize == *i || a as usize == *j);
         let mut invariant = vec![false; of.index() + 1];
@@ -107,7 +109,7 @@ impl Graph {
         invariant.last() == Some(&true)
     }
 
-    /// The component of a vector that a node is, if it is one.
+    /// The component of a rotating vector that a node is, if it is one.
     fn component(&self, id: Id, pairs: &[(usize, usize)], known: &Components) -> Option<Component> {
         let of = |a: u32, velocity: bool| {
             let pair = pairs.iter().position(|(i, j)| a as usize == *i || a as usize == *j)?;
@@ -130,10 +132,10 @@ impl Graph {
         }
     }
 
-    /// Whether the summands that turn make up forms that do not.
+    /// Whether the summands that are not invariant make up invariant forms.
     fn is_invariant_sum(&self, sum: Id, components: &Components, known: &impl Fn(Id) -> bool) -> bool {
         let Some(mut summands) = self.summands(sum, components, known) else { return false };
-        // Each has one that completes it.
+        // Each summand must have one that completes it.
         while let Some(first) = summands.pop() {
             match summands.iter().position(|other| first.completes(other)) {
                 Some(partner) => drop(summands.swap_remove(partner)),
@@ -143,7 +145,7 @@ impl Graph {
         true
     }
 
-    /// The summands of a sum that turn; `None` where one is not a product of two components.
+    /// The summands of a sum that are not invariant; `None` if one is not a product of two components.
     fn summands(&self, sum: Id, components: &Components, known: &impl Fn(Id) -> bool) -> Option<Vec<Summand>> {
         let (mut summands, mut open) = (Vec::new(), vec![(sum, 1.0)]);
         while let Some((id, sign)) = open.pop() {
@@ -154,7 +156,7 @@ impl Graph {
                 Node::Unary(Function::Neg, a) => open.push((a, -sign)),
                 _ => summands.push(self.summand(id, sign, components, known)?),
             }
-            // Sums that share their parts may have very many summands.
+            // Sums with shared subexpressions may have very many summands.
             if summands.len() + open.len() > MOST_SUMMANDS {
                 return None;
             }
@@ -196,5 +198,5 @@ fn is_vector(a: Option<&Component>, b: Option<&Component>) -> bool {
     a.second != b.second && a.vector == b.vector && a.number.abs() == b.number.abs()
 }
 
-/// The most summands of one sum that are looked at.
+/// The maximum number of summands of one sum that are examined.
 const MOST_SUMMANDS: usize = 64;

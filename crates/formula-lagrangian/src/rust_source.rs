@@ -1,4 +1,4 @@
-//! The same Lagrangian as Rust source.
+//! Output of a Lagrangian as Rust source.
 
 use crate::derived::Derived;
 use crate::node::Inputs;
@@ -6,7 +6,7 @@ use crate::{FormulaError, FormulaLagrangian, Function, Graph, Id, Node, Operatio
 use contact_geom::Structure;
 use std::fmt::{Display, Formatter, Write};
 
-/// The words of Rust that cannot be names of fields.
+/// The keywords of Rust, which cannot be names of fields.
 const KEYWORDS: [&str; 51] = [
     "as", "async", "await", "break", "const", "continue", "crate", "dyn", "else", "enum", "extern", "false", "fn",
     "for", "gen", "if", "impl", "in", "let", "loop", "match", "mod", "move", "mut", "pub", "ref", "return", "self",
@@ -14,7 +14,7 @@ const KEYWORDS: [&str; 51] = [
     "become", "box", "do", "final", "macro", "override", "priv", "typeof", "unsized", "virtual", "yield",
 ];
 
-/// The functions that are not methods of numbers, as they are written where they are used.
+/// The source of the functions that are not methods of `Scalar`, which is included where they are used.
 const ATAN2: &str = include_str!("rust_source/atan2.txt");
 const HYPOT: &str = include_str!("rust_source/hypot.txt");
 const ASINH: &str = include_str!("rust_source/asinh.txt");
@@ -22,8 +22,8 @@ const ACOSH: &str = include_str!("rust_source/acosh.txt");
 const ATANH: &str = include_str!("rust_source/atanh.txt");
 
 impl<const N: usize> FormulaLagrangian<N> {
-    /// The source of a file with this Lagrangian as a type: parameters are its fields, and value, gradient and structure are those of
-    /// the formula, to the last digit. It needs the crate `contact-geom`.
+    /// The source of a file with this Lagrangian as a type. The parameters are its fields; value, gradient and
+    /// structure are exactly those of the formula. It needs the crate `contact-geom`.
     ///
     /// ```
     /// use formula_lagrangian::Formula;
@@ -33,7 +33,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// ```
     ///
     /// # Errors
-    /// [`FormulaError::Name`] where `name` cannot be that of a type.
+    /// [`FormulaError::Name`] if `name` is not a valid name of a type.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
@@ -57,7 +57,7 @@ impl Derived {
             "//! A Lagrangian of the coordinates {coordinates}, made from its formula by formula-lagrangian.\n"
         )?;
         writeln!(out, "use contact_geom::nalgebra::SVector;")?;
-        writeln!(out, "use contact_geom::{{Lagrangian, Scalar, Structure, Triple, VelocityPoint}};\n")?;
+        writeln!(out, "use contact_geom::{{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint}};\n")?;
         writeln!(out, "/// The Lagrangian with its parameters.\n#[derive(Clone, Copy, Debug, PartialEq)]")?;
         if fields.is_empty() {
             writeln!(out, "pub struct {name};\n")?;
@@ -79,10 +79,10 @@ impl Derived {
         let body = Body { graph, results: &self.partials, fields: &fields, point: "x." };
         let [t, x, ..] = body.names(&["t", "x", "x", "x"]);
         writeln!(out, "    #[inline(always)]")?;
-        let triple = format!("Option<Triple<{n}, T>>");
+        let triple = format!("Option<ChartVector<{n}, T>>");
         writeln!(out, "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{n}, T>) -> {triple} {{")?;
         write!(out, "{body}")?;
-        // Before them are all of q, and those beyond the formula's coordinates.
+        // The derivatives with respect to all of q come first, including coordinates beyond those of the formula.
         let first_velocity = self.partials.len() / 2;
         let part = |from: usize| {
             let ids = self.partials.iter().skip(from).take(n);
@@ -95,10 +95,10 @@ impl Derived {
             part(0),
             part(first_velocity)
         )?;
-        writeln!(out, "        Some(Triple {{ x: l_q, y: l_v, z: {z} }})\n    }}\n")?;
+        writeln!(out, "        Some(ChartVector {{ x: l_q, y: l_v, z: {z} }})\n    }}\n")?;
 
         let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } = self.structure;
-        // Not what the present value of a parameter gives: fields can be changed.
+        // The present values of parameters are not used here, since the fields can be changed.
         let z_free = !graph.inputs(root).meets(Inputs::ACTION);
         writeln!(out, "    fn structure(&self) -> Structure {{\n        Structure {{")?;
         let claims = [
@@ -137,12 +137,12 @@ fn field(name: &str) -> String {
     if KEYWORDS.contains(&name) { format!("{name}_") } else { name.to_owned() }
 }
 
-/// The statements that compute some nodes.
+/// The statements that compute given nodes.
 struct Body<'a> {
     graph: &'a Graph,
     results: &'a [Id],
     fields: &'a [String],
-    /// What stands before q, v and z.
+    /// The prefix of q, v and z.
     point: &'a str,
 }
 
@@ -162,7 +162,7 @@ impl Body<'_> {
         self.nodes().any(|id| of(self.graph.node(id)))
     }
 
-    /// The names of the arguments, with a line before those that are not used.
+    /// The names of the arguments, with an underscore before those that are not used.
     fn names(&self, names: &[&str; 4]) -> [String; 4] {
         let inputs = self.results.iter().fold(Inputs::NONE, |all, id| all.and(self.graph.inputs(*id)));
         names.map(|name| {
@@ -177,7 +177,7 @@ impl Body<'_> {
         })
     }
 
-    /// A node as an operand: of the type f64 where it is constant.
+    /// A node as an operand, of type f64 if it is constant.
     fn operand(&self, id: Id) -> String {
         match self.graph.node(id) {
             Node::Number(bits) => literal(f64::from_bits(bits)),
@@ -196,17 +196,17 @@ impl Body<'_> {
         if operand.starts_with('-') { format!("({operand})") } else { operand }
     }
 
-    /// A node as a number over T.
+    /// A node as an expression of type T.
     fn number(&self, id: Id) -> String {
         let operand = self.operand(id);
         if self.graph.is_constant(id) { format!("T::from({operand})") } else { operand }
     }
 
-    /// The right side of the statement of a node; `None` for what is an operand by itself.
+    /// The right-hand side of the statement of a node; `None` for a node that is an operand by itself.
     fn right(&self, id: Id) -> Option<String> {
         let (o, n, constant) = (|id| self.operand(id), |id| self.number(id), |id| self.graph.is_constant(id));
         let r = |id| self.right_operand(id);
-        // Over T where one of the operands is.
+        // All operands are of type T if the node is.
         let all = |ids: [Id; 2]| if constant(id) { ids.map(o) } else { ids.map(n) };
         Some(match self.graph.node(id) {
             Node::Unary(Function::Neg, a) => format!("-{}", o(a)),
@@ -258,7 +258,7 @@ impl Display for Body<'_> {
     }
 }
 
-/// A number as Rust reads it, to the last digit.
+/// A number as a Rust literal, exactly.
 fn literal(x: f64) -> String {
     match x {
         _ if x.is_nan() => "f64::NAN".to_owned(),
@@ -268,7 +268,7 @@ fn literal(x: f64) -> String {
     }
 }
 
-/// The method of a function, or what is written for it.
+/// The method of a function, or the name of its included source.
 fn method(function: Function) -> &'static str {
     match function {
         Function::Neg => "Scalar::neg",

@@ -19,7 +19,7 @@ pub(crate) struct Partials<'a> {
 /// The properties that hold for all values of the parameters, and those that follow from the present value of `L_z`.
 ///
 /// Each follows from the inputs on which the derivatives depend as they are written, so that a property may hold
-/// without being claimed. Derivatives do not show jumps, so that nothing is claimed in coordinates on which a jump
+/// without being claimed. Derivatives hide kinks and jumps, so that nothing is claimed in coordinates on which one
 /// depends.
 pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> Structure {
     use Inputs as In;

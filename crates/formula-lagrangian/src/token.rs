@@ -1,9 +1,9 @@
-//! The words of a text.
+//! Division of a text into words.
 
 use crate::ParseError;
 use crate::hints::instead_of_character;
 
-/// A word of a text.
+/// The kind of a word of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Token<'t> {
     Number(f64),
@@ -15,7 +15,7 @@ pub(crate) enum Token<'t> {
     End,
 }
 
-/// A token with the bytes where it begins and ends.
+/// A token with the bytes at which it begins and ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Word<'t> {
     pub token: Token<'t>,
@@ -23,7 +23,7 @@ pub(crate) struct Word<'t> {
 }
 
 impl Word<'_> {
-    /// The word as it is written.
+    /// The word as it is shown in messages.
     pub fn shown(&self) -> String {
         match self.token {
             Token::Number(x) => format!("the number {x}"),
@@ -35,7 +35,7 @@ impl Word<'_> {
     }
 }
 
-/// The words of a text. Comments begin with `#`; `**` is `^`.
+/// Divides a text into words. Comments begin with `#`; `**` is `^`.
 pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
     let mut words = Vec::new();
     let mut at = 0;
@@ -89,7 +89,7 @@ pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
     Ok(words)
 }
 
-/// The length of the number that a text begins with: digits with one point, and an exponent.
+/// The length of the number at the start of a text: digits with at most one point, and an exponent.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits = |from: usize| bytes.iter().skip(from).take_while(|c| c.is_ascii_digit()).count();

@@ -1,12 +1,13 @@
-//! Symmetry under translations of several coordinates at once, seen in an expression, and the coordinates of bodies.
+//! Detection of symmetry under common translations of several coordinates, and of the coordinates of bodies.
 
 use crate::{Function, Graph, Id, Node, Operation};
 
 impl Graph {
-    /// Whether a node is seen to be invariant where these coordinates are moved by one length: where it depends on sums of them alone whose
-    /// factors add up to 0, as on `x - y`. What is not seen is not claimed.
+    /// Whether a node is invariant under a common translation of these coordinates, as far as its expression shows: it
+    /// must depend on them only through linear combinations whose coefficients add up to 0, such as `x - y`. Invariance
+    /// may hold without being detected.
     pub(crate) fn moves_into_itself(&self, of: Id, moved: &[usize]) -> bool {
-        // By how much each node grows in units of the length; not a number where that is not one number.
+        // The change of each node per unit of translation; NaN if it is not a constant.
         let mut growth = vec![f64::NAN; of.index() + 1];
         for (k, needed) in self.needed(of).into_iter().enumerate() {
             let id = Id(k as u32);
@@ -35,7 +36,8 @@ impl Graph {
         growth.last() == Some(&0.0)
     }
 
-    /// Sets of coordinates whose differences are in an expression, as `x1 - x2` and `x2 - x3`: those of bodies along an axis, each set in order.
+    /// Sets of coordinates whose differences occur in an expression, such as `x1 - x2` and `x2 - x3`: the coordinates
+    /// of bodies along an axis, each set in order.
     pub(crate) fn sets_of_differences(&self, of: Id, dimension: usize) -> Vec<Vec<usize>> {
         let mut set: Vec<usize> = (0..dimension).collect();
         for (k, needed) in self.needed(of).into_iter().enumerate() {

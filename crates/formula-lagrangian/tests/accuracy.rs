@@ -1,4 +1,5 @@
-//! Motions of formulas whose parts ask for steps of very different length, or that begin at nothing: to an accuracy, against closed forms.
+//! Motions whose parts require steps of very different lengths, or that start from a vanishing force: runs with a
+//! required accuracy, compared with closed-form solutions.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -14,13 +15,14 @@ fn run<const N: usize>(text: &str, names: &[&str], q: [f64; N], v: [f64; N], spa
     problem.accuracy(wanted).run(Until::Time(span)).unwrap()
 }
 
-/// Kepler's problem as text, which states no clock: from the apocentre through the pericentre, at distances down to a millionth.
+/// Kepler's problem as text, without a time transformation: from the apocentre through the pericentre, at distances
+/// down to a millionth.
 #[test]
 fn eccentric_orbits_are_followed() {
     for e in [0.9, 0.99, 0.999, 0.999_999] {
         let v = f64::sqrt((1.0 - e) / (1.0 + e));
         let found = run("(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", &["x", "y"], [1.0 + e, 0.0], [0.0, v], 6.5, 1e-9);
-        // The eccentric anomaly from the apocentre: M = E + e sin E there, by Newton's method.
+        // The eccentric anomaly from the apocentre, where M = E + e sin E, by Newton's method.
         let mean = 6.5 - 2.0 * PI;
         let mut anomaly = mean / (1.0 + e);
         for _ in 0..50 {
@@ -32,7 +34,7 @@ fn eccentric_orbits_are_followed() {
     }
 }
 
-/// From rest, under a force that is nothing at first.
+/// Motions from rest under a force that is negligible at first.
 #[test]
 fn motions_that_begin_at_nothing_are_followed() {
     let power = run("x'^2/2 + t^6*x", &["x"], [0.0], [0.0], 1.0, 1e-9);
@@ -42,18 +44,18 @@ fn motions_that_begin_at_nothing_are_followed() {
     assert!((pulse.p[0] / p - 1.0).abs() <= 1e-9 && (pulse.q[0] / (100.0 * p) - 1.0).abs() <= 1e-9, "{pulse:?}");
 }
 
-/// A strong magnetic field: 1600 turns, of which the first guess of the steps knows.
+/// A strong magnetic field, with 1600 revolutions, for which the initial estimate of the steps accounts.
 #[test]
 fn a_strong_field_is_followed() {
     let found = run("(x'^2 + y'^2)/2 + 1e4*x*y'", &["x", "y"], [0.0, 0.0], [1.0, 0.0], 1.0, 1e-6);
-    // p_y = y' + 1e4 x = 0 is kept, so that x'' = -1e8 x.
+    // p_y = y' + 1e4 x = 0 is conserved, so that x'' = -1e8 x.
     let (x, y) = (1e4_f64.sin() / 1e4, (1e4_f64.cos() - 1.0) / 1e4);
     let off = (found.q[0] - x).hypot(found.q[1] - y).hypot(found.p[0] - 1e4_f64.cos());
     assert!(off <= 1e-6, "{off:e} in {} steps", found.steps);
 }
 
-/// A plan ends with the first answer that is yes, in whichever of its searches it is given: that with equal steps fails here, and one with divided
-/// steps follows.
+/// A plan ends when the interrupt first returns true, in any of its searches: here the search with equal steps fails,
+/// and a search with divided steps follows.
 #[test]
 fn plans_are_interrupted_in_each_search() {
     let kepler = Formula::parse("(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", &["x", "y"], &[]).unwrap();

@@ -1,4 +1,4 @@
-//! Derivatives where a slope is infinite, or is no number in a branch that is not taken.
+//! Derivatives where a slope is infinite, or is NaN in a branch that is not taken.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -9,8 +9,8 @@ use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint};
 use formula_lagrangian::Formula;
 use random::Random;
 
-/// The potential, its slope and its second derivative at x, as the formula has them. Dual numbers over its slope give the same, or none: they see the powers of
-/// a root at 0 one by one.
+/// The potential, its first and its second derivative at x, from the formula. Dual numbers over the first derivative
+/// must give the same second derivative, or NaN, since they see the powers of a root at 0 one by one.
 fn jet(text: &str, p: f64, x: f64) -> [f64; 3] {
     let formula = Formula::parse(&format!("x'^2/2 + ({text})"), &["x"], &[("p", p)]).unwrap();
     let l = formula.lagrangian::<1>().unwrap();
@@ -25,7 +25,7 @@ fn jet(text: &str, p: f64, x: f64) -> [f64; 3] {
     [l.value(0.0, &at.q, &at.v, 0.0), l.force(0.0, &at)[0], second]
 }
 
-/// To the rounding of some powers and products.
+/// Equality to within the rounding of some powers and products.
 fn close(found: f64, exact: f64) -> bool {
     found == exact || (found - exact).abs() <= 1e-13 * exact.abs()
 }
@@ -77,7 +77,7 @@ fn powers_and_branches_have_their_derivatives() {
         let all = found.iter().zip(exact).all(|(a, b)| close(*a, *b) || a.is_nan() && b.is_nan());
         assert!(all, "{text} at {x}: {found:?}, not {exact:?}");
     }
-    // What has no derivative has none: a cone, the branch that is taken, and a choice by what is no number.
+    // Cases without a derivative: a cone, the branch that is taken, and a condition on NaN.
     for (text, x) in [
         ("sqrt(x^2 + x^4)", 0.0),
         ("if(x > 0, sqrt(x - 2), 0)", 1.0),
@@ -100,16 +100,17 @@ fn powers_of_lengths_have_their_derivatives_at_0() {
             assert_eq!(l.hessian(0.0, &at).qq.as_slice(), [0.0; 4], "{text}");
         }
     }
-    // Not where the power of each is not known to be flat.
+    // A base that is not known to be a sum of squares has no such derivatives.
     let l =
         Formula::parse("v[0]^2/2 + v[1]^2/2 - (q[0] + q[1])^1.5", &["q[2]"], &[]).unwrap().lagrangian::<2>().unwrap();
     assert_eq!(l.hessian(0.0, &VelocityPoint::new([0.0; 2], [0.0; 2], 0.0)).qq[(0, 1)], f64::NEG_INFINITY);
 }
 
-/// A function with its exact first and second derivative where it is defined, from the right at its end.
+/// A function with its exact value and first and second derivatives where it is defined, one-sided at the end of its
+/// domain.
 type Piece = (&'static str, fn(f64) -> [f64; 3]);
 
-/// Functions that are no numbers on one side, chosen where they are numbers, nested and summed at random.
+/// Functions that are NaN on one side, selected where they are defined, and nested and summed at random.
 #[test]
 fn branches_that_are_not_taken_leave_no_trace() {
     let right: [Piece; 4] = [
@@ -147,13 +148,13 @@ fn branches_that_are_not_taken_leave_no_trace() {
         }
         let text = terms.join(" + ");
         let found = jet(&text, 0.0, x);
-        // The terms are of the order of ten, and may cancel.
+        // The terms are of the order of ten, and may cancel each other.
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-13 * (10.0 + b.abs());
         assert!(found.iter().zip(exact).all(|(a, b)| near(*a, b)), "{text} at {x}: {found:?}, not {exact:?}");
     }
 }
 
-/// The rate alone is that of the gradient, to the bit, whatever parameters it has.
+/// The separately evaluated rate is bitwise equal to that of the gradient, for any parameters.
 #[test]
 fn the_rate_alone_is_that_of_the_gradient() {
     let texts =

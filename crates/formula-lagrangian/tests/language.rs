@@ -1,4 +1,4 @@
-//! What texts mean, and what is said of those that mean nothing.
+//! The values of valid texts, and the errors of invalid ones.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -38,7 +38,7 @@ fn values_are_those_of_the_same_operations() {
         ("1e-3*x", 2e-3),
         (".5*x", 1.0),
         ("5.*x", 10.0),
-        // A number to its last digit.
+        // Numbers are read exactly.
         ("0.1000000000000000055511151231257827021181583404541015625", 0.1),
         ("2.2250738585072011e-308", 2.225_073_858_507_201e-308),
         ("x*3.141592653589793238462643383279502884", x * std::f64::consts::PI),
@@ -82,7 +82,7 @@ fn values_are_those_of_the_same_operations() {
     for (text, expected) in table {
         assert_eq!(value(text), *expected, "{text}");
     }
-    // Composed of others: some roundings.
+    // Functions that are composed of others have some more roundings.
     let composed = [
         ("atan2(y, x)", y.atan2(x)),
         ("atan2(x, y)", x.atan2(y)),
@@ -168,7 +168,7 @@ fn errors_show_the_place_and_the_remedy() {
     );
 }
 
-/// What other languages write, and what is written here in its place.
+/// Corrections for the notation of other languages.
 #[test]
 fn errors_say_what_to_write_instead() {
     let table = [
@@ -210,7 +210,7 @@ fn errors_say_what_to_write_instead() {
         let found = error(text).to_string();
         assert!(found.contains(instead), "{text}: {found}");
     }
-    // In arrays by their own names; and no name is the remedy for itself.
+    // Arrays are suggested by their own names, and no name is suggested as its own correction.
     let of_array = |text: &str| match Formula::parse(text, &["q[2]"], &[]) {
         Err(FormulaError::Parse(error)) => error.to_string(),
         other => panic!("{text}: {other:?}"),
@@ -246,7 +246,7 @@ fn names_and_values_that_are_none() {
     assert!(matches!(lagrangian.set("a", f64::INFINITY), Err(FormulaError::ParameterValue { .. })));
 }
 
-/// Long, deep and wide texts end with an error, soon, and on a stack of ordinary size.
+/// Long, deeply nested and wide texts are errors, without delay and on a stack of ordinary size.
 #[test]
 fn texts_without_measure() {
     let deep = [
@@ -259,12 +259,12 @@ fn texts_without_measure() {
         assert!(error(&text).message.contains("nested more than"), "{}", error(&text));
     }
     assert!(error(&"x+".repeat(40_000)).message.contains("bytes"));
-    // A long sum is one level deep.
+    // A long sum has one level of nesting.
     let long = format!("x'^2 + y'^2 {}", "+ x*y'".repeat(5000));
     Formula::parse(&long, &["x", "y"], &[]).unwrap().lagrangian::<2>().unwrap();
     let nested = "sum(i, 1, 1000, sum(j, 1, 1000, sum(k, 1, 1000, x*i*j*k)))";
     assert!(error(nested).message.contains("more than 20000 parts"));
-    // So many words, and no more nodes than a few.
+    // Very many words, and only a few nodes.
     assert!(error("sum(i, 1, 100000000, sum(j, 1, 100000000, 0))").message.contains("more than 20000 parts"));
     // Exponentially many paths in a small graph.
     let doubled: String = (0..300).map(|i| format!("a{} = sin(a{i}) * (a{i} + 1)\n", i + 1)).collect();
@@ -274,7 +274,7 @@ fn texts_without_measure() {
         .unwrap();
 }
 
-/// A column may have a name that is not taken; the function of an event is no equation.
+/// An output column may have a name that is not in use; the function of an event must not be an equation.
 #[test]
 fn values_with_names() {
     let formula = Formula::parse("x'^2/2 - k*x^2/2", &["x"], &[("k", 2.0)]).unwrap();
@@ -287,7 +287,8 @@ fn values_with_names() {
     assert!(formula.expression("x = 1").is_err() && formula.expression("y = x").is_err());
 }
 
-/// Beside a Lagrangian its energy, momenta and conformal factor have names, which coordinates, parameters and definitions may take.
+/// Expressions that belong to a Lagrangian have names for its energy, momenta and conformal factor. Coordinates,
+/// parameters and definitions may take these names.
 #[test]
 fn quantities_of_the_motion() {
     let text = "m*x'^2/2 + a*x'*w'[1] + cosh(w'[0]) + w'[1]^4/4 - x^2*z + gamma*z + t";
@@ -297,7 +298,7 @@ fn quantities_of_the_motion() {
     let momenta = [2.0 * v[0] + 0.5 * v[2], f64::sinh(v[1]), 0.5 * v[0] + v[2].powi(3)];
     let value = v[0] * v[0] + 0.5 * v[0] * v[2] + v[1].cosh() + v[2].powi(4) / 4.0 - q[0] * q[0] * z - 0.25 * z + t;
     let energy = v.iter().zip(momenta).map(|(v, p)| v * p).sum::<f64>() - value;
-    // The roundings of a dozen operations on numbers up to 10.
+    // Round-off of a dozen operations on numbers up to 10.
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-14 * 10.0, "{a} and {b}");
     near(at("energy", 0.0), energy);
     for (name, p) in ["p_x", "p_w[0]", "p_w[1]"].iter().zip(momenta) {
@@ -311,13 +312,13 @@ fn quantities_of_the_motion() {
             && !l.expression("energy").unwrap().has_conformal_factor()
     );
     assert!(l.expression("p_x").unwrap().has_velocity() && l.expression("energy").unwrap().has_action());
-    // With other values of the parameters, too.
+    // The same holds for other values of the parameters.
     let mut light = l.expression("p_x - energy").unwrap();
     let before = light.at(t, &q, &v, z);
     light.set("m", 4.0).unwrap();
     near(light.at(t, &q, &v, z) - before, 2.0 * v[0] - v[0] * v[0]);
 
-    // A name that is taken is what it was; in the Lagrangian itself there is none of them.
+    // A name that is in use keeps its meaning. In the Lagrangian itself these names are not available.
     let taken = Formula::parse("x'^2/2 + sigma*p_x", &["x"], &[("sigma", 3.0), ("p_x", 5.0)]).unwrap();
     assert_eq!(taken.expression("sigma + p_x").unwrap().at(0.0, &[0.0], &[0.0], 0.0), 8.0);
     assert_eq!(taken.expression("energy = 7; energy + 1").unwrap().at(0.0, &[0.0], &[0.0], 0.0), 8.0);

@@ -1,5 +1,5 @@
-//! A formula and its derivatives are evaluated without an allocation. A counting allocator is global to its binary, so this test stands
-//! alone.
+//! A formula and its derivatives are evaluated without allocation. A counting allocator is global to its binary, so
+//! this test is in a file of its own.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -10,13 +10,13 @@ use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 
 thread_local! {
-    /// The allocations of this thread: the test runner's own threads do not count.
+    /// The allocations of this thread, so that those of the test runner do not count.
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-#[allow(unsafe_code)] // An allocator cannot be written without.
+#[allow(unsafe_code)] // An allocator requires unsafe code.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let _ = COUNT.try_with(|c| c.set(c.get() + 1));
@@ -38,9 +38,10 @@ fn allocations(action: impl FnOnce()) -> usize {
 
 #[test]
 fn nothing_is_allocated() {
-    // The counter counts.
+    // The counter works.
     assert_eq!(allocations(|| drop(Box::new(1.0))), 1);
-    // Eight coordinates, each coupled to its neighbours, in a curved kinetic energy: two hundred second derivatives.
+    // Eight coordinates, each coupled to its neighbours, with a kinetic energy that depends on position: two hundred
+    // second derivatives.
     let text =
         "sum(i, 0, n-1, v[i]^2*(2 + sin(q[i])))/2 - sum(i, 1, n-1, cos(q[i] - q[i-1])*v[i]*v[i-1]) - exp(-a*t)*z";
     let l: FormulaLagrangian<8> = Formula::parse(text, &["q[8]"], &[("a", 0.1)]).unwrap().lagrangian().unwrap();
@@ -52,7 +53,8 @@ fn nothing_is_allocated() {
     });
     assert!(sum.is_finite());
     assert_eq!(count, 0);
-    // Nor by the steps of integrators: duals, whose registers are on the heap, are in none.
+    // The steps of integrators do not allocate either: they do not use nested dual numbers, whose registers are on the
+    // heap.
     let problem = Problem::new(&l, 0.0, x).unwrap();
     for stages in [1, 2, 8, 16] {
         let plan = problem.by(GaussCollocation { stages }).steps(Steps::Size(1e-3)).plan(Until::Time(1.0)).unwrap();
@@ -60,7 +62,7 @@ fn nothing_is_allocated() {
         stepper.advance(1).unwrap();
         assert_eq!(allocations(|| stepper.advance(10).unwrap()), 0, "{stages} stages");
     }
-    // Nor by steps that are searched for a kink and meet none.
+    // Steps that are searched for a kink and do not contain one do not allocate either.
     let kinked = Formula::parse("x'^2/2 - x^2/2 - max(x - 100, 0)", &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
     let problem = Problem::new(&kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let plan = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(1e-1)).plan(Until::Time(10.0)).unwrap();

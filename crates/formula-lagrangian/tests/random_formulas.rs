@@ -1,4 +1,4 @@
-//! Random formulas: derivatives against duals, claims against probes.
+//! Random formulas: derivatives compared with dual numbers, and proved properties with numerical checks.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -16,7 +16,7 @@ impl Random {
         words[self.below(words.len())].to_owned()
     }
 
-    /// An expression of so many levels over given leaves; with kinks or without.
+    /// A random expression of the given depth over given leaves, with or without kinks.
     fn expression(&mut self, depth: usize, leaves: &[&str], kinks: bool) -> String {
         if depth == 0 || self.below(6) == 0 {
             return match self.below(5) {
@@ -62,7 +62,7 @@ impl Random {
         }
     }
 
-    /// A Lagrangian that has some structure, as a rule.
+    /// A random Lagrangian, which usually has some structure.
     fn lagrangian(&mut self, kinks: bool) -> String {
         let part = |random: &mut Random| {
             let leaves: &[&str] = match random.below(9) {
@@ -102,8 +102,9 @@ fn lagrangian(text: &str) -> FormulaLagrangian<2> {
     formula.lagrangian().unwrap()
 }
 
-/// Each claim that is proved holds to round-off where the derivatives, found by automatic differentiation, are compared with it; and the
-/// closed derivatives are those, to four units of round-off of their terms (to which each function adds one, each operation half a unit).
+/// Each proved property holds to round-off, compared with derivatives by automatic differentiation. The closed
+/// derivatives agree with these to four units of round-off of their terms, to which each function adds one unit, and
+/// each operation half a unit.
 fn compare(seed: u64, count: usize, kinks: bool) -> [usize; 3] {
     let mut random = Random(seed);
     let (mut compared, mut claims) = (0, 0);

@@ -1,4 +1,4 @@
-//! Formulas run by integrators, against the Rust types of the same Lagrangians.
+//! Runs of formulas compared with those of the Rust types of the same Lagrangians.
 
 use contact_geom::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{Dual, Lagrangian, VelocityPoint, nalgebra::SVector};
@@ -17,7 +17,7 @@ fn a_pendulum_by_gauss() {
     let ours = run(problem.by(gauss).steps(Steps::Size(0.5)).run(Until::Time(50.0)).unwrap());
     let problem = Problem::new(&typed, 0.0, start).unwrap();
     let theirs = run(problem.by(gauss).steps(Steps::Size(0.5)).run(Until::Time(50.0)).unwrap());
-    // The same operations in another order of factors: some roundings a step.
+    // The operations are the same except for the order of factors: some roundings per step.
     assert!((ours.0 - theirs.0).abs() < 1e-14 && (ours.1 - theirs.1).abs() < 1e-14, "{ours:?} {theirs:?}");
     let moving = Dual { re: 1.0, d: SVector::<f64, 1>::new(1.0) };
     let one = |x| SVector::from([Dual::constant(x)]);
@@ -25,8 +25,9 @@ fn a_pendulum_by_gauss() {
     assert_eq!(l.d[0], -1f64.sin());
 }
 
-/// As many stages as there are, so that one, two or more vector registers hold them: formulas are evaluated for two or four at once, types for
-/// one, to the same bits. By accelerations (the pendulum) and by the general route (drag of the second degree in z).
+/// For all numbers of stages, which occupy one, two or more vector registers. Formulas are evaluated for two or four
+/// registers at once, types for one, with bitwise equal results. Both paths are tested: by accelerations (the
+/// pendulum), and the general one (drag that is quadratic in z).
 #[test]
 fn gauss_steps_of_any_number_of_stages_are_those_of_the_type() {
     fn ends(lagrangian: &impl Lagrangian<1>, stages: usize) -> [f64; 3] {

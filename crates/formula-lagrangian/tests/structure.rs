@@ -1,4 +1,4 @@
-//! What is proved of formulas.
+//! Proved properties of formulas.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -11,7 +11,8 @@ fn lagrangian(text: &str) -> FormulaLagrangian<2> {
     Formula::parse(text, &["x", "y"], &[("a", 0.5)]).unwrap().lagrangian().unwrap()
 }
 
-/// The claims in the order autonomous, z_free, z_affine, constant_rate, separable, quadratic, constant_mass, by their first letters.
+/// The claims in the order autonomous, z_free, z_affine, constant_rate, separable, quadratic, constant_mass, by their
+/// first letters.
 fn claims(text: &str) -> String {
     let s = lagrangian(text).structure();
     let all = [
@@ -37,19 +38,19 @@ fn claims_are_those_that_hold() {
         ("(x'^2 + y'^2)/2 - x^2 - x*z", "am"),
         ("(x'^2 + y'^2)/2 - t*x^2 - a*z", "zrsqm"),
         ("(x'^2 + y'^2)/2 - x^2 - t*z", "zsqm"),
-        // A term linear in a velocity: a field, or a total derivative.
+        // A term linear in a velocity: a magnetic field, or a total derivative.
         ("(x'^2 + y'^2)/2 + x*y'", "afzrqm"),
         ("(x'^2 + y'^2)/2 + x' + x^3", "afzrm"),
         ("t*(x'^2 + y'^2)/2", "fzrq"),
         ("(2 + cos(x))*x'^2 + y'^2", "afzr"),
-        // Kinks: derivatives hide them.
+        // Kinks, which derivatives hide.
         ("(x'^2 + y'^2)/2 - abs(x)", "afzrsm"),
         ("(x'^2 + y'^2)/2 - abs(x')", "afzr"),
         ("(x'^2 + y'^2)/2 - abs(z)", "am"),
         ("(x'^2 + y'^2)/2 - sign(z)*x", "am"),
         ("(x'^2 + y'^2)/2 - if(y' < 1, x, 2*x)", "afzr"),
         ("(x'^2 + y'^2)/2 - sign(t)*z", "zsqm"),
-        // What vanishes is not there.
+        // Terms that vanish identically.
         ("(x'^2 + y'^2)/2 - x + 0*z^2 + (z - z)*x", "afzrsqm"),
     ];
     for (text, expected) in table {
@@ -75,8 +76,8 @@ fn coordinates_that_are_not_there_are_symmetries() {
     assert!(lagrangian("x'^2").is_smooth() && !lagrangian("max(x, y)").is_smooth());
 }
 
-/// Whether the rotation of x and y is seen, and whether it is a symmetry, by the derivative of L along it at a point without
-/// symmetry: round-off, to a few units for each of some ten terms, or not.
+/// Whether the rotation of x and y is detected, and whether it is a symmetry. The latter is tested by the derivative of
+/// L along it at a point without symmetry, which is round-off, a few units for each of some ten terms, or not.
 fn rotation(text: &str) -> [bool; 2] {
     let l = lagrangian(text);
     let seen = l.symmetries().iter().any(|s| matches!(s, Symmetry::Rotation(0, 1)));
@@ -113,15 +114,16 @@ fn rotations_are_seen_where_they_are_symmetries() {
     for text in others {
         assert_eq!(rotation(text), [false, false], "{text}");
     }
-    // Not seen, though it is one.
+    // A symmetry that is not detected.
     assert_eq!(rotation("x'^2 + y'^2 + (x + y)^2 + (x - y)^2"), [false, true]);
-    // In space, each of three.
+    // All three rotations in space.
     let text = "(x'^2 + y'^2 + w'^2)/2 + 1/sqrt(x^2 + y^2 + w^2)";
     let space = Formula::parse(text, &["x", "y", "w"], &[]).unwrap().lagrangian::<3>().unwrap();
     assert_eq!(space.symmetries().len(), 3);
 }
 
-/// The symmetries of a formula of bodies in the plane, or in space, all of which must leave L as it is, to some hundred roundings of its terms.
+/// The symmetries of a formula of bodies in the plane or in space. All of them must leave L invariant, to some hundred
+/// roundings of its terms.
 fn of_bodies<const N: usize>(text: &str, names: &[&str]) -> Vec<Symmetry<N>> {
     let l = Formula::parse(text, names, &[("g", 2.0)]).unwrap().lagrangian::<N>().unwrap();
     let of = |i: usize, seed: f64| ((i as f64 + 1.0) * seed).sin();
@@ -143,16 +145,16 @@ fn symmetries_of_bodies_are_seen() {
     let both = |potential: &str| of_bodies::<4>(&format!("{kinetic} + {potential}"), &names);
     let all = vec![together([1.0, 0.0, 1.0, 0.0]), together([0.0, 1.0, 0.0, 1.0]), turned];
     assert_eq!(both("g/sqrt((a - c)^2 + (b - d)^2) + 0.3*z"), all);
-    // The differences with other signs and factors; by a length; with a magnetic force between them.
+    // The differences with other signs and factors; by a length; and with a magnetic force between the bodies.
     assert_eq!(both("g/sqrt((2*a - 2*c)^2/4 + (d - b)^2) + (a - c)^2 + (b - d)^2"), all);
     assert_eq!(both("exp(-hypot(a - c, d - b))"), all);
     assert_eq!(both("(a - c)*(b' - d') - (b - d)*(a' - c') + cos(t)*(a'*c' + b'*d')"), all);
-    // About a centre they turn and do not move.
+    // With a fixed centre there is a rotation but no translation.
     assert_eq!(both("1/sqrt(a^2 + b^2) + 1/sqrt(c^2 + d^2) + 1/hypot(a - c, b - d)"), [turned]);
-    // Of bodies that a field of one direction pulls the translation across it is left; a trap leaves none.
+    // In a uniform field the translation perpendicular to it remains; in a trap no symmetry remains.
     assert_eq!(both("1/hypot(a - c, b - d) - 9.81*(3*b + g*d)"), [together([1.0, 0.0, 1.0, 0.0])]);
     assert_eq!(both("1/hypot(a - c, b - d) - a^2 - 2*b^2"), []);
-    // What does not turn: unequal factors, one sign, a product of other pairs.
+    // No rotations: unequal factors, opposite signs, products of other pairs.
     let still = vec![all[0], all[1]];
     for potential in
         ["(a - c)^2 + 2*(b - d)^2", "(a - c)^2 - (b - d)^2", "(a - c)*(b - d)", "(a - c)^2 + (b - d)*(b' - d')"]
@@ -175,7 +177,7 @@ fn a_plan_says_that_the_structure_is_proved() {
     assert_eq!(*problem.structure(), l.structure());
 }
 
-/// Not regular, or not defined at the start: typed errors.
+/// A Lagrangian that is not regular, or not defined at the start, is a typed error.
 #[test]
 fn bad_starts_are_refused() {
     let start = VelocityPoint::new([1.0, 0.0], [0.0, 1.0], 0.0);

@@ -1,4 +1,4 @@
-//! Kinks and jumps of formulas: steps end on them, so that accuracy holds across.
+//! Kinks and jumps of formulas: steps end on them, so that accuracy is maintained across them.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -7,31 +7,31 @@ use discrete_herglotz::{AnyIntegrator, Outcome, Problem, Status, Steps, Until};
 use formula_lagrangian::Formula;
 use std::f64::consts::PI;
 
-/// The motion of one coordinate x from a position and a velocity, to an accuracy.
+/// The motion of one coordinate x from a position and a velocity, with a required accuracy.
 fn by_accuracy(text: &str, [x, v]: [f64; 2], span: f64, wanted: f64) -> Outcome<1> {
     let lagrangian = Formula::parse(text, &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
     let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new([x], [v], 0.0)).unwrap();
     problem.accuracy(wanted).run(Until::Time(span)).unwrap()
 }
 
-/// The same by given steps.
+/// The same with a given integrator and number of steps.
 fn by_steps(text: &str, [x, v]: [f64; 2], span: f64, by: &str, steps: usize) -> Outcome<1> {
     let lagrangian = Formula::parse(text, &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
     let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new([x], [v], 0.0)).unwrap();
     problem.by(by.parse::<AnyIntegrator>().unwrap()).steps(Steps::Count(steps)).run(Until::Time(span)).unwrap()
 }
 
-/// Texts, starts, spans, and where the motion is at the end.
+/// Texts, initial states, time spans, and final states.
 fn solved() -> Vec<(&'static str, [f64; 2], f64, [f64; 2])> {
     let forced = "x'^2/2 - x^2/2 + if(t > 0.75, 1, 0)*x";
     vec![
-        // Half periods of frequency 1 and 3, then 1 and 2.
+        // Half periods of the frequencies 1 and 3, then of 1 and 2.
         ("x'^2/2 - if(x > 0, x^2/2, 4.5*x^2)", [1.0, 0.0], 4.0 * PI / 3.0, [1.0, 0.0]),
         ("x'^2/2 - if(x > 0, x^2/2, 2*x^2)", [1.0, 0.0], 9.0 * PI, [1.0, 0.0]),
         (forced, [0.0, 0.0], 2.0, [1.0 - 1.25_f64.cos(), 1.25_f64.sin()]),
-        // A parabola in each direction: a quarter takes sqrt(2).
+        // A parabola in each direction; a quarter of a period takes sqrt(2).
         ("x'^2/2 - abs(x)", [1.0, 0.0], 8.0 * 2.0_f64.sqrt(), [1.0, 0.0]),
-        // Walls and steps of the potential: reflected, slowed down, sped up.
+        // Jumps of the potential at which the motion is reflected, slowed down and accelerated.
         ("x'^2/2 - 5*if(x > 0.7, 1, 0)", [0.0, 1.0], 2.0, [-0.6, -1.0]),
         ("x'^2/2 - 0.3*if(x > 0.7, 1, 0)", [0.0, 1.0], 2.0, [0.7 + 1.3 * 0.4_f64.sqrt(), 0.4_f64.sqrt()]),
         ("x'^2/2 + 0.3*if(x > 0.7, 1, 0)", [0.0, 1.0], 2.0, [0.7 + 1.3 * 1.6_f64.sqrt(), 1.6_f64.sqrt()]),
@@ -50,11 +50,11 @@ fn accuracy_holds_across_kinks_and_jumps() {
     }
 }
 
-/// By given steps too, whatever the integrator: to the error of the same steps where the motion is smooth.
+/// The same with given steps and several integrators, to within the error of these steps for a smooth motion.
 #[test]
 fn given_steps_end_on_kinks_and_jumps() {
     for (text, start, span, [x, v]) in solved() {
-        // Frequencies are at most 3; the errors of all steps add up in time.
+        // Frequencies are at most 3. The errors of the steps accumulate in time.
         for (by, per_unit, bound) in
             [("gauss_8", 2.0, 1e-11), ("gauss_2", 40.0, 1e-6), ("kahan_li_8", 20.0, 1e-6), ("midpoint", 300.0, 1e-3)]
         {
@@ -66,7 +66,7 @@ fn given_steps_end_on_kinks_and_jumps() {
     }
 }
 
-/// Random numbers between two bounds, the same everywhere.
+/// Random numbers between two bounds, equal on all platforms.
 struct Random(u64);
 
 impl Random {
@@ -76,7 +76,8 @@ impl Random {
     }
 }
 
-/// A potential `k x^2/2 - c x + d` in each of three regions, which end at two walls; a force that begins at a time; a drag.
+/// A potential `k x^2/2 - c x + d` in each of three regions, which are separated by two walls; a force that begins at a
+/// given time; and drag.
 struct Pieces {
     walls: [f64; 2],
     pieces: [[f64; 3]; 3],
@@ -86,7 +87,7 @@ struct Pieces {
 }
 
 impl Pieces {
-    /// With jumps of the potential at its walls, or continuous.
+    /// Random pieces with or without jumps of the potential at the walls.
     fn random(random: &mut Random) -> Self {
         let walls = [random.between(-0.8, -0.1), random.between(0.1, 0.8)];
         let mut pieces = [[0.0; 3]; 3].map(|_: [f64; 3]| [random.between(0.2, 9.0), random.between(-1.0, 1.0), 0.0]);
@@ -108,7 +109,8 @@ impl Pieces {
         )
     }
 
-    /// The motion within a region: the Taylor series of a linear equation, to round-off for times up to a tenth.
+    /// The motion within a region, by the Taylor series of a linear equation, which is exact to round-off for times up
+    /// to a tenth.
     fn flow(&self, region: usize, forced: bool, [x, v]: [f64; 2], t: f64) -> [f64; 2] {
         let [k, c, _] = self.pieces[region];
         let c = if forced { c + self.force } else { c };
@@ -123,8 +125,8 @@ impl Pieces {
         sums
     }
 
-    /// The motion from a start to a time, from wall to wall; `None` where it comes so near to the top of a step of the potential, or to a turn at a
-    /// wall, that its end depends on the last digits.
+    /// The motion from an initial state over a time span, from wall to wall. `None` if it comes so close to the top of
+    /// a jump of the potential, or to a turning point at a wall, that the final state depends on round-off.
     fn solve(&self, [mut x, mut v]: [f64; 2], span: f64) -> Option<[f64; 2]> {
         let mut t = 0.0;
         let mut region = self.walls.iter().filter(|wall| x >= **wall).count();
@@ -163,7 +165,7 @@ impl Pieces {
             if square.abs() < 0.02 {
                 return None;
             }
-            // Exactly on the wall, so that the next part begins in its own region.
+            // The position is exactly on the wall, so that the next piece begins in its own region.
             x = wall;
             if square > 0.0 {
                 (v, region) = (square.sqrt().copysign(v), next);
@@ -179,7 +181,8 @@ fn potential([k, c, d]: [f64; 3], x: f64) -> f64 {
     k * x * x / 2.0 - c * x + d
 }
 
-/// A thousand random kinks, jumps and walls, by an accuracy: each within it; and by steps of an eighth of a unit.
+/// A thousand random kinks, jumps and walls. A run with a required accuracy satisfies it, and runs with steps of a
+/// sixteenth of a unit of time are accurate to their order.
 #[test]
 fn random_kinks_and_jumps() {
     let mut random = Random(7);
@@ -216,7 +219,8 @@ fn random_kinks_and_jumps() {
     assert!(solved > 700 && refused <= solved / 100, "{refused} of {solved} refused");
 }
 
-/// A jump that is written as a smooth function, so narrow that no gradient sees it: the motion is right beyond it, or refused.
+/// A jump that is written as a smooth function, so narrow that no evaluation of the gradient detects it. The motion
+/// beyond it is correct, or the run is refused.
 #[test]
 fn a_jump_in_disguise_is_not_crossed() {
     for (height, beyond) in [(0.15, 0.4_f64.sqrt()), (0.0015, 0.994_f64.sqrt())] {

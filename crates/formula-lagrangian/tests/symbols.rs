@@ -1,4 +1,4 @@
-//! Formulas that a program builds are those of the same text.
+//! Formulas that are built by a program are equal to those of the same text.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -24,7 +24,8 @@ fn operators_build_what_a_text_says() {
         let c = |i: usize| ((k * 7 + i) as f64 * 0.618_033_988_749_894_9).fract() - 0.45;
         let at = VelocityPoint::new([c(0), c(1)], [c(2), c(3)], c(4));
         let [one, other] = [&built, &read].map(|l| l.with_gradient(c(5), &at));
-        // The same sums in the same order but for summands that commute: round-off of some twenty terms of order 1.
+        // The sums are the same and in the same order except for commuting summands: round-off of some twenty terms of
+        // order 1.
         assert!((one.0 - other.0).abs() < 1e-14, "{one:?} {other:?}");
         assert!((one.1.x - other.1.x).norm() < 1e-13, "{one:?} {other:?}");
     }

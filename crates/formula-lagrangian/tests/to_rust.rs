@@ -1,4 +1,4 @@
-//! Rust source of formulas: compiled here, and compared with the formulas bit by bit.
+//! Rust source of formulas, which is compiled here and compared bitwise with the formulas.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -13,7 +13,7 @@ mod all_functions;
 mod kepler;
 
 const KEPLER: &str = "(x'^2 + y'^2)/2 + mu/sqrt(x^2 + y^2) + gamma*z";
-/// Every function, and constants that are made of parameters.
+/// All functions, and constants that depend on parameters.
 const ALL: &str = "
     smooth = sin(x)*cos(y) + tan(x/2) + versine(y) + atan(y) + sinh(x) - cosh(y)/tanh(2 + x) + recip(3 - x)
     roots = sqrt(4 + x*y) + exp(-x)*expm1(y) + ln(3 + x) - log1p(x^2) + (2 + x)^0.3 + (3 + y)^type - x^3 + (2 + y)^-5 + x^7
@@ -26,7 +26,7 @@ fn all() -> FormulaLagrangian<2> {
     Formula::parse(ALL, &["x", "y"], &[("type", 0.7)]).unwrap().lagrangian().unwrap()
 }
 
-/// With `UPDATE=1` in the environment the snapshots are written.
+/// Compares a source with its snapshot. With `UPDATE` set in the environment the snapshot is written first.
 fn check(text: &str, file: &str) {
     let path = format!("{}/tests/snapshots/{file}.rs", env!("CARGO_MANIFEST_DIR"));
     if std::env::var_os("UPDATE").is_some() {
@@ -45,7 +45,7 @@ fn the_source_is_what_was_looked_at() {
     }
 }
 
-/// The value and the gradient at a point, with a derivative along a direction.
+/// The value and the gradient at a point, with their derivatives along a direction.
 fn numbers(l: &impl Lagrangian<2>, k: usize) -> Vec<u64> {
     let coordinate = |i: usize| ((k * 7 + i) as f64 * 0.618_033_988_749_894_9).fract() - 0.45;
     let moving = |i: usize| Dual { re: coordinate(i), d: SVector::<f64, 1>::new(coordinate(i + 3)) };

@@ -7,8 +7,8 @@ use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};
 use formula_lagrangian::Formula;
 use herglotz::runtime::{
-    CATALOGUE, CatalogueEntry, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes,
-    RunMonitor, RuntimeError, SeenSymmetry, Start, StepControl, System, Varied,
+    CATALOGUE, CatalogueEntry, Check, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes,
+    Place, RunMonitor, RuntimeError, SeenSymmetry, Start, StepControl, System, Varied,
 };
 use std::ops::ControlFlow;
 
@@ -583,4 +583,18 @@ fn symmetries_and_source() {
     assert!(free.structure().separable && free.is_smooth());
     assert!(free.to_rust("Free").unwrap().contains("impl Lagrangian<1> for Free"));
     assert!(free.to_rust("not a type").is_err());
+}
+
+/// With the factor 0, or one that is not finite, the pullback is not a contact form.
+#[test]
+fn a_factor_that_is_none_is_not_contact() {
+    let check = |sigma: f64| {
+        let (contact_defect, herglotz_defect, momenta) = (0.0, 0.0, Vec::new());
+        let place = Place { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
+        Check { integrator: String::new(), step_size: 1.0, places: vec![place], statements: Vec::new() }
+    };
+    assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
+    for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {
+        assert!(!check(none).is_contact() && check(none).loses_the_form(), "{none}");
+    }
 }

@@ -3,12 +3,12 @@
 use crate::arrays::{number, numbers, value_error};
 use crate::run::{Kept, Record, record};
 use crate::signals::Signals;
-use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use herglotz::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError,
     Start, Steps,
 };
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// The arguments of a motion: q0, v0 or p0 as flat arrays, whether it is p0, and z0; t; every; integrator, step, steps;
 /// and whether the conformal factor is requested.

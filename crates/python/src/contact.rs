@@ -3,9 +3,9 @@
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, Darboux, Dual, support::conformality_with_jacobian};
+use herglotz::runtime::Formula;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use herglotz::runtime::Formula;
 
 /// The conformal factor, the defect, the image and the Jacobian.
 type Found = (f64, f64, Py<PyArray1<f64>>, Py<PyArray2<f64>>);

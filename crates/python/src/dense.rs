@@ -3,9 +3,9 @@
 use crate::arrays::{matrix, numbers, value_error, vector};
 use crate::motion::{Motion, columns};
 use crate::signals::Signals;
+use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
 use std::ops::ControlFlow;
 
 /// The ends of a motion's steps.

@@ -4,12 +4,12 @@ use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
 use crate::motion::{self, GivenEvent, GivenWay};
 use crate::signals::heard;
 use crate::system::System;
-use numpy::{PyArray1, PyArray2};
-use pyo3::prelude::*;
 use herglotz::runtime::{
     Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
     Start, Status, Tally, Varied, in_words,
 };
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

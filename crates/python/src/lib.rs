@@ -3,12 +3,12 @@
 
 mod arrays;
 mod assembled;
+mod checks;
 mod condition;
 mod contact;
 mod dense;
 mod ensemble;
 mod exact;
-mod looks;
 mod motion;
 mod path;
 mod run;
@@ -17,14 +17,16 @@ mod symbol;
 mod system;
 mod text;
 
-use pyo3::prelude::*;
 use herglotz::runtime::{AnyIntegrator, CATALOGUE};
+use pyo3::prelude::*;
 
 /// The extension module.
 #[pymodule]
 mod _core {
     #[pymodule_export]
     use crate::assembled::{run_bodies, run_lattice};
+    #[pymodule_export]
+    use crate::checks::{check, compare, geometry};
     #[pymodule_export]
     use crate::condition::Condition;
     #[pymodule_export]
@@ -35,8 +37,6 @@ mod _core {
     use crate::ensemble::{EnsembleRecord, run_ensemble};
     #[pymodule_export]
     use crate::exact::{exact_lagrangian, exponential, retract};
-    #[pymodule_export]
-    use crate::looks::{check, compare, geometry};
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]

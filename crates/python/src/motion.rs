@@ -3,10 +3,10 @@
 use crate::arrays::{number, numbers, shown, value_error, whole, word};
 use crate::signals::Signals;
 use crate::system::System;
-use pyo3::prelude::*;
 use herglotz::runtime::{
     AnyIntegrator, Column, Direction, Event, Formula, InitialVelocity, OutputTimes, Start, StepControl, Steps,
 };
+use pyo3::prelude::*;
 
 /// A request for a motion, from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]

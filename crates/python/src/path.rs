@@ -3,9 +3,9 @@
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole, word};
 use crate::signals::heard_at_once;
 use crate::system::System;
+use herglotz::runtime::{BoundaryProblem, FoundPath, PathStatus};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use herglotz::runtime::{BoundaryProblem, FoundPath, PathStatus};
 
 /// A path of k steps between two positions: k + 1 points with momenta and actions.
 #[pyclass(frozen, get_all, module = "herglotz._core")]

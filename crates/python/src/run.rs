@@ -3,12 +3,12 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use numpy::{PyArray1, PyArray2};
-use pyo3::prelude::*;
 use herglotz::runtime::{
     Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor, RuntimeError,
     Status,
 };
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
 use std::ops::ControlFlow;
 
 /// Stores the parts of the rows of a motion.

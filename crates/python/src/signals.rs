@@ -1,7 +1,7 @@
 //! Signals of the user (Ctrl-C) during a run.
 
-use pyo3::prelude::*;
 use herglotz::runtime::Interrupt;
+use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};

@@ -1,9 +1,9 @@
 //! Systems given by a formula.
 
 use crate::arrays::value_error;
+use herglotz::runtime::SeenSymmetry;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
-use herglotz::runtime::SeenSymmetry;
 
 /// A Lagrangian with all that integrators need.
 #[pyclass(frozen, module = "herglotz")]
@@ -43,7 +43,8 @@ impl System {
     fn new(lagrangian: String, coordinates: Vec<String>, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-        let inner = herglotz::runtime::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
+        let inner =
+            herglotz::runtime::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
         Ok(System { inner, lagrangian, given_coordinates: coordinates })
     }
 

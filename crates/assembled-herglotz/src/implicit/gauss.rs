@@ -55,8 +55,8 @@ pub struct AssembledGauss<'a> {
     p: Vec<f64>,
     z: f64,
     sigma: f64,
-    /// The stage velocities of the last step (`v`), with the stages of one unknown after those of another; those of the
-    /// next step (`next`); and work space for a correction (`change`).
+    /// The stage velocities of the last step (`v`), grouped by unknown; those of the next step (`next`); and work space
+    /// for a correction (`change`).
     v: Vec<f64>,
     next: Vec<f64>,
     change: Vec<f64>,

@@ -11,7 +11,7 @@ pub(crate) struct Pattern {
     pub rows: Vec<u32>,
 }
 
-/// The index of an entry in the row or column of a fixed place, which is not stored.
+/// The index of an entry in the row or column of a fixed component, which is not stored.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
 impl Pattern {

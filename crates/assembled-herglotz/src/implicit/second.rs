@@ -95,7 +95,7 @@ fn add<'p, const K: usize>(
     for (lane, places) in (0..count).zip(places) {
         let triangle = (0..K).flat_map(|i| (0..=i).map(move |j| (i, j)));
         for ((i, j), place) in triangle.zip(places) {
-            // Rows and columns of fixed places have no entry in the matrix.
+            // Rows and columns of fixed components have no entry in the matrix.
             if let Some(entry) = entries.get_mut(*place as usize) {
                 *entry += second[i][j][lane];
             }

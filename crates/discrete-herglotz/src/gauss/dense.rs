@@ -11,7 +11,8 @@ use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
+/// The state at the start of a step in the variables of the route: y are velocities in the condensed routes, momenta in
+/// the general one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepStart<const N: usize> {
     pub q: [f64; N],
@@ -25,7 +26,7 @@ impl<const N: usize> StepStart<N> {
     pub const ZERO: Self = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
 }
 
-/// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
+/// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, padded with 0 after the last stage.
 pub(crate) struct Solved<const N: usize> {
     pub v: [[f64; MAX_STAGES]; N],
     pub force: [[f64; MAX_STAGES]; N],
@@ -41,14 +42,14 @@ impl<const N: usize> Solved<N> {
         l: [0.0; MAX_STAGES],
     };
 
-    /// The collocation polynomial of the step through these stages.
+    /// The collocation polynomial through these stages.
     pub fn curve(&self, s: usize, t: f64, h: f64, start: PhasePoint<N>) -> DenseStep<N> {
         let series = |values: &[f64; MAX_STAGES]| through(values, s);
         let [v, force] = [&self.v, &self.force].map(|of| of.each_ref().map(series));
         DenseStep::new(s, (t, h), start, [v, force], [series(&self.rate), series(&self.l)])
     }
 
-    /// From the accelerations and the positions of a condensed step.
+    /// The stages of a condensed step from its accelerations and positions.
     pub fn from_accelerations(
         lagrangian: &impl Lagrangian<N>,
         table: &Condensed,
@@ -79,7 +80,7 @@ impl<const N: usize> Solved<N> {
             }
         }
         if wants_z && table.gamma != 0.0 {
-            // L itself, of which the values are `L - gamma z`.
+            // So far the values are those of `L - gamma z`; this adds `gamma z`.
             let (actions, values) = (table.actions(), solved.l);
             for i in 0..s {
                 solved.l[i] += actions.from_start[i] * start.z;
@@ -92,7 +93,8 @@ impl<const N: usize> Solved<N> {
     }
 }
 
-/// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
+/// The Legendre series of the polynomial through values at the nodes. The Gauss quadrature of its products with the
+/// Legendre polynomials is exact.
 fn through(values: &[f64; MAX_STAGES], s: usize) -> Series {
     let mut c = [0.0; MAX_STAGES];
     for (row, value) in Coefficients::of(s).series.iter().zip(values).take(s) {
@@ -109,7 +111,7 @@ mod tests {
     use contact_geom::numbers::max_or_nan;
     use std::array::from_fn;
 
-    /// The states between the parts are those of the curve, to some roundings of each of its terms.
+    /// The states of the sketch agree with those of the curve to a few units of round-off of each term.
     #[test]
     fn a_sketch_is_on_the_curve() {
         for s in 1..=MAX_STAGES {

@@ -5,22 +5,24 @@ use crate::gauss::{GaussStepper, MAX_STAGES, TransformedStepper};
 use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
 use contact_geom::Lagrangian;
 
-/// Contact [`Gauss`](crate::gauss::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
+/// Contact [`Gauss`](crate::gauss::Gauss) collocation with s = 1 to 16 stages, of order 2s, for every regular
+/// Lagrangian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussCollocation {
     /// The number of stages.
     pub stages: usize,
 }
 
-/// The same with steps that are equal in the transformed time that an autonomous Lagrangian states: short where its motion is fast, and the
-/// last one shorter, so that it ends where the span does.
+/// Contact Gauss collocation with equal steps in transformed time, by the time transformation of an autonomous
+/// Lagrangian: the steps are short where the motion is fast, and the last step is shortened to end at the end of the
+/// time span.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TransformedGauss {
     /// The number of stages.
     pub stages: usize,
 }
 
-/// Of either.
+/// The description of either method.
 pub(crate) fn info(stages: usize, in_transformed_time: bool) -> MethodInfo {
     MethodInfo {
         name: format!("{}gauss_{stages}", if in_transformed_time { "transformed_" } else { "" }).into(),
@@ -48,7 +50,7 @@ fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
 }
 
 impl GaussCollocation {
-    /// A stepper by the cheapest route that the Lagrangian's structure allows.
+    /// A stepper by the least expensive route that the Lagrangian's structure allows.
     pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
         self,
         problem: &Problem<'a, L, N>,
@@ -63,7 +65,7 @@ impl GaussCollocation {
 }
 
 impl TransformedGauss {
-    /// A stepper by the Lagrangian's own time transformation.
+    /// A stepper with the Lagrangian's own time transformation.
     pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
         self,
         problem: &Problem<'a, L, N>,
@@ -128,7 +130,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         _: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
-        // Compiled only where there is a time transformation; the check has refused the rest.
+        // Compiled only for Lagrangians with a time transformation; the check rejects all others.
         if const { L::HINTS.time_transformation } {
             Ok(Box::new(self.run(problem, h)?))
         } else {

@@ -32,12 +32,13 @@ pub(crate) use tables::coefficients::MAX_STAGES;
 ///
 /// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`,
 ///
-/// whose sums with `hb` end the step: `q1 = q0 + hb.V`, `p1 = (p0 + hb.(rho L_q)) / rho1`, `sigma_d = 1 / rho1`.
+/// with the end of the step `q1 = q0 + hb.V`, `p1 = (p0 + hb.(rho L_q)) / rho1`, `rho1 = 1 - hb.(rho L_z)`,
+/// `sigma_d = 1 / rho1`.
 ///
-/// `(rho L_v)' = rho L_q` with `rho' = -rho L_z` is Herglotz' equation, and the method is Gauss collocation of the symplectified
-/// motion, reduced again; so the flow is conformally contact up to round-off. Symmetric. Its steps as a
-/// [`DiscreteLagrangian`] solve the stages by Newton's method from a constant velocity; [`stepper`](Self::stepper) makes the
-/// fast ones.
+/// `(rho L_v)' = rho L_q` with `rho' = -rho L_z` is Herglotz' equation. The method is Gauss collocation applied to the
+/// symplectified motion and reduced to the contact phase space; its flow is therefore conformally contact up to
+/// round-off. It is symmetric. As a [`DiscreteLagrangian`] it solves the stage equations by Newton's method, starting
+/// from a constant velocity; for runs use the faster [`stepper`](Self::stepper).
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::DoublePendulum};
@@ -84,11 +85,12 @@ impl<L> Gauss<L> {
         self.forward.s
     }
 
-    /// A stepper from a state at a time, by the cheapest route that the Lagrangian's declared structure allows. `guess` is a
-    /// guess of the velocity at the start, from which it is found.
+    /// A stepper from a state at a time, by the least expensive route that the Lagrangian's declared structure allows.
+    /// `guess` is the initial guess for the velocity at the start.
     ///
     /// # Errors
-    /// [`InputError`] where the state is not finite, a claim of the structure is false, or no velocity belongs to the momentum.
+    /// [`InputError`] if the state is not finite, if a declared property of the structure is false, or if no velocity
+    /// with the given momentum is found.
     pub fn stepper<const N: usize>(
         &self,
         t0: f64,
@@ -101,7 +103,8 @@ impl<L> Gauss<L> {
         GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, true)
     }
 
-    /// Like [`stepper`](Self::stepper) for a run whose action is not requested: where z decouples it is not computed.
+    /// Like [`stepper`](Self::stepper), for a run whose action is not requested: z is not computed if it decouples from
+    /// the motion.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper).
@@ -117,12 +120,12 @@ impl<L> Gauss<L> {
         GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, false)
     }
 
-    /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau
-    /// of a time transformation, `dt = g(q) dtau`. `guess` is a guess of the velocity at the start, from which it is found.
+    /// A stepper with variable steps from a state at a time, for autonomous Lagrangians: the step size is constant in
+    /// the transformed time tau, `dt = g(q) dtau`. `guess` is the initial guess for the velocity at the start.
     ///
     /// # Errors
-    /// Those of [`stepper`](Self::stepper); [`InputError::Unclaimed`] where the Lagrangian does not claim to be autonomous;
-    /// [`InputError::TimeTransformation`] where the rate dt/dtau at the start is not positive and finite.
+    /// Those of [`stepper`](Self::stepper); [`InputError::Unclaimed`] if the Lagrangian does not declare that it is
+    /// autonomous; [`InputError::TimeTransformation`] if the rate dt/dtau at the start is not positive and finite.
     pub fn transformed_stepper<const N: usize, C>(
         &self,
         transformation: C,
@@ -151,7 +154,7 @@ impl<L> Gauss<L> {
         StageEquations { lagrangian: &self.lagrangian, products, t }
     }
 
-    /// A step from a state, forward or backward.
+    /// A step from a state, forward or backward in time.
     fn transition<const N: usize>(
         &self,
         t: f64,
@@ -178,7 +181,7 @@ impl<L> Gauss<L> {
         .checked()
     }
 
-    /// The stages between two points, without differentials.
+    /// Solves the stage equations between two given points, over `f64`.
     fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<(Given<N, f64>, Workspace<N>), StepError>
     where
         L: Lagrangian<N>,
@@ -206,7 +209,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
         Ok(self.equations(t, true).lifted_end(&given, &plain, &mut work)?.action)
     }
 
-    /// By the step itself: `D1 = -sigma_d p0`, `D2 = p1`.
+    /// From the momenta of the solved step: `D1 = -sigma_d p0`, `D2 = p1`.
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         let (given, Workspace { x, l, .. }) = self.between(t, x)?;
         let end = self.equations(t, true).end(&given, &x, &l);
@@ -214,7 +217,8 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
         Ok(DiscreteJet::new(end.action, end.p0 * -sigma, end.p, (1.0 - end.rho) * sigma).with_sigma(sigma))
     }
 
-    /// By the derivatives of the step, from one linear system: the nested duals of [`value`](Self::value) are not needed.
+    /// From the derivatives of the step, by one linear system; the nested dual numbers of [`value`](Self::value) are
+    /// not needed.
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let (plain, mut work) = self.between(t, x)?;
         let x: DiscretePoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*x)).into();
@@ -245,7 +249,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
         self.transition(t, from, guess, true)
     }
 
-    /// The method is symmetric: a step with `-h` from the end.
+    /// A step with `-h` from the end, since the method is symmetric.
     fn backward(
         &self,
         t: f64,

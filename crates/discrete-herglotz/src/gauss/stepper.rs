@@ -33,33 +33,36 @@ use pulp::{Simd, WithSimd};
 use retries::{PAUSE, Tried};
 use std::sync::Arc;
 
-/// The largest dimension whose linear motion is advanced by one matrix.
+/// The largest dimension for which a linear motion is advanced by one precomputed matrix.
 const MOST_LINEAR: usize = 32;
 
 /// The state and the workspace of a route.
-#[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
+#[allow(clippy::large_enum_variant)] // A run has one, in a box.
 enum Route<'a, L, const N: usize> {
-    /// In a box of its own: its matrices are larger than all that others hold.
+    /// Boxed, since its matrices are larger than the data of the other variants.
     Linear(Box<Linear<N>>, Arc<Condensed>),
     Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
 
-/// How the stages of a step are solved.
+/// How the stage equations of a step are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Solution {
-    /// By sweeps as they are.
+    /// Fixed-point iteration.
     FixedPointIteration,
-    /// By sweeps that simplified Newton iteration corrects.
+    /// Simplified Newton iteration.
     Simplified,
-    /// By Newton's method with the derivatives at each stage, damped.
+    /// Damped Newton iteration with the derivatives at each stage.
     Newton,
 }
 
-/// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
-/// from the one before, iteration to round-off, compensated sums. Where the iteration does not contract simplified Newton
-/// iteration takes its place, with a Jacobian that is kept as long as it serves; and where that does not either, Newton's
-/// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
+/// A stepper of contact Gauss collocation.
+///
+/// The stages are evaluated in SIMD lanes. Their initial guess is extrapolated from the step before, the fixed-point
+/// iteration runs to round-off, and the state is advanced by compensated sums. If the fixed-point iteration does not
+/// converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration converges fast;
+/// if that does not converge either, Newton's method is used, in the stage positions alone if the mass matrix and the
+/// rate are constant. The step fails if none of them converges.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     s: usize,
@@ -75,15 +78,18 @@ pub struct GaussStepper<'a, L, const N: usize> {
     solved: bool,
     newton: bool,
     solution: Solution,
-    /// Steps until the cheaper solution is tried again, and how many there are next time: twice as many.
+    /// Steps until the less expensive method of solution is tried again, and their number the next time (doubled at
+    /// each change to a more expensive one).
     pause: usize,
     pauses: usize,
-    /// Of Newton's method by the general routes, made for the first step that the sweeps do not solve.
+    /// The workspace of Newton's method in the general route; made for the first step in which the fixed-point
+    /// iteration does not converge.
     by_newton: Option<Box<(Products, Workspace<N>)>>,
     newton_steps: u64,
-    /// The misfit of a constant conformal factor.
+    /// The defect of a constant conformal factor, see [`tail::of_sigma`].
     of_sigma: f64,
-    /// Of steps that tell nothing between their nodes, and where doubts are wanted: the last mean velocities.
+    /// The last mean velocities: present for few stages, where the defect between the nodes is no measure of
+    /// resolution, and when suspect intervals are requested.
     sequence: Option<Box<Sequence<N>>>,
     watch: ResolutionMonitor<N>,
 }
@@ -107,7 +113,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let unit = is_identity(&w);
             mass = Some(w);
             of_sigma = tail::of_sigma(1.0 + table.grow.head, table.gamma * h);
-            // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
+            // For many coordinates the matrix costs more than the iterations that it saves, and does not fit on the
+            // stack.
             let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
@@ -150,7 +157,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         })
     }
 
-    /// With [`SuspectInterval`]s about steps of any number of stages.
+    /// Records [`SuspectInterval`]s for any number of stages.
     pub(crate) fn doubting(mut self) -> Self {
         if self.sequence.is_none() {
             self.sequence = Some(Sequence::new(self.values()));
@@ -158,7 +165,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self
     }
 
-    /// Without Newton's method: a step whose iteration does not contract then fails with [`StepError::NotConverged`].
+    /// Without Newton's method: a step whose fixed-point iteration does not converge fails with
+    /// [`StepError::NotConverged`].
     pub fn without_newton(mut self) -> Self {
         self.newton = false;
         self
@@ -174,12 +182,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         }
     }
 
-    /// The steps that were solved by Newton's method, since the iteration did not contract.
+    /// The number of steps that were solved by simplified Newton iteration or Newton's method, since the fixed-point
+    /// iteration did not converge.
     pub fn newton_steps(&self) -> u64 {
         self.newton_steps
     }
 
-    /// The last step as a curve.
+    /// The dense output of the last step.
     fn curve(&self) -> Option<DenseStep<N>> {
         let (s, h) = (self.s, self.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
@@ -202,7 +211,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         Some(solved.curve(s, t, h, start))
     }
 
-    /// The state as the route holds it.
+    /// The state in the variables of the route: velocities in the condensed routes, momenta in the general one.
     #[inline(always)]
     fn values(&self) -> StepStart<N> {
         let (q, y, z) = match &*self.route {
@@ -213,7 +222,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
     }
 
-    /// What the sums carry beyond the last digits of the state.
+    /// The compensation terms of the state's compensated sums.
     pub(crate) fn rests(&self) -> StepStart<N> {
         let (q, y, z) = match &*self.route {
             Route::Linear(run, _) => (&run.q, &run.v, run.z),
@@ -223,7 +232,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         StepStart { q: q.map(|q| q.rest), y: y.map(|y| y.rest), z: z.rest }
     }
 
-    /// Goes on from the sums of a stepper of the same problem that has come to this start.
+    /// Takes over the compensation terms of a stepper of the same problem that has reached this stepper's start.
     pub(crate) fn add_rests(&mut self, rests: &StepStart<N>) {
         let (q, y, z) = match &mut *self.route {
             Route::Linear(run, _) => (&mut run.q, &mut run.v, &mut run.z),
@@ -236,13 +245,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         z.rest = rests.z;
     }
 
-    /// With momenta for the velocities of the condensed routes.
+    /// The phase point of a state of the route; the velocities of the condensed routes are turned into momenta.
     fn phase(&self, x: &StepStart<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
         PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
 
-    /// Takes steps by sweeps; returns how many, and why there are no more where they are not all.
+    /// Takes steps by fixed-point or simplified Newton iteration. Returns the number of steps taken, and the error if
+    /// they are fewer than requested.
     fn sweep(&mut self, steps: usize) -> (usize, Option<StepError>) {
         let (taken, refused) = match self.arch.dispatch(AdvanceGauss { run: self, steps }) {
             Ok(()) => (steps, None),
@@ -257,7 +267,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     }
 }
 
-/// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
+/// A number of steps, compiled for one instruction set; ends at the first step that fails.
 struct AdvanceGauss<'b, 'a, L, const N: usize> {
     run: &'b mut GaussStepper<'a, L, N>,
     steps: usize,
@@ -278,7 +288,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
             return if taken == steps { Ok(()) } else { Err((taken, IterationOutcome::NonFinite)) };
         }
         for taken in 0..steps {
-            // Dense output is of the last step.
+            // Dense output covers the last step.
             if taken + 1 == steps {
                 run.from = run.values();
             }
@@ -327,7 +337,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
                 tried = Tried::default();
             }
             let Some(refused) = refused else { continue };
-            // What branches on the value of lanes would do so however the stages are found.
+            // These do not depend on how the stage equations are solved.
             let final_cause = matches!(
                 refused,
                 StepError::SigmaVanished { .. } | StepError::StageFactor { .. } | StepError::Branched
@@ -335,7 +345,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             if !final_cause && self.try_again(&mut tried, refused).is_ok() {
                 continue;
             }
-            // The first reason: that of the last resort tells less, unless it is the integrating factor.
+            // The first error is reported: that of Newton's method is less informative, unless it is about the
+            // integrating factor.
             let cause = if final_cause { refused } else { tried.refused.unwrap_or(refused) };
             return Err(StepFailure { taken: done, cause });
         }
@@ -375,7 +386,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         work_summary(self.route(), &self.lagrangian.structure())
     }
 
-    /// The collocation polynomial. It costs nothing where it is not asked for.
+    /// The collocation polynomial of the last step; computed only when it is requested.
     fn dense(&self) -> Option<DenseStep<N>> {
         self.curve()
     }
@@ -391,7 +402,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         let (s, h) = (self.s, self.h);
         if let Route::General(run) = &mut *self.route {
             let part = h / longer.length();
-            // An action with a pole has no polynomial.
+            // L is not finite where the collocation polynomial of the action has a pole.
             let stages = Coefficients::of(s).c.iter().take(s).map(|c| longer.stage(part * c.0));
             run.predict(stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho)));
         }
@@ -405,8 +416,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         self.read(&mut words).is_some() && words.is_empty()
     }
 
-    /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks
-    /// more often.
+    /// The first unresolved step that was recorded in the run; if there is none, the result of a defect sample of the
+    /// last step alone. Further steps are sampled only if this is called more often.
     fn unresolved(&self) -> Option<UnresolvedStep> {
         self.mark()
     }

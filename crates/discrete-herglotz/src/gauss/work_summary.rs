@@ -1,4 +1,4 @@
-//! What steps of contact Gauss collocation compute and skip, in words.
+//! Description of what the steps of contact Gauss collocation compute and what they skip.
 
 use crate::PlanEntry;
 use crate::integration::plan_entry::DECOUPLED;
@@ -7,13 +7,15 @@ use contact_geom::Structure;
 /// How the steps of contact Gauss collocation are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GaussRoute {
-    /// The motion is linear: one matrix, made once.
+    /// The motion is linear: each step applies one precomputed matrix.
     Linear,
-    /// Constant mass and constant rate of the conformal factor: the accelerations of the stages alone are iterated.
+    /// Constant mass matrix and constant rate of the conformal factor: the iteration is in the accelerations of the
+    /// stages.
     Condensed,
-    /// Velocities, actions and factors of the stages are iterated; the matrix W is constant.
+    /// The iteration is in the velocities, actions and integrating factors of the stages; the mass matrix W is
+    /// constant.
     ConstantMass,
-    /// The same with W taken at the stages of each step.
+    /// As [`ConstantMass`](Self::ConstantMass), with W evaluated at the stages of each step.
     General,
 }
 
@@ -30,7 +32,7 @@ fn action(structure: &Structure) -> PlanEntry {
     PlanEntry::computed("action z", if drives { "it drives the motion" } else { "the stages of this route carry it" })
 }
 
-/// By equal steps of time.
+/// The summary for steps that are equal in physical time.
 pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
     let newton = PlanEntry::skipped("Newton's method", "only in steps whose iteration does not contract");
     let gradients = PlanEntry::skipped("Jacobian", "the iteration needs gradients alone");
@@ -61,7 +63,7 @@ pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<Plan
     }
 }
 
-/// By steps that are equal in transformed time.
+/// The summary for steps that are equal in transformed time.
 pub(crate) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<PlanEntry> {
     vec![
         PlanEntry::computed(

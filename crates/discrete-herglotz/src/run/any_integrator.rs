@@ -1,4 +1,4 @@
-//! The table of integrators.
+//! The integrators of this crate, by name.
 
 use crate::{
     DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
@@ -12,7 +12,7 @@ use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Any of the integrators of this crate by name, chosen at run time. A program that has this type compiles them all.
+/// Any integrator of this crate, selected by name at run time. A program that uses this type compiles all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AnyIntegrator {
     /// The flow of a discrete Lagrangian, each step by Newton's method.
@@ -27,15 +27,15 @@ pub enum AnyIntegrator {
         /// The number of stages.
         stages: usize,
     },
-    /// [`DividedGauss`], by its name with the misfit: `divided_gauss_8_1e-5`.
+    /// [`DividedGauss`]; the name contains the largest defect: `divided_gauss_8_1e-5`.
     Divided(DividedGauss),
-    /// A splitting with exact rate, for `v.Mv/2 - V(t, q) + f(z)`.
+    /// A splitting whose conformal factor is exact, for `v.Mv/2 - V(t, q) + f(z)`.
     Splitting(SplittingScheme),
     /// A symmetric composition of a symmetric rule of order 2.
     Composition(Method, SplittingScheme),
 }
 
-/// The same expression for each integrator.
+/// Evaluates an expression with the integrator of each variant.
 macro_rules! each {
     ($any:expr, $integrator:ident => $result:expr) => {
         match $any {
@@ -59,8 +59,8 @@ macro_rules! each {
 }
 
 impl AnyIntegrator {
-    /// Every integrator by one name, but for those with a number of the user's own in it: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
-    /// Gauss methods in transformed time.
+    /// All integrators whose names contain no number that the user chooses freely: quadrature rules, Gauss methods,
+    /// splittings, compositions of the symmetric midpoint rule, and Gauss methods in transformed time.
     pub fn all() -> Vec<AnyIntegrator> {
         let discrete = Method::RULES.iter().copied().map(AnyIntegrator::Discrete);
         let gauss = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::Gauss { stages });
@@ -71,7 +71,7 @@ impl AnyIntegrator {
         discrete.chain(gauss).chain(splittings).chain(compositions).chain(transformed).collect()
     }
 
-    /// The order of the flow; in transformed time, in steps of its time.
+    /// The order of the flow; for a method in transformed time, with respect to the step in that time.
     pub fn order(self) -> u32 {
         match self {
             AnyIntegrator::Discrete(method) => method.order(),
@@ -119,7 +119,7 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
 impl Display for AnyIntegrator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
-            // As a splitting it has a stepper of its own.
+            // The name `strang` belongs to the splitting, which has its own stepper.
             AnyIntegrator::Discrete(Method::Strang) => f.pad("discrete_strang"),
             AnyIntegrator::Discrete(method) => f.pad(method.name()),
             AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
@@ -138,7 +138,7 @@ impl FromStr for AnyIntegrator {
     fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
         let all = Self::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]);
         let named = all.into_iter().find(|integrator| integrator.to_string() == name);
-        // Of compositions those of the other rules too.
+        // `all` lists compositions of the midpoint rule only; compositions of the other rules are parsed here.
         let composed = || {
             let (rule, scheme) = name.split_once("_by_")?;
             let scheme = SplittingScheme::ALL.into_iter().find(|known| known.name() == scheme)?;
@@ -153,7 +153,7 @@ impl FromStr for AnyIntegrator {
     }
 }
 
-/// As its name.
+/// Serializes as the name.
 #[cfg(feature = "serde")]
 impl serde::Serialize for AnyIntegrator {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -170,10 +170,10 @@ impl<'de> serde::Deserialize<'de> for AnyIntegrator {
     }
 }
 
-/// No integrator has this name.
+/// The error of a name that belongs to no integrator.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("there is no integrator {name:?}; there are {}", AnyIntegrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]
 pub struct UnknownIntegrator {
-    /// The name that was asked for.
+    /// The requested name.
     pub name: String,
 }

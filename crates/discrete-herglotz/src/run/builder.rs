@@ -1,4 +1,4 @@
-//! A run as it is put together, from a problem to its outcome.
+//! The builder of a run: integrator, steps, observers and requests.
 
 use crate::run::accuracy;
 use crate::run::integrate::integrate;
@@ -12,10 +12,11 @@ use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use std::sync::Arc;
 
-/// A [`Problem`] with an integrator, steps and observers.
+/// A [`Problem`] with an integrator, steps and observers; a builder.
 ///
-/// From these and the declared structure of the Lagrangian (probed: a false claim is an error) a [`Plan`] takes the cheapest route, and
-/// says in words what will be computed and what not.
+/// From these and the declared structure of the Lagrangian, [`Plan`] selects the least expensive route, and describes
+/// what will be computed and what is skipped. The declared structure is checked at sample points; a false claim is an
+/// error.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -54,69 +55,74 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         }
     }
 
-    /// The same by this integrator.
+    /// Sets the integrator.
     pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
         Run { integrator: Some(Arc::new(integrator)), ..self }
     }
 
-    /// The same by steps of a given length or number.
+    /// Sets the size or the number of the steps.
     pub fn steps(self, steps: Steps) -> Self {
         Run { length: Some(StepControl::Given(steps)), ..self }
     }
 
-    /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's time transformation, chosen by trial runs so that the
-    /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span, and that of v, relative to the
-    /// largest speed of the motion. The trial runs cost a small multiple of the run; what is narrower than the distance of their nodes, about the
-    /// step divided by four times the stages, may go unseen.
+    /// Requests an error instead of a step size. Trial runs select one step size for the whole run, in time or in the
+    /// transformed time of the Lagrangian, such that at every tenth of the span the error of (q, p), relative to its
+    /// size at that time or at the end, is at most `wanted`, and so is the error of v, relative to the largest speed of
+    /// the motion. The trial runs cost a small multiple of the run. Features of the motion that are narrower than the
+    /// distance of their nodes, about the step divided by four times the number of stages, may be missed.
     ///
-    /// Where an observer's event ends the run, the trial runs end there too.
+    /// If an observer's event ends the run, the trial runs end there too.
     ///
-    /// Where no integrator is named, it is contact Gauss collocation: with 8 stages, with 16 where it is to take many steps whose
-    /// accelerations alone are iterated, and in the transformed time that the Lagrangian states where that takes much fewer steps.
+    /// If no integrator is given, contact Gauss collocation is used: with 8 stages; with 16 stages for many steps whose
+    /// stage equations are iterated in the accelerations only; and in the transformed time of the Lagrangian if this
+    /// takes far fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
         Run { length: Some(StepControl::For(wanted, accuracy::choose)), ..self }
     }
 
-    /// The same with a scale for each coordinate, where coordinates differ in size or unit: errors are those of `q_i / scales_i`, and of
-    /// `v_i / scales_i` relative to the largest such speed of the motion. It holds for an [`accuracy`](Self::accuracy) and for an
-    /// [estimate](Self::with_error_estimate).
+    /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are those of `q_i /
+    /// scales_i`, and of `v_i / scales_i` relative to the largest such speed of the motion. The scales apply to
+    /// [`accuracy`](Self::accuracy) and to the [error estimate](Self::with_error_estimate).
     pub fn scales(self, scales: [f64; N]) -> Self {
         Run { scales: Some(scales.into()), ..self }
     }
 
-    /// The same with one more observer, which sees what those before it have seen.
+    /// Adds an observer; observers are called in the order in which they were added.
     pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
         self.observers.push(Box::new(Borrowed(observer)));
         self
     }
 
-    /// Without the action in the outcome: where z does not act back on the motion, and no observer asks for it, it is not computed.
+    /// Omits the action from the outcome. It is not computed if z does not act back on the motion and no observer
+    /// requests it.
     pub fn without_action(self) -> Self {
         Run { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
-    /// With the conformal factor of the motion in the outcome.
+    /// Includes the conformal factor of the motion in the outcome.
     pub fn with_conformal_factor(self) -> Self {
         Run { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
     }
 
-    /// With an estimate of its error in the outcome: of given steps by a run with twice as many of half their length, which costs
-    /// twice as much as the run; of steps for an accuracy what the trial runs have found.
+    /// Includes an error estimate in the outcome. For given steps it is computed by a run with twice as many steps of
+    /// half the size, which costs twice as much as the run itself; for a requested accuracy it is the error found by
+    /// the trial runs.
     pub fn with_error_estimate(self) -> Self {
         Run { estimated: true, ..self }
     }
 
-    /// Goes on with the run where it was interrupted, to the last bit: problem, integrator, steps, end and requests must be the same. The
-    /// observers see what follows, its start included.
+    /// Continues an interrupted run, with bitwise the same result as an uninterrupted one: problem, integrator, steps,
+    /// end and requests must be the same. The observers see the continued part, including its start.
     pub fn resume(self, interrupted: ResumeState) -> Self {
         Run { from: Some(interrupted), ..self }
     }
 
-    /// Checks everything, chooses the step and the route.
+    /// Checks the input and selects the step and the route.
     ///
     /// # Errors
-    /// [`InputError`]: a span that is not finite, a step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
-    /// integrator whose hypothesis the Lagrangian does not meet, an accuracy that it does not reach.
+    /// [`InputError`]: a span that is not finite, a step that is 0 or not finite, missing steps or a missing
+    /// integrator, a false or a missing claim of structure, an integrator whose hypotheses the Lagrangian does not
+    /// satisfy, an accuracy that cannot be reached.
     pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
         let needs = self.needs.and(self.observers.needs());
         let problem = self.problem;
@@ -150,27 +156,29 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Ok(plan)
     }
 
-    /// Runs it.
+    /// Performs the run.
     ///
     /// # Errors
-    /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. What goes wrong in mid-run is the outcome's status.
+    /// Those of [`plan`](Self::plan), and those of observers that cannot observe the run. A failure during the run is
+    /// reported as the status of the outcome.
     pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
         integrate(&self.plan(until)?, &mut self.observers, self.from.as_ref())
     }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
-    /// A run of it by an integrator.
+    /// A run of the problem with an integrator.
     pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, L, N> {
         Run::of(self).by(integrator)
     }
 
-    /// A run of it by given steps of contact Gauss collocation with eight stages.
+    /// A run with given steps of contact Gauss collocation with eight stages.
     pub fn steps<'o>(&self, steps: Steps) -> Run<'_, 'o, L, N> {
         self.by(GaussCollocation { stages: 8 }).steps(steps)
     }
 
-    /// A run of it to a relative error of (q, p) and v, by an integrator that is chosen for it; see [`Run::accuracy`].
+    /// A run to a requested relative error of (q, p) and v, with an integrator that is selected for it; see
+    /// [`Run::accuracy`].
     pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
         Run::of(self).accuracy(wanted)
     }

@@ -1,4 +1,4 @@
-//! A problem with the integrator and the steps that a run takes.
+//! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
 use crate::gauss::FEW_STAGES;
@@ -11,30 +11,31 @@ use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, Step
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
-/// The number of unknowns of a collocation step up to which the single matrix of a linear motion is always made, and the divisor of its cube
-/// that gives the number of steps from which on it is made for more unknowns: it is solved for in double-double precision.
+/// For a linear motion a collocation step is multiplication by one matrix, which is computed in double-double
+/// precision. It is always computed up to the first number of unknowns of a step; for more unknowns only from a number
+/// of steps on that is the cube of the unknowns divided by the second number.
 const MATRIX: (usize, usize) = (32, 1024);
 
 /// A problem with the integrator and the steps that are selected for it.
 pub(crate) struct Discretization<'p, L, const N: usize> {
     pub problem: &'p Problem<'p, L, N>,
     pub t_end: f64,
-    /// The step; negative where the run is backward in time.
+    /// The step size; negative if the run goes backward in time.
     pub h: f64,
     pub count: usize,
-    /// The error that trial runs have found, where an accuracy was requested.
+    /// The error found by the trial runs, if an accuracy was requested.
     pub error: Option<f64>,
     pub integrator: Shared<'p, L, N>,
     pub info: MethodInfo,
     pub needs: OutputRequest,
-    /// The scales of the coordinates in which errors are measured, where they are given.
+    /// The scales of the coordinates for errors, if they are given.
     pub scales: Option<SVector<f64, N>>,
     /// Whether the Lagrangian states switching functions.
     pub switches: bool,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
-    /// The steps that are selected for a request.
+    /// The problem of a request with the selected steps.
     pub fn new(request: &Request<'p, L, N>, selection: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, scales, .. } = *request;
         let StepSelection { integrator, count, h, error, .. } = selection.clone();
@@ -47,8 +48,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches })
     }
 
-    /// The problem with the structure that its steps use: for few steps a linear motion is solved as a nonlinear one, since the matrix of a
-    /// step would cost more than the iterations.
+    /// The problem with the structure that the steps use: for few steps a linear motion is solved like a nonlinear one,
+    /// since the matrix of a step would cost more than the iterations.
     pub fn problem_for_steps(&self) -> Problem<'p, L, N> {
         let unknowns = self.info.collocation.unwrap_or(0) * N;
         let by_matrix = unknowns <= MATRIX.0 || unknowns.pow(3) / MATRIX.1 <= self.count;
@@ -61,7 +62,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         self.stepper_of(&self.problem_for_steps(), self.h, watched)
     }
 
-    /// A stepper at the start of a problem, with steps of h, which end on kinks and jumps where the Lagrangian states them.
+    /// A stepper at the start of a problem, with step size h. If the Lagrangian has switching functions, steps end on
+    /// its kinks and jumps.
     pub fn stepper_of(
         &self,
         problem: &Problem<'p, L, N>,
@@ -75,11 +77,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         self.integrator.stepper(problem, h, options)
     }
 
-    /// A stepper after steps of another length from a state with its velocity: after so many, or at the time `t_end`. In transformed
-    /// time the steps keep their length, and the last one ends at `t_end`.
+    /// A stepper that starts at a state with its velocity and has taken steps of size h: a given number of them, or
+    /// until the time `t_end`. In transformed time the step size is the run's, and the last step ends at `t_end`.
     ///
-    /// For these few steps the matrix of a linear motion is made only where the stages cannot be solved for without it, as with an
-    /// ill-conditioned mass matrix.
+    /// For these few steps the matrix of a linear motion is computed only if the stage equations cannot be solved
+    /// without it, as with an ill-conditioned mass matrix.
     pub fn advanced(
         &self,
         (t, from): (f64, &PhasePoint<N>),
@@ -91,7 +93,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         let Structure { quadratic: linear, separable, .. } = self.problem.structure;
         let by = |quadratic: bool| {
             let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-            // The double-double tables of the separable route depend on the length of the step: they are not made for a few steps.
+            // The double-double tables of the separable route depend on the step size: they are not computed for a few
+            // steps.
             let separable = separable && (quadratic || self.info.collocation.is_none());
             let structure = Structure { quadratic, separable, ..self.problem.structure };
             let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
@@ -104,7 +107,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         by(false).or_else(|cause| if linear { by(true) } else { Err(cause) })
     }
 
-    /// A stepper after one step from a time and a state to another time. The iteration starts from the curve of a longer step, where one is given.
+    /// A stepper after one step from a time and a state to another time. The iteration starts from the curve of a
+    /// longer step, if one is given.
     pub fn step_to(
         &self,
         (t0, from): &(f64, PhasePoint<N>),
@@ -121,12 +125,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         self.advanced((*t0, from), &v, t - t0, (1, t), guess)
     }
 
-    /// Whether the steps of a Gauss method have so many stages that their defect is sampled between the nodes.
+    /// Whether the steps of a Gauss method have enough stages for defect samples between the nodes.
     pub fn many_stages(&self) -> bool {
         self.info.collocation.is_some_and(|stages| stages > FEW_STAGES)
     }
 
-    /// The number of steps after which the run ends at the latest.
+    /// The largest number of steps of the run.
     pub fn most(&self) -> usize {
         if self.info.in_transformed_time { usize::MAX } else { self.count }
     }
@@ -140,7 +144,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
     fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError> {
-        // With a constant mass there is one velocity alone.
+        // For a constant mass the velocity is unique.
         let near = near.filter(|_| !self.problem.structure.constant_mass);
         legendre_inverse(self.problem.lagrangian, t, state, &near.unwrap_or(self.problem.start.v)).map(|x| x.v)
     }
@@ -157,7 +161,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
         Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
     }
 
-    /// Of the start, of L there, of the steps, and of the outputs.
+    /// A digest of the start, of L there, of the steps, and of the requests.
     fn fingerprint(&self) -> u64 {
         let Problem { lagrangian, t0, start, state, .. } = self.problem;
         let (value, slope) = lagrangian.with_gradient(*t0, start);

@@ -1,4 +1,4 @@
-//! The end of a run by an observer within a step that cannot be taken as a whole.
+//! A run that an observer ends within a step that fails as a whole.
 
 use crate::Stepper;
 use crate::run::Plan;
@@ -9,11 +9,12 @@ use crate::run::observers::step_view::{StepView, Stop};
 use contact_geom::{Lagrangian, PhasePoint};
 use std::ops::ControlFlow;
 
-/// The number of bisections of such a step: the part of it that can be taken is then known to the rounding of the step.
+/// The number of bisections of a failed step: the part of it that can be taken is then known to the round-off of the
+/// step.
 const BISECTIONS: usize = 48;
 
-/// The end of the run within the step, with the logarithm of the conformal factor there: all observers see the part of the step in which
-/// it lies. `None` where no observer ends the run.
+/// The end of the run within the failed step, and the logarithm of the conformal factor there. All observers see the
+/// part of the step that contains the end. `None` if no observer ends the run there.
 pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
     plan: &Plan<'_, L, N>,
     observers: &mut Vec<Box<dyn Observer<N> + '_>>,
@@ -33,7 +34,7 @@ pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
             impossible = fraction;
             continue;
         };
-        // Observers see each part from the start of the step.
+        // Each part starts at the start of the step, so the observers start anew there.
         terminal.prepare(&info).ok()?;
         if terminal.start(&plan.view(stepper, None, findings, (taken, false))).is_break() {
             return None;
@@ -52,7 +53,7 @@ pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
     Some((stop, end.within(t).ok().and_then(|there| there.log_factor)))
 }
 
-/// A part of a step as observers see it.
+/// The view of a part of a step for the observers.
 fn view_of_part<'r, L: Lagrangian<N>, const N: usize>(
     plan: &'r Plan<'_, L, N>,
     part: &'r dyn Stepper<N>,

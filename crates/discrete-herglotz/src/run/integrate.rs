@@ -1,4 +1,4 @@
-//! The loop of every run.
+//! The main loop of a run.
 
 use crate::run::checks::rest::{REST, is_at_rest};
 use crate::run::checks::{Checks, TakenSteps, alone};
@@ -15,8 +15,8 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// The observers of a run, in the order in which they were added.
 pub(crate) type Observers<'o, const N: usize> = Vec<Box<dyn Observer<N> + 'o>>;
 
-/// Takes the steps of a plan, from its start or from where the run was interrupted: steps at which nothing is due are taken at once; then the
-/// checks, and then the observers, see the last of them.
+/// Takes the steps of a plan, from its start or from a resumed state. Steps after which no check and no observer is due
+/// are taken together; the checks, and then the observers, see the end of the last of them.
 pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
     plan: &Plan<'_, L, N>,
     observers: &mut Observers<'_, N>,
@@ -48,7 +48,7 @@ pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
 }
 
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
-    /// Runs it with no observers.
+    /// Performs the run without observers.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper). A failure during the run is the outcome's status.
@@ -57,7 +57,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     }
 }
 
-/// A run on its way.
+/// The state of a run in progress.
 struct Integration<'r, 'p, 'o, L, const N: usize> {
     plan: &'r Plan<'p, L, N>,
     observers: &'r mut Observers<'o, N>,
@@ -65,11 +65,11 @@ struct Integration<'r, 'p, 'o, L, const N: usize> {
     stepper: Box<dyn Stepper<N> + 'p>,
     checks: Checks<'r, 'p, L, N>,
     taken: usize,
-    /// Whether its last step is taken.
+    /// Whether the last step has been taken.
     over: bool,
-    /// How it ended, where it did so before its last step.
+    /// The status, if the run ended before its last step.
     status: Option<Status>,
-    /// The time and the state at its end, where they are within a step.
+    /// The time and the state at the end, if the run ended within a step.
     end: Option<(f64, PhasePoint<N>)>,
 }
 
@@ -85,7 +85,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
             return Err(InputError::Unsaved);
         }
         let in_transformed_time = steps.info.in_transformed_time;
-        // Where trial runs have met an event that ends the run, the steps until then.
+        // If the trial runs found an event that ends the run, the number of steps up to it.
         let expected = plan.ends_after.map_or(steps.count, |ended| steps.count.min(ended.saturating_add(1)));
         let info = RunInfo {
             t0: steps.problem.t0,
@@ -108,14 +108,14 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         Ok(Integration { plan, observers, info, stepper, checks, taken, over, status: None, end: None })
     }
 
-    /// Shows the start to the observers.
+    /// Calls the observers at the start.
     fn start(&mut self) {
         let start = self.plan.view(&*self.stepper, None, self.checks.findings, (self.taken, self.over));
         let stop = self.observers.start(&start).break_value();
         self.stop(stop);
     }
 
-    /// The number of steps after which an observer, or a check, is due.
+    /// The number of steps after which an observer or a check is due next.
     fn next(&self) -> usize {
         let seen = alone(self.taken, self.next_seen(self.taken));
         seen.min(self.checks.next(self.taken)).min(self.plan.steps.most())
@@ -140,7 +140,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         cause
     }
 
-    /// Ends the run with a step that cannot be taken: an observer may end it within that step.
+    /// Ends the run at a failed step: an observer may end it within that step.
     fn fail(&mut self, cause: StepError) {
         let (findings, taken) = (self.checks.findings, self.taken);
         match end_within_step(self.plan, self.observers, &*self.stepper, self.info, (findings, taken)) {
@@ -153,7 +153,8 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         }
     }
 
-    /// Whether the motion has come to rest: at the end that the plan has found, or where all claims are checked.
+    /// Whether the motion is at rest: at the end of the plan if the plan found a time of rest, otherwise at the steps
+    /// at which all claims are checked.
     fn is_at_rest(&self, probed: bool) -> bool {
         if self.over {
             return self.plan.rests_until.is_some();
@@ -162,7 +163,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         probed && is_at_rest(steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
     }
 
-    /// Shows the end of the last step to the observers, where they are due.
+    /// Calls the observers at the end of the last step, if they are due.
     fn observe(&mut self, first: usize, before: Option<(f64, PhasePoint<N>)>, at_rest: bool) {
         if self.taken >= self.next_seen(first) || self.over {
             let (findings, last) = (self.checks.findings, self.over && !at_rest);
@@ -180,7 +181,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         }
     }
 
-    /// Ends the run by an observer.
+    /// Ends the run if an observer stopped it.
     fn stop(&mut self, stop: Option<Stop<N>>) {
         let Some(Stop { by, cause, at }) = stop else { return };
         let step = self.taken;

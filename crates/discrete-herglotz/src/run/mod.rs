@@ -1,4 +1,4 @@
-//! Runs: a problem, advanced by an integrator, checked, observed, and planned.
+//! Runs of a problem: planning, time stepping, checks and observers.
 
 mod accuracy;
 mod any_integrator;

@@ -5,43 +5,44 @@ use crate::{Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// What a run has led to. Where it was ended before its time, that is what was computed before.
+/// The result of a run: the final state, or the last state that was computed if the run ended early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome<const N: usize> {
     /// How the run ended.
     pub status: Status,
-    /// The first step that cannot have resolved the motion, where one was seen: what follows it may be wrong.
+    /// The first unresolved step that was detected: the results after it may be wrong.
     pub unresolved: Option<UnresolvedStep>,
-    /// The steps taken.
+    /// The number of steps taken.
     pub steps: usize,
-    /// The time reached.
+    /// The final time.
     pub t: f64,
-    /// The position there.
+    /// The final position.
     pub q: SVector<f64, N>,
-    /// The momentum there.
+    /// The final momentum.
     pub p: SVector<f64, N>,
-    /// The velocity there; `None` where none belongs to the momentum.
+    /// The final velocity; `None` if no velocity has this momentum.
     pub v: Option<SVector<f64, N>>,
-    /// The action there, where someone asked for it.
+    /// The final action, if it was requested.
     pub z: Option<f64>,
-    /// The logarithm of the conformal factor of the motion, where someone asked for it.
+    /// The logarithm of the conformal factor of the motion, if it was requested.
     pub log_factor: Option<f64>,
-    /// The error of (q, p) relative to its size, or of v relative to the largest speed, whichever is larger, where someone asked for it; see
-    /// [`Run::with_error_estimate`](super::Run::with_error_estimate). Where an observer ended the run within a step, that at the step's end.
+    /// The estimated error of (q, p) relative to its size, or of v relative to the largest speed, whichever is larger,
+    /// if it was requested; see [`Run::with_error_estimate`](super::Run::with_error_estimate). If an observer ended the
+    /// run within a step, the error at the end of that step.
     pub error_estimate: Option<f64>,
-    /// The evaluations of forces or gradients.
+    /// The number of evaluations of forces or gradients.
     pub evaluations: u64,
     pub(crate) z_or_start: f64,
 }
 
 impl<const N: usize> Outcome<N> {
-    /// The state `(q, p, z)`; the action is the start's where no one asked for it.
+    /// The state `(q, p, z)`; z is the initial action if the action was not requested.
     pub fn state(&self) -> PhasePoint<N> {
         PhasePoint { q: self.q, p: self.p, z: self.z_or_start }
     }
 }
 
-/// To go on from there.
+/// The final state as the start of another problem.
 impl<const N: usize> From<&Outcome<N>> for Start<N> {
     fn from(outcome: &Outcome<N>) -> Self {
         Start::Momentum(outcome.state(), outcome.v.unwrap_or_else(SVector::zeros))

@@ -1,4 +1,4 @@
-//! The plan of a run: its steps and its route, and what these compute and skip.
+//! The plan of a run: its steps, its route, and what they compute and skip.
 
 use crate::integration::check_claims::violated_claim;
 use crate::run::checks::next_probe;
@@ -11,11 +11,11 @@ use contact_geom::{Defect, Lagrangian, PhasePoint, Structure};
 use std::cell::Cell;
 use std::fmt::{Display, Formatter};
 
-/// The number of steps that are taken before a run to check the claims of structure along them.
+/// The number of initial steps along which the claims of structure are checked before a run.
 const FIRST_STEPS: usize = 64;
 
-/// A run after its checks, with its steps and its route; made by [`Run::plan`](crate::Run::plan). Printed, it says what will be computed
-/// and what is skipped.
+/// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
+/// `Display` output lists what will be computed and what is skipped.
 pub struct Plan<'p, L, const N: usize> {
     pub(crate) steps: Discretization<'p, L, N>,
     /// The number of steps after which an observer is expected to end the run.
@@ -23,16 +23,16 @@ pub struct Plan<'p, L, const N: usize> {
     work_summary: Vec<PlanEntry>,
     /// Whether `sigma_d` is the same in all steps.
     pub(crate) constant_rate: bool,
-    /// Whether the error of given steps is estimated.
+    /// Whether an error estimate was requested.
     pub(crate) estimated: bool,
-    /// The end that was requested, where the run ends earlier since the motion is at rest from there on.
+    /// The requested end time, if the run ends earlier because the motion comes to rest.
     pub(crate) rests_until: Option<f64>,
     /// A stepper at the start, for the first run of the plan.
     start: Cell<Option<Box<dyn Stepper<N> + 'p>>>,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
-    /// The plan of a request with the steps that are selected for it.
+    /// The plan of a request with its selected steps.
     pub(crate) fn new(request: &Request<'p, L, N>, selection: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
         let steps = Discretization::new(request, selection)?;
         let stepper = steps.stepper(steps.error.is_none())?;
@@ -47,43 +47,44 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         })
     }
 
-    /// The time step, negative where the run is backward in time; of an integrator in transformed time, the step of tau.
+    /// The time step, negative if the run goes backward in time; for an integrator in transformed time, the step of
+    /// tau.
     pub fn step_size(&self) -> f64 {
         self.steps.h
     }
 
-    /// The number of steps. In transformed time with steps of a given size it is estimated from `dt/dtau` at the start; an observer may
-    /// end the run earlier.
+    /// The number of steps. For steps of a given size in transformed time it is an estimate from `dt/dtau` at the
+    /// start. An observer may end the run earlier.
     pub fn count(&self) -> usize {
         self.steps.count
     }
 
-    /// The facts about the integrator: of the one that was selected, where none was named.
+    /// Information about the integrator, whether given or selected.
     pub fn integrator(&self) -> &MethodInfo {
         &self.steps.info
     }
 
-    /// The error of (q, p) and v that the trial runs found, or predict; `None` where no accuracy was requested.
+    /// The error of (q, p) and v that the trial runs found or predict; `None` if no accuracy was requested.
     pub fn error(&self) -> Option<f64> {
         self.steps.error
     }
 
-    /// A stepper at the start, for programs that take the steps themselves: in transformed time with [`Stepper::advance_until`], which
-    /// ends at the end of the span. The steps of a splitting do not monitor whether they resolve the motion, which would take up to a third
-    /// of their time.
+    /// A stepper at the start, for programs that take the steps themselves. In transformed time use
+    /// [`Stepper::advance_until`], which ends at the end of the span. The stepper of a splitting does not monitor
+    /// whether its steps resolve the motion, which would take up to a third of the time.
     ///
     /// # Errors
-    /// Those of the method's start.
+    /// Those of the creation of the stepper.
     pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         self.steps.stepper(false)
     }
 
-    /// The stepper of a run of the plan; the first run takes the one with which the plan was made.
+    /// The stepper for a run of the plan; the first run takes the one that was created with the plan.
     pub(crate) fn take_stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         self.start.take().map_or_else(|| self.steps.stepper(self.steps.error.is_none()), Ok)
     }
 
-    /// What observers see after some steps.
+    /// The view of the observers after `k` steps.
     pub(crate) fn view<'r>(
         &'r self,
         stepper: &'r dyn Stepper<N>,
@@ -123,7 +124,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         Ok(())
     }
 
-    /// What the run computes and what it skips, by the steps and beside them.
+    /// What the run computes and what it skips, within the steps and otherwise.
     pub fn entries(&self) -> Vec<PlanEntry> {
         let (needs, structure) = (self.steps.needs, self.steps.problem.structure);
         let mut entries = self.work_summary.clone();

@@ -1,10 +1,10 @@
-//! Random numbers of the tests: the same in every run.
+//! Random numbers for the tests, equal in every run.
 
-/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
+/// A pseudorandom number generator (G. Marsaglia, "Xorshift RNGs", 2003).
 pub struct Random(pub u64);
 
 impl Random {
-    /// A whole number below `n`.
+    /// An integer below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;

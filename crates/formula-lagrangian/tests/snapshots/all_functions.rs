@@ -1,7 +1,7 @@
 //! A Lagrangian of the coordinates x, y, made from its formula by formula-lagrangian.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure, ChartVector, VelocityPoint};
+use contact_geom::{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint};
 
 /// The Lagrangian with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -90,27 +90,3 @@ impl Check {
         if size > 0.0 { apart / size } else { apart }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_factor_that_is_none_is_not_contact() {
-        let check = |sigma: f64| {
-            let place = Place {
-                t: 0.0,
-                sigma,
-                log_factor: 0.0,
-                contact_defect: 0.0,
-                herglotz_defect: 0.0,
-                momenta: Vec::new(),
-            };
-            Check { integrator: String::new(), step_size: 1.0, places: vec![place], statements: Vec::new() }
-        };
-        assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
-        for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {
-            assert!(!check(none).is_contact() && check(none).loses_the_form(), "{none}");
-        }
-    }
-}

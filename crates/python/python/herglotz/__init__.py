@@ -33,7 +33,7 @@ _LATER = {
     "_ensemble": "Ensemble MemberCrossings ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_path": "Path path",
-    "_looks": "Check Comparison Contact Geometry check compare geometry is_contact",
+    "_checks": "Check Comparison Contact Geometry check compare geometry is_contact",
 }
 _LATER = {name: module for module, names in _LATER.items() for name in names.split()}
 

@@ -1,4 +1,4 @@
-//! A look between the nodes of a step: does its curve solve Herglotz' equations there?
+//! The defect of a step's collocation polynomial in Herglotz' equations, sampled between the nodes.
 
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
@@ -20,37 +20,37 @@ use pulp::{Simd, WithSimd};
 use std::array::from_fn;
 use std::sync::OnceLock;
 
-/// What a look at a step has found.
+/// The defect of a step at a set of sample points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct DefectSample {
-    /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
-    /// the momenta and actions. Infinite where something is not finite.
+    /// The largest defect of the curve, relative to the momenta and actions: of `p' = L_q + L_z p` and `z' = L`, each
+    /// times the step size, and of `p = L_v`. Infinite if a value is not finite.
     pub defect: f64,
-    /// The same of momenta and forces alone, and of the action alone, in their own units.
+    /// The absolute defect of momenta and forces alone, and that of the action alone.
     pub of_momenta: f64,
     pub of_action: f64,
-    /// The momenta that it is relative to.
+    /// The size of the momenta, to which `defect` is relative.
     pub size: f64,
-    /// The actions.
+    /// The size of the actions, to which `defect` is relative.
     pub size_z: f64,
-    /// The misfit that the last two coefficients of the step's polynomials let expect.
+    /// An estimate of the defect from the last two Legendre coefficients of the step's polynomials.
     pub expected: f64,
-    /// The largest misfit of the values of L themselves, beyond their round-off: what jumps between two points and has no gradient at
-    /// either is seen in the values alone.
+    /// The largest defect of the values of L, beyond their round-off. It detects a jump of L between two points at
+    /// which the gradient of the jumping term vanishes.
     pub of_value: f64,
-    /// The largest `|p.v| + |z L_z|`, which such a misfit changes.
+    /// The largest `|p.v| + |z L_z|`, for comparison with `of_value`.
     pub kinetic: f64,
     /// The values of L at the start and at the end of the step's curve.
     ends: [f64; 2],
-    /// Whether L may jump between the step before and this one.
+    /// Whether L may jump between the preceding step and this one.
     pub follows_a_jump: bool,
 }
 
-/// Products of two numbers that are smaller have lost digits.
+/// The threshold below which products of two numbers may have lost digits by underflow.
 pub(crate) const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 impl DefectSample {
-    /// Whether the misfit is one of numbers that have lost digits since they are too small, as where a force begins at nothing.
+    /// Whether the defect may be due to underflow, as where a force grows from zero.
     pub fn is_underflown(&self) -> bool {
         self.defect * self.size < UNDERFLOWN
     }
@@ -61,7 +61,7 @@ impl DefectSample {
         beyond_rounding((after - before).abs(), max_or_nan(before.abs(), after.abs()))
     }
 
-    /// Together with that of the next part of the same step, between which L may jump.
+    /// The sample of two consecutive parts of one step, between which L may jump: `self` and then `next`.
     pub fn joined(self, next: DefectSample) -> DefectSample {
         DefectSample {
             defect: max_or_nan(self.defect, next.defect),
@@ -77,12 +77,12 @@ impl DefectSample {
         }
     }
 
-    /// The same after a jump of L.
+    /// The same sample, flagged as following a jump of L.
     pub fn after_a_jump(self) -> DefectSample {
         DefectSample { follows_a_jump: true, ..self }
     }
 
-    /// Together with one at other points of the step.
+    /// Combined with a sample at other points of the same step.
     pub fn and(self, other: DefectSample) -> DefectSample {
         DefectSample {
             defect: max_or_nan(self.defect, other.defect),
@@ -94,8 +94,8 @@ impl DefectSample {
     }
 }
 
-/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L; where there is a time transformation
-/// in its time, each multiplied with its rate.
+/// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
+/// transformation they are polynomials in tau, each multiplied by the rate dt/dtau.
 pub(crate) struct Curve<const N: usize> {
     pub s: usize,
     pub t: f64,
@@ -107,14 +107,14 @@ pub(crate) struct Curve<const N: usize> {
     pub force: [Stages; N],
     pub rate: Stages,
     pub l: Stages,
-    /// Whether z is part of the step; else `L` is that at `z = 0`.
+    /// Whether z is part of the stage equations; if not, `l` holds L at `z = 0`.
     pub acts: bool,
     /// The rates of the time transformation at the start and at the end.
     rates: [f64; 2],
 }
 
 impl<const N: usize> Curve<N> {
-    /// With stages still to be filled in.
+    /// A curve with its start, and stages that are 0 until they are set.
     pub fn new(s: usize, t: f64, h: f64, start: &PhasePoint<N>) -> Self {
         let zero = [Stages::ZERO; N];
         Curve {
@@ -133,19 +133,19 @@ impl<const N: usize> Curve<N> {
         }
     }
 
-    /// From the stages of a step in transformed time, and the rates of the time transformation at its ends.
+    /// Sets the stages of a step in transformed time, and the rates of the time transformation at its ends.
     pub fn of_transformed(&mut self, solved: &Solved<N>, rates: [f64; 2]) {
         self.of_solved(solved);
         self.rates = rates;
     }
 
-    /// From the stages of a general step.
+    /// Sets the stages of a general step.
     pub fn of_solved(&mut self, solved: &Solved<N>) {
         (self.v, self.force) = (solved.v.map(Stages), solved.force.map(Stages));
         (self.rate, self.l) = (Stages(solved.rate), Stages(solved.l));
     }
 
-    /// From the accelerations and positions of a condensed step that began with the velocity v0.
+    /// Sets the stages from the accelerations and positions of a condensed step with initial velocity v0.
     #[inline(always)]
     pub fn of_accelerations<S: Simd, L: Lagrangian<N>>(
         &mut self,
@@ -176,7 +176,7 @@ impl<const N: usize> Curve<N> {
     }
 }
 
-/// Maps from the stages to as many points between the nodes.
+/// The linear maps from the s stages to s sample points between the nodes.
 struct Between {
     /// The points, as fractions of the step.
     points: Stages,
@@ -185,19 +185,19 @@ struct Between {
     integral: StageMap,
 }
 
-/// The round-off of a value of L, relative to its size: some hundred units for the sums that it is made of.
+/// The relative round-off of a value of L: some hundred units, for the sums that it consists of.
 const ROUNDED: f64 = 256.0 * f64::EPSILON;
 
 fn beyond_rounding(defect: f64, size: f64) -> f64 {
-    // A NaN stays one.
+    // Written so that a NaN is returned.
     if defect <= ROUNDED * size { 0.0 } else { defect - ROUNDED * size }
 }
 
-/// The sets of points that there are.
+/// The number of sets of sample points.
 pub(crate) const SAMPLE_SETS: usize = 16;
 
 impl Between {
-    /// One of the sets of points for a number of stages from 1 to 16, made once.
+    /// The maps of one set of sample points, for a number of stages from 1 to 16; computed once.
     fn of(s: usize, set: usize) -> &'static Between {
         static TABLES: [[OnceLock<Box<Between>>; SAMPLE_SETS]; MAX_STAGES] =
             [const { [const { OnceLock::new() }; SAMPLE_SETS] }; MAX_STAGES];
@@ -205,13 +205,13 @@ impl Between {
         TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
     }
 
-    /// A polynomial at the points.
+    /// The values of a polynomial at the sample points.
     #[inline(always)]
     fn value<S: Simd>(&self, s: usize, y: &Stages, out: &mut Stages) {
         self.value.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
     }
 
-    /// From a number at the start of the step, what grows at the rate of a polynomial.
+    /// The integral of a polynomial up to the sample points, plus the value at the start of the step.
     #[inline(always)]
     fn grown<S: Simd>(&self, s: usize, h: f64, y: &Stages, from: f64, out: &mut Stages) {
         self.integral.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
@@ -223,8 +223,9 @@ impl Between {
     fn new(s: usize, set: usize) -> Self {
         let g = Coefficients::of(s);
         let golden = 0.618_033_988_749_894_9;
-        // The Gauss points of one stage fewer lie between those of s; one more beside the step's end, where curves are worst. The
-        // other sets are equidistant, each moved so that all together leave the shortest gaps.
+        // Set 0: the Gauss points of s - 1 stages, which lie between those of s, and one point near the end of the
+        // step, where the defect is largest. The other sets are equidistant, each shifted by the golden ratio, so that
+        // the gaps of their union are shortest.
         let inner = Coefficients::of(s.saturating_sub(1).max(1));
         let end = 0.5 * (1.0 + g.c[s - 1].0);
         let points = from_fn(|i| match set {
@@ -237,12 +238,12 @@ impl Between {
     }
 }
 
-/// The sum of the stages with weights, which are 0 beyond the last.
+/// The weighted sum of the stages; the weights after the last stage are 0.
 fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
 }
 
-/// The look, in the lanes of an instruction set.
+/// The evaluation of a defect sample, in SIMD lanes.
 pub(crate) struct Compare<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
     pub transformation: &'a P,
@@ -283,7 +284,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
                 v: vector(|d| v[d].block::<S>(r)),
                 z: z.block::<S>(r),
             };
-            // From the transformed time to t.
+            // The factors from transformed time to t.
             let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
             if !P::PHYSICAL {
                 let rate = transformation.rate(&x.q);
@@ -327,7 +328,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
                 size_z = size_z.max(z.block::<S>(r).abs()).max((value * long).abs());
             }
         }
-        // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
+        // The maximum over lanes may hide a NaN. In `all` every value is multiplied by 0, which leaves a NaN for a NaN
+        // or an infinity.
         if all.sum() != 0.0 {
             return DefectSample {
                 defect: f64::INFINITY,
@@ -342,13 +344,13 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
         let (of_momenta, of_action) = (defect.max_abs_or_nan(), of_z.max_abs_or_nan());
         let defect = relative(of_momenta, size) + relative(of_action, size_z);
         let of_value = beyond_rounding(of_value.max_abs_or_nan(), largest_l.max_abs_or_nan());
-        // The coefficients are the same for all points.
+        // The coefficients do not depend on the sample points; set 0 alone returns the estimate from them.
         if set > 0 {
             return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
         }
         let fastest = max_abs_or_nan(v.iter().flat_map(|v| v.0));
         let g = Coefficients::of(s);
-        // The sizes of the last two coefficients together.
+        // The sum of the sizes of the last two coefficients.
         let tail = |y: &Stages| g.last.iter().map(|row| weighted(row, y).abs()).sum::<f64>();
         let mut expected = tail(&curve.rate) * h;
         for d in 0..N {

@@ -1,13 +1,13 @@
-//! The last steps in sequence, whose velocities tell whether steps of few stages resolve the motion.
+//! The mean velocities of the last steps, from which it is judged whether steps of few stages resolve the motion.
 
 use crate::gauss::dense::StepStart;
 use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::SVector;
 
-/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
+/// The number of stages up to which the stage values of a step do not show whether it resolves the motion.
 pub(crate) const FEW_STAGES: usize = 2;
 
-/// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
+/// The mean velocities of the last four steps, the last position, and the states after the last two steps.
 pub(crate) struct Sequence<const N: usize> {
     pub velocities: [SVector<f64, N>; 4],
     pub q: SVector<f64, N>,
@@ -15,7 +15,7 @@ pub(crate) struct Sequence<const N: usize> {
 }
 
 impl<const N: usize> Sequence<N> {
-    /// Before the first step.
+    /// The sequence before the first step.
     pub fn new(start: StepStart<N>) -> Box<Self> {
         Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
     }

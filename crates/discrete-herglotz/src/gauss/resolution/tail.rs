@@ -1,4 +1,5 @@
-//! Whether a step resolves the motion that it crosses.
+//! Whether a step resolves the motion, judged by the last Legendre coefficient of its stages and by its conformal
+//! factor.
 
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::lanes::Lanes;
@@ -6,32 +7,33 @@ use crate::numbers::registers::{Stages, blocks};
 use contact_geom::numbers::max_or_nan;
 use pulp::Simd;
 
-/// The relative error of `sigma_d` in a step from which on the step does not resolve the drag: a tenth. Gauss' method with one
-/// stage reaches it at `gamma h = 1`, where the factor changes by e.
+/// The error of `ln sigma_d` in a step above which the step does not resolve the drag: a tenth. The Gauss method with
+/// one stage reaches it at `gamma h = 1`, where the factor changes by e.
 const SIGMA: f64 = 0.1;
 
-/// The last coefficient of the stages in the Legendre polynomials, in units of the largest stage, from which on they are not
-/// the values of a function that a polynomial of their degree follows: one half. A harmonic reaches it with three to four
-/// stages a period; where a step resolves the motion the coefficients fall geometrically.
+/// The last Legendre coefficient of the stages, in units of the largest stage, above which a polynomial of their degree
+/// does not approximate the motion: one half. A harmonic motion reaches it with three to four stages per period; if a
+/// step resolves the motion, the coefficients decrease geometrically.
 const TAIL: f64 = 0.5;
 
-/// What a tail must move of the positions to count: below it the stages are round-off.
+/// The displacement by the last coefficient, relative to the positions, below which the stages are taken for round-off.
 pub(crate) const MOVED: f64 = 1e-8;
 
-/// The change of a sweep, relative to the stages, from which on their tail is looked at: what the last step's polynomial has
-/// foretold to a tenth is resolved.
+/// The change of the first iteration, relative to the stages, above which their last coefficient is checked. A step
+/// that the last step's polynomial predicts to a tenth is resolved.
 pub(crate) const FORETOLD: f64 = 0.1;
 
-/// The roundings of a force or momentum that a misfit, or what an iteration leaves, may hold: sixteen stages, with the weights of an
-/// interpolation between them.
+/// The round-off of a defect, or of a converged iteration, in units of the round-off of one force or momentum: for
+/// sixteen stages and the weights of an interpolation between them.
 pub(crate) const ROUNDINGS: f64 = 256.0;
 
-/// The misfit of a conformal factor: `ln sigma_d` against the integral of `L_z`; above one where the step does not resolve it.
+/// The defect of a conformal factor: the difference of `ln sigma_d` and the integral of `L_z`, above one if the step
+/// does not resolve the drag.
 pub(crate) fn of_sigma(sigma: f64, integral: f64) -> f64 {
     (sigma.ln() - integral).abs() / SIGMA
 }
 
-/// The functional that takes the last coefficient of a polynomial from its values at the stages.
+/// The linear functional that gives the last Legendre coefficient of a polynomial from its values at the stages.
 pub(crate) struct Tail {
     s: usize,
     weights: Stages,
@@ -42,9 +44,10 @@ impl Tail {
         Tail { s, weights: Stages(Coefficients::of(s).last[0]) }
     }
 
-    /// The misfit of a step by the values at its stages, times a factor where one is given: above one where they are not those of a
-    /// polynomial. `time` turns them to lengths that are compared with the positions. Up to two stages do not tell: a step is then no
-    /// worse than its order. All must be finite.
+    /// The defect of a step from the values at its stages, times a factor if one is given: above one if a polynomial
+    /// does not approximate them. `values * time` has the units of the positions, with which the last coefficient is
+    /// compared. For one and two stages the result is 0, since the last coefficient then says nothing beyond the order
+    /// of the step. All values must be finite.
     #[inline(always)]
     pub fn defect<S: Simd, const N: usize>(
         &self,

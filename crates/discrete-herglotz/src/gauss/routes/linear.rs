@@ -1,4 +1,4 @@
-//! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
+//! Steps of contact Gauss collocation for a linear motion: one precomputed matrix.
 
 use crate::gauss::dense::StepStart;
 use crate::gauss::tables::coefficients::MAX_STAGES;
@@ -12,8 +12,9 @@ use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;
 
-/// The change of the action, a polynomial of degree two in the velocity and the position from a place, beside `grow z`. The place is the equilibrium, if
-/// there is one: elsewhere the terms of a motion that comes to rest would cancel, and leave their rounding.
+/// The change of the action in a step without the term `grow z`: a polynomial of degree two in the velocity and in the
+/// position relative to a reference point. The reference point is the equilibrium if there is one; with another one the
+/// terms would cancel as a motion comes to rest, and leave their round-off.
 struct Action<const N: usize> {
     stage_positions: SVector<f64, N>,
     qq: SMatrix<f64, N, N>,
@@ -34,14 +35,15 @@ pub(crate) struct Linear<const N: usize> {
     shift_v: [Unevaluated; N],
     grow: Unevaluated,
     action: Option<Action<N>>,
-    /// The accelerations of the stages, row `i N + d`, as affine functions of (q0, v0): for dense output.
+    /// The accelerations of the stages as affine functions of (q0, v0), in row `i N + d`; for dense output.
     stages: Vec<Vec<f64>>,
     pub q: [CompensatedSum; N],
     pub v: [CompensatedSum; N],
     pub z: CompensatedSum,
 }
 
-/// Where a force that is linear in the positions vanishes, from its slope and its value at the origin; the origin where there is no such place, or more than one.
+/// The zero of a force that is affine in the positions, from its derivative and its value at the origin; the origin if
+/// there is no zero, or more than one.
 fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f64, N>) -> SVector<f64, N> {
     let mut stage_positions = -at_origin;
     if stage_positions.iter().all(|x| *x == 0.0) {
@@ -53,7 +55,7 @@ fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f
 }
 
 impl<const N: usize> Linear<N> {
-    /// For `a = M^-1 L_q = -K q + f`; `None` where the stage equations have no solution.
+    /// The step for `a = M^-1 L_q = -K q + f`; `None` if the stage equations are singular.
     #[inline(never)]
     pub fn new<L: Lagrangian<N>>(
         lagrangian: &L,
@@ -73,8 +75,9 @@ impl<const N: usize> Linear<N> {
         let there = VelocityPoint { q: stage_positions, v: SVector::zeros(), z: 0.0 };
         let at_place = lagrangian.gradient(t, &there);
         let constant_at_place = inverse_mass * at_place.x;
-        // The stages' accelerations: rows (i, d), a_id - sum slope B a = slope (q0 + u v0) + f; as right-hand sides the unit
-        // vectors of q0 and v0, and f, at the origin and for positions from the place.
+        // The equations of the stage accelerations, in rows (i, d): a_id - sum slope B a = slope (q0 + u v0) + f. The
+        // right-hand sides are those of the unit vectors of q0 and v0, then f at the origin and f at the reference
+        // point.
         let [last, from_place] = [2 * N, 2 * N + 1];
         let sides = 2 * N + 2;
         let mut rows: Vec<Vec<Quad>> = (0..s * N)
@@ -100,7 +103,8 @@ impl<const N: usize> Linear<N> {
         let exact = &table.exact;
         let sum = |w: &[Quad], d: usize, side: usize| (0..s).fold(zero, |sum, j| sum + w[j] * a(j, d, side));
         let action = wants_z.then(|| {
-            // The stages as affine functions of (q0, v0, 1), with positions from the place, and the sum of L over them.
+            // The stages as affine functions of (q0, v0, 1), with positions relative to the reference point, and the
+            // weighted sum of L over them.
             let position = |i: usize, d: usize, side: usize| {
                 unit(side, d, one) + unit(side, N + d, table.u[i]) + sum(&table.b[i], d, side)
             };
@@ -147,9 +151,11 @@ impl<const N: usize> Linear<N> {
         }))
     }
 
-    /// Takes steps until one is not finite; the state is then that before it. Returns how many, and where the last one began.
+    /// Takes steps until the state is not finite; the state is then that before the failed step. Returns the number of
+    /// steps, and the start of the last one.
     ///
-    /// Only a run that leaves the finite numbers is looked at step by step, again from its start.
+    /// The state is checked at the end of all steps; only if it is not finite they are repeated from the start with a
+    /// check after each step.
     #[inline(always)]
     pub fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
         let start = (self.q, self.v, self.z);
@@ -211,7 +217,7 @@ impl<const N: usize> Linear<N> {
         self.action.is_some()
     }
 
-    /// The accelerations of the stages of the step from a position and a velocity.
+    /// The accelerations of the stages of the step that starts at a position and a velocity.
     pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
         let side = |k: usize| {
             if k < N {

@@ -1,4 +1,4 @@
-//! The routes of a contact Gauss step: what of the stage equations is left to solve where the structure of L allows to skip a part.
+//! The routes of a contact Gauss step: the reduced forms of the stage equations that the structure of L allows.
 
 pub(crate) mod general;
 pub(crate) mod linear;

@@ -23,35 +23,39 @@ use std::sync::Arc;
 
 mod slope;
 
-/// How much worse than nothing what the step before foretells may be: its error is rough, and the first sweeps take it away, where that of
-/// nothing is smooth and lasts.
+/// The extrapolated predictor is dropped if its first change exceeds the part of the force that is outside the linear
+/// force by this factor. Its error is rough, and the first iterations remove it, whereas the error of a motion by the
+/// linear force alone is smooth and decreases more slowly.
 const ROUGH: f64 = 16.0;
 
-/// The steps after which what the step before foretells is tried again.
+/// The number of steps after which a dropped predictor is tried again.
 const UNFORETOLD: u32 = 31;
 
-/// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
+/// The largest relative change of an iteration after which its values are accurate enough for the terms with the tails
+/// of the matrices.
 const NEAR: f64 = 1e-3;
 
-/// The tails of the matrices act in one of so many steps, with as many times their weight: what they add up to is the same, and is
-/// had at that part of the price. An odd number, so that they meet all phases of a period that is a power of two of steps.
+/// The tails of the matrices are applied in one of this many steps, with a weight of this number: their accumulated
+/// effect is the same at a fraction of the cost. The number is odd, so that all phases are met if the period of the
+/// motion is a power of two of steps.
 const TAILS: usize = 7;
 
 /// The state and the workspace of the condensed step.
 ///
-/// The matrix of the sweeps and what it multiplies lie together, within 4096 bytes in few dimensions: a processor takes a load for
-/// one of what was just stored where the last twelve bits of their addresses agree, and waits.
+/// The matrix of the iteration and the vectors that it multiplies are adjacent, within 4096 bytes for few dimensions: a
+/// processor delays a load if the last twelve bits of its address agree with those of a recent store (4K aliasing).
 #[repr(C)]
 pub(crate) struct SeparableStages<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub table: Arc<Condensed>,
     pub left: Preconditioned,
-    /// What the force adds to the linear one, `a_i + kappa Q_i`: the unknown of the iteration.
+    /// The unknown of the iteration: the acceleration without the linear force, `a_i + kappa Q_i`.
     rest: [Stages; N],
     pub x: [Stages; N],
-    /// The accelerations of the last sweep.
+    /// The accelerations of the last iteration.
     pub a: [Stages; N],
-    /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
+    /// The part of the stage positions that is constant in an iteration: the terms of the state, and the terms with the
+    /// tails of the matrices.
     base: [Stages; N],
     /// `M^-1`; `None` where M is the identity.
     inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
@@ -59,26 +63,27 @@ pub(crate) struct SeparableStages<'a, L, const N: usize> {
     pub q: [CompensatedSum; N],
     pub v: [CompensatedSum; N],
     pub z: CompensatedSum,
-    /// Whether guesses are far from the solution.
+    /// Whether the initial guesses are too inaccurate for the terms with the tails of the matrices.
     far: bool,
-    /// Whether `rest` belongs to the step before.
+    /// Whether `rest` is the solution of the step before.
     warm: bool,
-    /// Corrects the sweeps where they do not contract by themselves.
+    /// Simplified Newton iteration, used while the fixed-point iteration does not converge.
     pub newton: Option<Box<SlopeNewton<N>>>,
-    /// The same while it is not used.
+    /// Its workspace while it is not used.
     suspended_newton: Option<Box<SlopeNewton<N>>>,
-    /// Solves the steps for which that does not serve; made for the first step that the sweeps do not solve.
+    /// Newton's method in the stage positions, for steps in which simplified Newton iteration does not converge; made
+    /// for the first step in which the fixed-point iteration does not converge.
     positions: Option<Box<PositionNewton<N>>>,
-    /// Whether the stages of the next step are solved, and `rest` is theirs.
+    /// Whether the stages of the next step are solved already, with their solution in `rest`.
     solved: bool,
-    /// The steps left for which the guess is a motion by the linear force alone.
+    /// The number of further steps whose initial guess is a motion by the linear force alone.
     unforetold: u32,
-    /// The steps that Newton's Jacobian has served.
+    /// The number of steps since the Jacobian of the simplified Newton iteration was computed.
     age: u32,
     tail: Tail,
-    /// Above one where the last step has not resolved the motion.
+    /// The defect of the last step; above one if it does not resolve the motion.
     pub defect: f64,
-    /// Steps since the start, and the one at which the slope of the force is looked at again.
+    /// The number of steps taken, and the number at which the slope of the force is estimated again.
     taken: usize,
     review: usize,
     pub evaluations: u64,
@@ -123,8 +128,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
     }
 
-    /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q at a time and a position from now on;
-    /// `false` where that is not possible.
+    /// Switches to simplified Newton iteration with `L_qq` at a time and a position; `false` if the Jacobian is
+    /// singular or not finite.
     pub fn linearise(&mut self, t: f64, q: SVector<f64, N>) -> bool {
         if !self.prepare() {
             return false;
@@ -136,7 +141,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
     }
 
-    /// Goes over to sweeps that Newton's method corrects; `false` where that is not possible. A frame of the stack by itself.
+    /// Allocates simplified Newton iteration and sets kappa = 0; `false` if that is not possible. Not inlined, so that
+    /// its matrices have a stack frame of their own.
     #[inline(never)]
     fn prepare(&mut self) -> bool {
         if self.newton.is_none() {
@@ -149,24 +155,25 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         true
     }
 
-    /// Takes the sweeps as they are again.
+    /// Returns to fixed-point iteration.
     pub fn suspend_newton(&mut self) {
         self.suspended_newton = self.newton.take();
         self.look_again();
     }
 
-    /// Guesses the next step to be a motion without forces.
+    /// Takes a motion without forces as the initial guess of the next step.
     pub fn forget(&mut self) {
         self.rest = [Stages::ZERO; N];
         self.warm = false;
     }
 
-    /// Makes the workspace of Newton's method, so that later steps allocate nothing.
+    /// Allocates the workspace of Newton's method, so that later steps do not allocate.
     pub fn reserve(&mut self) {
         self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
     }
 
-    /// Solves the stages of the next step, from the time `t`, by Newton's method, and has it taken from them.
+    /// Solves the stage equations of the next step, from the time `t`, by Newton's method; the next call of `step` uses
+    /// them.
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
@@ -178,7 +185,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         self.rest = [Stages::ZERO; N];
         for (i, (a, q)) in positions.stages().enumerate() {
             for d in 0..N {
-                // Beyond the last stage it is repeated.
+                // The last stage is repeated in the padding.
                 self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
             }
         }
@@ -186,7 +193,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         Ok(())
     }
 
-    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
+    /// Recomputes the Jacobian of the simplified Newton iteration at the middle stage of the last step.
     #[cold]
     #[inline(never)]
     fn renew(&mut self, t: f64) {
@@ -198,7 +205,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
     }
 
-    /// Takes the forces at the positions of the blocks of stages that T holds, from the r-th on.
+    /// Evaluates the forces at the blocks of stages that T holds, from the r-th on; returns the index of the next
+    /// block.
     #[inline(always)]
     fn take_forces<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
         let x = VelocityPoint { q: vector(|d| T::of(&self.x[d], r)), v: vector(|_| T::zero()), z: T::zero() };
@@ -209,7 +217,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         r + T::COUNT
     }
 
-    /// The accelerations of forces.
+    /// The accelerations `M^-1` times the forces.
     #[inline(always)]
     fn accelerations<S: Simd>(&self, force: SVector<Lanes<S>, N>) -> SVector<Lanes<S>, N> {
         let zero = Lanes::<S>::splat(0.0);
@@ -250,8 +258,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
         }
-        // What is below round-off is added from the second sweep on: beside the first one's forces it costs little. Where the guess
-        // is poor the tails of the matrices wait for the values of a later sweep.
+        // Terms below round-off are added from the second iteration on; computed beside the forces of the first one
+        // they cost little. If the initial guess is poor, the terms with the tails of the matrices use the values of a
+        // later iteration.
         let at_once = solved || self.newton.is_some();
         let weight = match self.taken % TAILS {
             _ if at_once => 1.0,
@@ -263,15 +272,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let mut aside = !at_once && !due;
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
-        // With sweeps ahead changes fall so fast that to leave less costs nothing.
+        // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
         let mut sweeps =
             FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
-        // The positions and what the force adds there, of the sweep before.
+        // The positions and `rest` of the iteration before.
         let mut before = [Stages::ZERO; 2];
         let outcome = loop {
             if again {
                 self.begin::<S>(small);
-                // Where Newton's method is needed the tails follow each of its corrections.
+                // In simplified Newton iteration the terms with the tails are updated after each correction.
                 (small, again) = (Some(weight), self.newton.is_some());
             }
             let base = &self.base;
@@ -313,13 +322,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             }
         }
         if let (IterationOutcome::Done, Some(_)) = (outcome, &self.newton) {
-            // Stiff forces magnify the round-off of the positions, and the correction takes it back.
+            // Stiff forces magnify the round-off of the positions; the corrected accelerations do not contain it.
             self.a = self.rest;
         }
         let outcome = if outcome == IterationOutcome::Done { self.finish::<S>(t) } else { outcome };
         self.warm = outcome == IterationOutcome::Done;
         if !self.warm {
-            // What an iteration leaves that does not contract is worse than nothing.
+            // The result of a diverged iteration is a worse initial guess than a motion by the linear force alone.
             self.rest = [Stages::ZERO; N];
             return outcome;
         }
@@ -340,7 +349,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         IterationOutcome::Done
     }
 
-    /// Takes the forces of one block of stages; what they have changed by most, and the largest of what they consist of, are kept.
+    /// Stores the forces of one block of stages, and updates the largest change of `rest` and the largest of its terms.
     #[inline(always)]
     fn take<S: Simd>(&mut self, r: usize, force: SVector<Lanes<S>, N>, [change, size]: &mut [Lanes<S>; 2]) {
         let (a, kappa) = (self.accelerations(force), Lanes::<S>::splat(self.left.kappa));
@@ -354,8 +363,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
     }
 
-    /// Whether a change of the accelerations is one of the rounding of forces: those that cancel beside an equilibrium are rounded like the terms
-    /// that cancel.
+    /// Whether a change of the accelerations is round-off of the forces: where terms of a force cancel, near an
+    /// equilibrium, its round-off is that of the terms.
     #[cold]
     #[inline(never)]
     fn is_rounding(&self, t: f64, change: f64) -> bool {
@@ -367,7 +376,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         change <= ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
     }
 
-    /// Corrects a sweep by Newton's method. Returns the change, and whether the positions have not moved but for their round-off.
+    /// Corrects a fixed-point iteration by the simplified Newton method. Returns the largest change of the
+    /// accelerations, and whether the positions have changed by no more than their round-off.
     #[cold]
     #[inline(never)]
     fn correct(&mut self) -> (f64, bool) {
@@ -377,8 +387,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         (change, moved <= 4.0 * f64::EPSILON * width)
     }
 
-    /// What the sweeps of a step have in common: what comes of the state. With what is below its round-off where a weight is given:
-    /// the rests of the state, which are not free of its direction, and as many times what comes of the tails of the matrices.
+    /// Computes `base`, the terms of the stage positions from the state. If a weight is given, terms below round-off
+    /// are included: those of the compensation terms of the state, whose direction is not random, and the weight times
+    /// those of the tails of the matrices.
     #[inline(always)]
     fn begin<S: Simd>(&mut self, small: Option<f64>) {
         let (head, s) = (&self.left.head, self.table.s);
@@ -405,7 +416,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 if tail.is_some() {
                     small = weight.mul_add(base.block(r), small);
                 }
-                // The small terms first: a sum that has been rounded would not know them.
+                // The small terms are added first, since they are below the round-off of the full sum.
                 base.set(r, head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small)));
             }
         }
@@ -428,7 +439,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if branched() {
             return IterationOutcome::Branched;
         }
-        // The largest change over lanes may hide a NaN.
+        // The maximum over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {
             return IterationOutcome::NonFinite;
         }
@@ -456,7 +467,7 @@ saved!([L, const N: usize] SeparableStages<'_, L, N> {
 } and save_solution, load_solution);
 
 impl<L, const N: usize> SeparableStages<'_, L, N> {
-    /// The matrix by its slope and whether it has a tail, and Newton's Jacobian.
+    /// Saves kappa and whether the tail is present, which determine the matrices, and the simplified Newton iteration.
     fn save_solution(&self, to: &mut Vec<u64>) {
         self.left.kappa.save(to);
         self.left.tail.is_some().save(to);

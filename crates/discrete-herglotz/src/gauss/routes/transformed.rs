@@ -17,7 +17,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation};
 use pulp::{Simd, WithSimd};
 
-/// the time transformation that a Lagrangian states.
+/// The time transformation that a Lagrangian provides.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OwnTransformation<'a, L>(pub &'a L);
 
@@ -28,18 +28,21 @@ impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformati
     }
 }
 
-/// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`TimeTransformation`], `dt = g(q) dtau`.
+/// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of a
+/// [`TimeTransformation`], `dt = g(q) dtau`.
 ///
-/// It is Gauss collocation of `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H` at the start, which makes `K = 0`. With
-/// the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`, the stages are
+/// It is Gauss collocation for the contact Hamiltonian `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H`, and
+/// therefore `K = 0`, at the start. With the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`,
+/// the stage equations are
 ///
 /// `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`, `rho = 1 - hA (rho g L_z)`, `rho p_t = p_t0`,
 /// `rho L_v = p0 + hA (rho (g L_q - (E + p_t) grad g))`,
 ///
-/// and the same sums with `hb` end the step, `sigma_d = 1 / rho1`. The step contracts `dz - p dq - p_t dt` by `sigma_d`, and so
-/// every momentum of a symmetry of L that leaves g invariant. Order 2s in tau, and symmetric.
+/// and the end of the step is given by the same sums with `hb`, `sigma_d = 1 / rho1`. The step multiplies the contact
+/// form `dz - p dq - p_t dt` by `sigma_d`, and so it does every momentum of a symmetry of L that leaves g invariant.
+/// The method is symmetric and of order 2s in tau.
 ///
-/// The stages are found by fixed-point iteration: a step that is too large for it is refused with
+/// The stage equations are solved by fixed-point iteration; a step that is too large for it fails with
 /// [`StepError::NotConverged`].
 ///
 /// ```
@@ -59,7 +62,7 @@ pub struct TransformedStepper<'a, L, C, const N: usize> {
     h: f64,
     tau: f64,
     taken: usize,
-    /// The start of the last step, where that was taken by itself.
+    /// The start of the last step, if it is known (after `advance_until`).
     from: Option<Values<N>>,
     unresolved: Option<UnresolvedStep>,
 }
@@ -101,8 +104,8 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         })
     }
 
-    /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
-    /// momentum.
+    /// The momentum `p_t` conjugate to t. Up to the error of the method it is minus the energy, `E + p_t = K / g`. Each
+    /// step multiplies it by `sigma_d`, as any momentum.
     pub fn time_momentum(&self) -> f64 {
         self.general.extension.p_t.value
     }
@@ -112,17 +115,17 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         self.tau
     }
 
-    /// Takes steps up to a physical time, the last one shorter so that it ends there to round-off. Nothing is done where the
-    /// time is past already.
+    /// Takes steps up to a physical time; the last step is shortened to end there to round-off. Takes no step if the
+    /// time is already past.
     ///
     /// # Errors
-    /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
+    /// Those of [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
     pub fn advance_to(&mut self, t_end: f64) -> Result<(), StepFailure> {
         self.advance_until(usize::MAX, t_end).map(|_| ())
     }
 
-    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step that was
-    /// taken by itself.
+    /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if the
+    /// start of the last step is not known.
     pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
         let (general, from) = (&*self.general, self.from.as_ref()?);
         let value = |x: &[CompensatedSum; N]| SVector::from(x.map(|x| x.value));
@@ -141,14 +144,15 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         (0..sets).map(at).reduce(DefectSample::and)
     }
 
-    /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
+    /// Repeats the last step, which has passed a given time, with the length for which it ends at that time.
     fn shorten(&mut self, before: &Values<N>, t_end: f64) -> Result<(), StepError> {
-        // Lengths, whichever way the run goes.
+        // Lengths are positive in both directions of time.
         let way = self.h.signum();
         let (mut short, mut long, mut length) = (0.0, self.h.abs(), self.h.abs());
         let mut over = (self.time() - t_end) * way;
         for _ in 0..ITERATION_LIMIT {
-            // Newton's method, where dt/dh is the rate at the end but for the method's error.
+            // Newton's method, with bisection as a safeguard; dt/dh is the rate at the end up to the error of the
+            // method.
             let newton = length - over / self.general.rate();
             length = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
             self.general.reset(before);
@@ -156,7 +160,8 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
             self.sweep(1).map_err(|halt| halt.cause)?;
             over = (self.time() - t_end) * way;
             if self.ends_at(t_end, before.t.value) {
-                // The stages are those of another length than the next step's.
+                // The stages belong to a step of another length than the next one, which must not be extrapolated from
+                // them.
                 let end = self.general.values();
                 self.general.reset(&end);
                 return Ok(());
@@ -166,7 +171,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         Err(StepError::NotConverged { residual: over, iterations: ITERATION_LIMIT })
     }
 
-    /// Whether a step from some time ends at another to round-off; that is then the time.
+    /// Whether a step from the time `before` ends at `t_end` to round-off; if so, the time is set to `t_end`.
     fn ends_at(&mut self, t_end: f64, before: f64) -> bool {
         let there = (self.time() - t_end).abs() <= 2.0 * f64::EPSILON * t_end.abs().max(before.abs());
         if there {
@@ -175,13 +180,13 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         there
     }
 
-    /// Takes steps by sweeps.
+    /// Takes steps by fixed-point iteration.
     fn sweep(&mut self, steps: usize) -> Result<(), StepFailure> {
         let TransformedStepper { general, taken, unresolved, .. } = self;
         self.arch.dispatch(AdvanceTransformed { general: &mut **general, unresolved, taken, steps })
     }
 
-    /// From the words of another; no look at its last step.
+    /// Restores the state from words; the start of the last step is not among them.
     fn read(&mut self, from: &mut &[u64]) -> Option<()> {
         self.general.load(from)?;
         let mut h = 0.0;
@@ -196,7 +201,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         Some(())
     }
 
-    /// Goes back to the full step after one that was made shorter.
+    /// Restores the full step size after a shortened step.
     fn lengthen(&mut self) {
         if self.general.table.h != self.h {
             self.general.table = StageTable::new(self.general.table.s, self.h);
@@ -204,7 +209,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
     }
 }
 
-/// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
+/// A number of steps, compiled for one instruction set; ends at the first step that fails.
 struct AdvanceTransformed<'b, 'a, L, C, const N: usize> {
     general: &'b mut General<'a, L, Fictitious<C>, N>,
     unresolved: &'b mut Option<UnresolvedStep>,
@@ -219,7 +224,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for Ad
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         forget_branches();
         for taken in 0..self.steps {
-            // L does not depend on it.
+            // L is autonomous.
             let t = self.general.extension.t.value;
             let progress = self.general.step::<S>(t);
             if progress != IterationOutcome::Done {
@@ -235,7 +240,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for Ad
 }
 
 impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, C, N> {
-    /// The steps are equal in the transformed time.
+    /// The steps are equal in transformed time.
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.lengthen();
         self.from = None;
@@ -248,7 +253,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for 
         Some(self.general.last_velocity())
     }
 
-    /// The last step is shorter, so that it ends at `t_end` to round-off.
+    /// The last step is shortened to end at `t_end` to round-off.
     fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
         let halt = |taken, cause| StepFailure { taken, cause };
         if !t_end.is_finite() {

@@ -1,72 +1,77 @@
-//! Damped Newton iteration for the stages of a step: how much of a correction is taken, and when there is no hope.
+//! Damped Newton iteration for the stages of a step: the choice of the damping factor, and the detection of failure.
 
-/// The iterations that a step may take: three times as many as one needs whose forces grow like a third power.
+/// The largest number of iterations of a step: three times the number for forces that grow like a third power.
 pub(crate) const ITERATIONS: u32 = 24;
 
-/// The part of a correction that is tried where the whole does not help. Smaller ones find few solutions more, and each of them costs
-/// an evaluation.
+/// The damping factor that is tried if the full correction fails the test. Smaller factors find few further solutions,
+/// and each of them costs an evaluation.
 const SHORT: f64 = 0.3;
 
-/// The part by which the next correction must fall where this one is taken whole.
+/// The relative decrease of the next correction that the test requires of a full correction; for a damped one it is
+/// multiplied by the damping factor.
 const GAIN: f64 = 0.25;
 
-/// The ratio of two corrections above which the Jacobian is taken anew: an iteration with the old one costs a tenth of it or less.
+/// The ratio of two successive corrections above which the Jacobian is recomputed. An iteration with the old Jacobian
+/// costs at most a tenth of one with a new Jacobian.
 const CONTRACTION: f64 = 0.2;
 
-/// The unknowns from which on a factorisation costs more than a step that contracts.
+/// The number of unknowns from which on a factorisation costs more than a step whose iteration contracts.
 const DEAR: usize = 16;
 
-/// The corrections of which no part helps that are taken nevertheless: one, where it is cheap.
+/// The number of corrections that may be taken although they fail the test: one for a small number of unknowns, where a
+/// factorisation is inexpensive.
 pub(crate) fn chances(unknowns: usize) -> u32 {
     u32::from(unknowns < DEAR)
 }
 
-/// What is to be done with a trial.
+/// The decision on a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verdict {
     Taken,
-    /// Another [`part`](Damping::part) of the same correction.
+    /// Try another damping factor ([`part`](Damping::part)) of the same correction.
     Again,
     GivenUp,
 }
 
-/// The corrections of one step.
+/// The damping of the Newton corrections of one step.
 ///
-/// A correction is taken as far as the next one, with the same Jacobian, is smaller: the natural test of monotonicity, which needs no
-/// scales of the residuals; see Deuflhard, "Newton Methods for Nonlinear Problems" (2004). Where neither the whole nor a part passes
-/// it the iteration is given up, but for some chances: steps too long for the motion have no solution, or one that is found by
-/// chance alone.
+/// A correction is accepted if the next one, with the same Jacobian, is smaller: the natural monotonicity test, which
+/// does not depend on the scaling of the residuals; see Deuflhard, "Newton Methods for Nonlinear Problems" (2004). If
+/// neither the full nor the damped correction passes the test, the iteration fails, except for the first `chances`
+/// failures, where the full correction is taken. Steps that are too long for the motion have no solution, or one that
+/// is found only by chance.
 pub(crate) struct Damping {
     part: f64,
-    /// Corrections that may still be taken though no part of them passes the test.
+    /// The number of corrections that may still be taken although they fail the test.
     chances: u32,
-    /// Whether the correction that is tried is one of these.
+    /// Whether the current correction is one of these.
     regardless: bool,
     ratio: f64,
 }
 
 impl Damping {
-    /// With the corrections that may be taken though they do not pass the test.
+    /// A new iteration, with the number of corrections that may be taken although they fail the test.
     pub fn new(chances: u32) -> Self {
         Damping { part: 1.0, chances, regardless: false, ratio: 1.0 }
     }
 
-    /// The part of the correction that is to be tried.
+    /// The damping factor of the next trial.
     pub fn part(&self) -> f64 {
         self.part
     }
 
-    /// Whether the next correction asks for a new Jacobian; else it is the one that the last trial found.
+    /// Whether the next correction needs a new Jacobian; if not, it is the one that the last trial has computed.
     pub fn renews(&self) -> bool {
         self.ratio > CONTRACTION
     }
 
-    /// The size of the next correction over that of the last, 1 where that was not taken whole.
+    /// The size of the next correction divided by that of the last; 1 if the last correction was damped.
     pub fn ratio(&self) -> f64 {
         self.ratio
     }
 
-    /// Judges a trial by the sizes of its correction and of the next; below `near` all are taken.
+    /// Decides on a trial from the sizes of its correction and of the next one; corrections below `near` are always
+    /// accepted.
     pub fn judge(&mut self, correction: f64, next: f64, near: f64) -> Verdict {
         let smaller = next <= (1.0 - GAIN * self.part) * correction;
         let regardless = (self.regardless || correction <= near) && next.is_finite();
@@ -95,8 +100,7 @@ impl Damping {
 mod tests {
     use super::*;
 
-    /// The iteration of `arctan x = 0` from where Newton's method goes to infinity, and of `x^2 + 1 = 0`, which has no root: the trials
-    /// that it takes, and where it ends.
+    /// The damped iteration for `f(x) = 0`: the number of trials, and the root if it converges.
     fn follow(f: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64, mut x: f64, chances: u32) -> (u32, Option<f64>) {
         let (mut damping, mut trials) = (Damping::new(chances), 0);
         for _ in 0..ITERATIONS {
@@ -125,7 +129,7 @@ mod tests {
         assert!(x.is_some_and(|x| x.abs() <= 1e-14) && trials <= 10, "{trials}: {x:?}");
     }
 
-    /// Without a chance and with one, and from where the function is not defined.
+    /// `x^2 + 1` has no root, and the second function is not defined at its first iterate.
     #[test]
     fn what_has_no_root_is_given_up() {
         for chances in [chances(DEAR), chances(1)] {

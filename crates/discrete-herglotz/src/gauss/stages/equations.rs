@@ -1,6 +1,6 @@
-//! The stage equations of contact Gauss collocation, with their Jacobian: for Newton's method of the general routes, and for the
-//! discrete Lagrangian. Of constant mass and constant rate [`PositionNewton`](crate::gauss::stages::position_newton::PositionNewton) has fewer
-//! unknowns.
+//! The stage equations of contact Gauss collocation and their Jacobian, for Newton's method in the general route and
+//! for the discrete Lagrangian. For constant mass and constant rate
+//! [`PositionNewton`](crate::gauss::stages::position_newton::PositionNewton) has fewer unknowns.
 
 use crate::gauss::stages::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
@@ -15,7 +15,7 @@ use contact_geom::{
 };
 use std::array::from_fn;
 
-/// The products of the coefficients with a step, which may be negative.
+/// The coefficients of the method multiplied by the step size, which may be negative.
 #[derive(Clone, Debug)]
 pub(crate) struct Products {
     pub s: usize,
@@ -33,13 +33,13 @@ impl Products {
 }
 
 impl Products {
-    /// The weight of a stage in a mean over the step.
+    /// The quadrature weight `b_j` of a stage.
     pub fn weight(&self, j: usize) -> f64 {
         self.b[j] / self.h
     }
 }
 
-/// What a step starts from.
+/// The given data of a step.
 #[derive(Clone, Copy)]
 pub(crate) enum Given<const N: usize, T> {
     /// The state `(q0, p0, z0)`.
@@ -58,7 +58,7 @@ pub(crate) struct StageUnknowns<const N: usize, T> {
 }
 
 impl<const N: usize> StageUnknowns<N, f64> {
-    /// A motion of constant velocity.
+    /// Sets the unknowns to a motion of constant velocity.
     fn make_uniform(&mut self, v: &SVector<f64, N>, p0: &SVector<f64, N>, z0: f64) {
         self.v.fill(*v);
         self.z.fill(z0);
@@ -66,8 +66,8 @@ impl<const N: usize> StageUnknowns<N, f64> {
         self.p0 = *p0;
     }
 
-    /// The largest factor over the smallest, the start's 1 included: momenta are sums of terms with all of them, divided by
-    /// one, and their round-off grows with this.
+    /// The largest integrating factor divided by the smallest, including the value 1 at the start. Momenta are sums of
+    /// terms with all factors, divided by one of them; their round-off grows with this ratio.
     fn spread(&self) -> f64 {
         let over = |f: &dyn Fn(f64) -> f64| self.rho.iter().fold(1.0, |m, r| max_or_nan(m, f(*r)));
         over(&|r| r.abs()) * over(&|r| 1.0 / r.abs())
@@ -80,7 +80,7 @@ impl<const N: usize> StageUnknowns<N, f64> {
         self.p0 = x.p0;
     }
 
-    /// The same over another scalar, without differentials.
+    /// The same unknowns as constants over another scalar type.
     pub fn lifted<T: Scalar>(&self) -> StageUnknowns<N, T> {
         StageUnknowns {
             v: self.v.iter().map(|v| v.map(T::from)).collect(),
@@ -102,16 +102,16 @@ pub(crate) struct StepEnd<const N: usize, T> {
     pub rho: T,
 }
 
-/// What Newton's method works in; made once for a run, so that no step allocates.
+/// The workspace of Newton's method; made once for a run, so that steps do not allocate.
 pub(crate) struct Workspace<const N: usize> {
     /// The guess, then the solution.
     pub x: StageUnknowns<N, f64>,
     /// L and its gradient at the stages of the solution.
     pub l: Vec<Dual<f64, ChartVector<N>>>,
-    /// The last iterate, from which the solution is tried.
+    /// The last accepted iterate.
     from: StageUnknowns<N, f64>,
     jacobian: DMatrix<f64>,
-    /// The factors of the Jacobian that an iteration uses: of its own iterate, or of one before.
+    /// The LU factors of the Jacobian in use, at the last accepted iterate or at an earlier one.
     lu: DenseLu,
     residual: DVector<f64>,
     correction: DVector<f64>,
@@ -137,13 +137,13 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         x.v.iter().zip(&self.products.a[i]).fold(*q0, |sum, (v, a)| sum + v.map(|e| e * *a))
     }
 
-    /// L and its gradient at the stages.
+    /// Evaluates L and its gradient at the stages.
     fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<Dual<T, ChartVector<N, T>>>) {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
             let t = T::from(self.t + self.products.c[i]);
-            // The numbers of many directions would not fit on the stack.
+            // Dual numbers with many directions would not fit on the stack.
             if const { N > BLOCK } {
                 let (re, d) = self.lagrangian.with_gradient(t, &y);
                 return Dual { re, d };
@@ -152,7 +152,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }));
     }
 
-    /// The workspace for steps of this kind.
+    /// The workspace for steps with this kind of given data.
     pub fn workspace(&self, given: &Given<N, f64>) -> Workspace<N> {
         let (s, n) = (self.products.s, self.unknowns(given));
         let x =
@@ -170,7 +170,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The residuals: of the momenta, then of the actions, the factors, and the end position.
+    /// The residuals, in the order: momenta, actions, integrating factors, end position.
     pub fn residual<T: Scalar>(
         &self,
         given: &Given<N, T>,
@@ -207,7 +207,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The derivatives of the residuals.
+    /// The Jacobian of the residuals.
     pub fn jacobian(
         &self,
         given: &Given<N, f64>,
@@ -224,7 +224,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g) = (x.rho[k], &l[k].d);
             let weights: [f64; MAX_STAGES] = from_fn(|i| a[i][k]);
-            // What stage k adds to the equations of stage i, through its own velocity, action and factor.
+            // The contribution of stage k to the equations of stage i through its velocity, action and factor.
             for i in 0..s {
                 let (own, w) = (if i == k { 1.0 } else { 0.0 }, a[i][k]);
                 for d in 0..N {
@@ -240,7 +240,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 out[(row_r + i, row_z + k)] += w * rho * zz;
                 out[(row_r + i, row_r + k)] += own + w * g.z;
             }
-            // And through its position, which the velocities of all stages move.
+            // Its contribution through its position, which depends on the velocities of all stages.
             let n = out.nrows();
             for (j, &moved) in a[k][..s].iter().enumerate() {
                 for e in 0..N {
@@ -275,7 +275,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// Adds a part of a correction to the unknowns.
+    /// Subtracts `part` times a Newton correction from the unknowns.
     fn add<T: Scalar>(&self, x: &mut StageUnknowns<N, T>, change: &DVector<T>, part: f64) {
         let s = self.products.s;
         for i in 0..s {
@@ -290,8 +290,9 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The size of a correction: the largest, each in units of the largest of its kind. The momenta `L_v` of the stages are of the kind of
-    /// that of the start, which vanishes where a motion starts at rest.
+    /// The size of a correction: the largest component, each kind relative to the largest unknown of that kind. The
+    /// momentum at the start is compared with the momenta `L_v` of the stages too, since it vanishes if the motion
+    /// starts at rest.
     fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[Dual<T, ChartVector<N, T>>], change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
@@ -313,8 +314,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         worst
     }
 
-    /// Solves the stage equations by Newton's method from a motion of constant velocity `v`, with the momentum `p0`. Returns
-    /// the iterations.
+    /// Solves the stage equations by damped Newton iteration from a motion of constant velocity `v`, with the momentum
+    /// `p0`. Returns the number of iterations.
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
@@ -352,14 +353,14 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 next.copy_from(residual);
                 let after = if lu.solve(next.as_mut_slice()).is_ok() { self.size(x, l, next) } else { f64::NAN };
                 change = self.size(x, l, correction);
-                // With half of the digits there is no need of damping.
+                // No damping once half of the digits are correct.
                 match damping.judge(change, after, f64::EPSILON.sqrt()) {
                     Verdict::Taken => break after,
                     Verdict::Again => {}
                     Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
                 }
             };
-            // With half of the digits at the least. The round-off of a solution grows with the number of unknowns.
+            // The round-off of a solution, which grows with the number of unknowns; at most half of the digits.
             let round_off = f64::EPSILON * max_or_nan(1e3, 8.0 * residual.len() as f64);
             let near = (round_off * x.spread()).min(f64::EPSILON.sqrt());
             if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
@@ -375,7 +376,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         Err(StepError::NotConverged { residual: change, iterations: ITERATIONS })
     }
 
-    /// The end of the step whose stages are solved, from L and its gradient there.
+    /// The end of a solved step, from L and its gradient at the stages.
     pub fn end<T: Scalar>(
         &self,
         given: &Given<N, T>,
@@ -398,8 +399,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The end of the step over a scalar with differentials, from the solution without: each correction by the inverse Jacobian
-    /// settles one more order of derivatives.
+    /// The end of the step over a scalar with derivatives, from the solution over `f64`: each correction by the inverse
+    /// Jacobian determines one more order of derivatives.
     ///
     /// # Errors
     /// [`StepError::Singular`], [`StepError::NotConverged`].
@@ -423,7 +424,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             }
             self.add(&mut x, &change, 1.0);
             let size = self.size(&x, &l, &change);
-            // The iteration ends in finitely many steps but for round-off.
+            // Apart from round-off the iteration is finite.
             if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
                 self.stages(given, &x, &mut l);
                 return Ok(self.end(given, &x, &l));

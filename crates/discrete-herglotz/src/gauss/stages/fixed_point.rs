@@ -1,23 +1,23 @@
-//! When an iteration of the stages ends.
+//! Convergence test of the iterations for the stages.
 
 use crate::StepError;
 
-/// What is to be done after a sweep.
+/// The outcome of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum IterationOutcome {
-    /// Another sweep.
+    /// Another iteration is needed.
     Continue,
     /// The stages are solved to round-off.
     Done,
-    /// The iteration does not contract: the largest change of the last sweep, relative to the terms.
+    /// The iteration does not converge; the largest change of the last iteration, relative to the terms.
     Slow { change: f64, sweeps: u32 },
     /// A value is not finite.
     NonFinite,
     /// The integrating factor of a stage is not positive.
     StageFactor { rho: f64 },
-    /// The Lagrangian branches on a value of its own, other than lane by lane.
+    /// The Lagrangian branches on one value where the SIMD lanes differ.
     Branched,
-    /// The step is not conformally contact.
+    /// The conformal factor of the step is not positive.
     SigmaVanished { sigma: f64 },
 }
 
@@ -35,48 +35,49 @@ impl From<IterationOutcome> for StepError {
     }
 }
 
-/// The sweeps after which an iteration counts as not contracting.
+/// The number of iterations after which the iteration counts as not converging.
 const LIMIT: u32 = 60;
 
-/// The largest relative change of a sweep after which the last two values of a force tell its slope.
+/// The largest relative change for which the last two values of a force determine its slope.
 const TELLING: f64 = 0.1;
 
-/// The sweeps of Newton's method above which its Jacobian is taken anew: three times the usual number.
+/// The number of simplified Newton iterations above which the Jacobian is recomputed: three times the usual number.
 pub(crate) const SLOW: u32 = 18;
 
-/// The steps that a Jacobian serves at the least, unless one is refused: second derivatives by dual numbers cost as much as ten
-/// steps.
+/// The smallest number of steps for which a Jacobian is kept, unless a step fails: second derivatives by dual numbers
+/// cost as much as ten steps.
 pub(crate) const AGE: u32 = 16;
 
-/// The changes of the sweeps of one step.
+/// The convergence test of a fixed-point iteration or simplified Newton iteration in one step.
 ///
-/// The iteration ends when the next change, predicted from the last two, is a small part of the round-off of the terms, or when
-/// changes near round-off, or that move nothing, no longer fall. It is given up when larger changes have not fallen three times, or
-/// at the limit: so it neither stalls nor loops.
+/// The iteration ends when the next change, predicted from the last two, is a small fraction of the round-off of the
+/// terms, or when changes near round-off, or changes that do not move the positions, no longer decrease. It fails when
+/// larger changes have failed to decrease more than three times, or at the limit on the number of iterations.
 #[derive(Default)]
 pub(crate) struct FixedPointIteration {
     enough: f64,
     left: f64,
     count: u32,
-    /// The change of the first sweep, and the largest term in it.
+    /// The change of the first iteration, and its largest term.
     first: (f64, f64),
     before: f64,
     ratio: f64,
-    /// Whether a sweep ahead, without forces, lies between the last change and the next, and whether one is to follow the last.
+    /// Whether a secant step, without evaluations of the force, lies between the last change and the next, and whether
+    /// one is to follow the last iteration.
     ahead: bool,
     ends_ahead: bool,
     risen: u32,
-    /// Whether the last sweep has not moved the positions but for their round-off: where forces are stiff that alone changes
-    /// the accelerations by more than theirs.
+    /// Whether the last iteration has moved the positions by no more than their round-off. For stiff forces this
+    /// changes the accelerations by more than the round-off of the accelerations.
     pub still: bool,
-    /// Whether this sweep is the last: its change is round-off.
+    /// Whether this iteration is expected to be the last: its predicted change is round-off.
     last: bool,
 }
 
 impl FixedPointIteration {
-    /// An iteration that ends with a change of so many times the round-off of its terms, or when the next one is expected to be so small
-    /// as what may be left. What is left has the same direction in every step, and so it adds up like the number of steps, where
-    /// round-off adds up like its root.
+    /// An iteration that ends when a change is at most `enough` times the round-off of the terms, or when the next
+    /// change is predicted to be at most `left` times it. The remaining error has the same direction in every step and
+    /// accumulates in proportion to the number of steps, whereas round-off accumulates like its square root.
     pub fn until(enough: f64, left: f64) -> Self {
         FixedPointIteration { enough, left, ..FixedPointIteration::default() }
     }
@@ -85,29 +86,29 @@ impl FixedPointIteration {
         self.count
     }
 
-    /// The change of the first sweep relative to the largest term: how far what the last step foretold was off.
+    /// The change of the first iteration relative to the largest term: the relative error of the predictor.
     pub fn first(&self) -> f64 {
         self.first.0 / self.first.1
     }
 
-    /// The change of the first sweep.
+    /// The change of the first iteration.
     pub fn first_change(&self) -> f64 {
         self.first.0
     }
 
-    /// Whether a sweep ahead is worth it after this change, relative to the terms: the changes fall, and they are small enough to tell the
-    /// slope of a force. Then it is taken.
+    /// Whether a secant step follows this change, given relative to the terms: if the changes decrease, and are small
+    /// enough to determine the slope of the force. The caller must then take it.
     pub fn secant_step(&mut self, change: f64) -> bool {
         self.ahead = self.count > 1 && self.ratio < 0.5 && change <= TELLING;
         self.ahead
     }
 
-    /// Whether what is left is small after one more sweep ahead, as there was one before each of the last sweeps.
+    /// Whether the iteration ends with one more secant step: its end was predicted from a change that followed one.
     pub fn ends_ahead(&self) -> bool {
         self.ends_ahead
     }
 
-    /// Judges a sweep by its largest change and the largest term.
+    /// Evaluates an iteration by its largest change and the largest term.
     #[inline(always)]
     pub fn judge(&mut self, change: f64, size: f64) -> IterationOutcome {
         self.count += 1;
@@ -126,7 +127,7 @@ impl FixedPointIteration {
         if self.count == 1 {
             self.first = (change, size);
         } else {
-            // The slower of the last two contractions: the first is often that of components which die out at once.
+            // The larger of the last two contraction factors: the first is often that of components that decay at once.
             let ratio = change / self.before;
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;

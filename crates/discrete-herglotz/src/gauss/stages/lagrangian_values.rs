@@ -16,7 +16,7 @@ pub(crate) struct StageValues<'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
-    /// At all s stages.
+    /// The values at all s stages.
     #[inline(always)]
     pub fn all<S: Simd>(&self, s: usize) -> Stages {
         let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(s));
@@ -26,7 +26,7 @@ impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
         values
     }
 
-    /// At the blocks of stages that T holds, from the r-th on.
+    /// Evaluates the blocks of stages that T holds, from the r-th on; returns the index of the next block.
     #[inline(always)]
     fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {
         let (q, v) = (vector(|d| T::of(&self.x[d], r)), vector(|d| T::of(&self.v[d], r)));

@@ -12,14 +12,14 @@ use pulp::Simd;
 
 /// How velocities are found from momenta.
 pub(crate) enum Mass<const N: usize> {
-    /// `W^-1`, the same everywhere.
+    /// `W^-1` if it is constant.
     Constant(Box<SMatrix<f64, N, N>>),
-    /// `W^-1` at the stages, by rows, taken anew in each step.
+    /// `W^-1` at the stages, by rows, recomputed in each step.
     Stages(Box<[[Stages; N]]>),
 }
 
 impl<const N: usize> Mass<N> {
-    /// From `W^-1` at the start.
+    /// Uses `W^-1` at the start of the run if it is constant.
     pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
         if structure.constant_mass || structure.separable {
             Mass::Constant(inverse)
@@ -28,7 +28,7 @@ impl<const N: usize> Mass<N> {
         }
     }
 
-    /// Takes `W^-1` at a block of stages; `false` where W is singular there.
+    /// Computes `W^-1` at a block of stages; `false` if W is singular there.
     #[inline(always)]
     pub fn invert<S: Simd>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
         let Mass::Stages(stored) = self else { return true };
@@ -44,7 +44,7 @@ impl<const N: usize> Mass<N> {
         true
     }
 
-    /// Keeps `W^-1` of a stage, and of those beyond it.
+    /// Stores `W^-1` of a stage, and repeats it for all following stages.
     pub fn keep(&mut self, stage: usize, inverse: &SMatrix<f64, N, N>) {
         let Mass::Stages(stored) = self else { return };
         for (i, row) in stored.iter_mut().enumerate() {
@@ -64,7 +64,7 @@ impl<const N: usize> Mass<N> {
     }
 }
 
-/// A constant one is not saved; that of the stages belongs to the last step.
+/// A constant `W^-1` is not saved; that at the stages is part of the last step.
 impl<const N: usize> Saved for Mass<N> {
     fn save(&self, to: &mut Vec<u64>) {
         if let Mass::Stages(rows) = self {

@@ -1,4 +1,5 @@
-//! The stages of a collocation step: their values in vector registers, their equations, and the iterations that solve these.
+//! The stages of a collocation step: their values in SIMD registers, their equations, and the iterations that solve
+//! them.
 
 pub(crate) mod damping;
 pub(crate) mod equations;

@@ -1,4 +1,4 @@
-//! The times that the general step can be taken in.
+//! The independent variable of the general step: physical or transformed time.
 
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::registers::Stages;
@@ -6,15 +6,15 @@ use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Scalar, TimeTransformation};
 
-/// The time that steps are equal in.
+/// The independent variable in which the steps are equal.
 pub(crate) trait Parametrization<const N: usize> {
-    /// Whether it is t itself: nothing is computed for it then.
+    /// Whether it is the physical time t; the computation of rates is then omitted.
     const PHYSICAL: bool;
     /// The rate `g = dt/dtau`.
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T;
 }
 
-/// The time t.
+/// The physical time t.
 pub(crate) struct Physical;
 
 impl<const N: usize> Parametrization<N> for Physical {
@@ -25,7 +25,7 @@ impl<const N: usize> Parametrization<N> for Physical {
     }
 }
 
-/// The time of a time transformation.
+/// The transformed time tau of a time transformation.
 pub(crate) struct Fictitious<C>(pub C);
 
 impl<const N: usize, C: TimeTransformation<N>> Parametrization<N> for Fictitious<C> {
@@ -36,11 +36,11 @@ impl<const N: usize, C: TimeTransformation<N>> Parametrization<N> for Fictitious
     }
 }
 
-/// What a transformed time adds to a step.
+/// The additional variables of a step in transformed time.
 pub(crate) struct Extension<P> {
     pub transformation: P,
     pub t: CompensatedSum,
-    /// The momentum of t.
+    /// The momentum conjugate to t.
     pub p_t: CompensatedSum,
     /// The rates g of the stages.
     pub g: Stages,
@@ -52,7 +52,7 @@ impl<P> Extension<P> {
     }
 }
 
-/// The state with what is carried of it.
+/// The state with the compensation terms of its sums.
 #[derive(Clone, Copy)]
 pub(crate) struct Values<const N: usize> {
     pub q: [CompensatedSum; N],

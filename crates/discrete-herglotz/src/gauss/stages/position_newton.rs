@@ -1,4 +1,5 @@
-//! Newton's method for the stages of a condensed step: in their positions alone, with the true slope of the force at each.
+//! Newton's method for the stages of a condensed step: the unknowns are the stage positions, and the Jacobian has the
+//! derivative of the force at each stage.
 
 use crate::StepError;
 use crate::gauss::stages::damping::{Damping, ITERATIONS, Verdict, chances};
@@ -8,15 +9,15 @@ use crate::solve::mass_matrix::BLOCK;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::KernelDual};
 
-/// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, of which a correction is
-/// `(1 - B a')^-1` times the residual. Made once for a run, so that no step allocates.
+/// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, with
+/// the Newton correction `(1 - B a')^-1` times the residual. Made once for a run, so that steps do not allocate.
 pub(crate) struct PositionNewton<const N: usize> {
     /// `q0 + u v0`.
     base: Vec<SVector<f64, N>>,
-    /// The positions of the last iterate, and of the one that is tried.
+    /// The positions of the last accepted iterate and of the trial.
     x: Vec<SVector<f64, N>>,
     trial: Vec<SVector<f64, N>>,
-    /// The accelerations at those that are tried, and the time of the step for which they are a solution.
+    /// The accelerations at the trial positions, and the start time of the last step that was solved.
     a: Vec<SVector<f64, N>>,
     solved: f64,
     /// `a'` at the stages.
@@ -27,7 +28,7 @@ pub(crate) struct PositionNewton<const N: usize> {
     next: Vec<f64>,
 }
 
-/// Of a step: its system and its start.
+/// The system and the start of a step.
 pub(crate) struct At<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub table: &'a Condensed,
@@ -38,8 +39,8 @@ pub(crate) struct At<'a, L, const N: usize> {
     pub v: SVector<f64, N>,
 }
 
-/// `L_qq` at a time and a position, where L is separable: without the directions of velocity and action, at a fraction of the price of
-/// all second derivatives, and of their room.
+/// `L_qq` at a time and a position, for separable L. Only the derivatives in q are computed, at a fraction of the cost
+/// and of the memory of all second derivatives.
 #[inline(never)]
 pub(crate) fn curvature<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
@@ -53,7 +54,7 @@ pub(crate) fn curvature<const N: usize>(
     }
 }
 
-/// The same by as many directions at once.
+/// `L_qq` by dual numbers with B directions at once.
 #[inline(always)]
 fn by_directions<const N: usize, const B: usize>(
     lagrangian: &impl Lagrangian<N>,
@@ -80,7 +81,7 @@ fn by_directions<const N: usize, const B: usize>(
 }
 
 impl<const N: usize> PositionNewton<N> {
-    /// For steps of `s` stages.
+    /// The workspace for steps of `s` stages.
     pub fn new(s: usize) -> Self {
         let (points, numbers) = (vec![SVector::zeros(); s], vec![0.0; s * N]);
         PositionNewton {
@@ -97,13 +98,13 @@ impl<const N: usize> PositionNewton<N> {
         }
     }
 
-    /// The accelerations and the positions of the stages that are solved.
+    /// The accelerations and the positions of the solved stages.
     pub fn stages(&self) -> impl Iterator<Item = (&SVector<f64, N>, &SVector<f64, N>)> {
         self.a.iter().zip(&self.trial)
     }
 
-    /// Solves the stages; returns the iterations. It starts from the forces of the step before, if that was solved here, and then from
-    /// a motion without any.
+    /// Solves the stage equations; returns the number of iterations. The initial guess uses the forces of the step
+    /// before if that was solved here; if this fails, or without such a step, it is a motion without forces.
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
@@ -130,7 +131,7 @@ impl<const N: usize> PositionNewton<N> {
         outcome
     }
 
-    /// Newton's method from the positions of `x`.
+    /// Damped Newton iteration from the positions `x`.
     fn iterate<L: Lagrangian<N>>(&mut self, at: &At<L, N>, chances: u32) -> Result<u32, StepError> {
         self.trial.copy_from_slice(&self.x);
         self.evaluate(at);
@@ -158,7 +159,7 @@ impl<const N: usize> PositionNewton<N> {
                 self.evaluate(at);
                 self.next.copy_from_slice(&self.residual);
                 let next = if self.lu.solve(&mut self.next).is_ok() { extent(&self.next) } else { f64::NAN };
-                // With half of the digits there is no need of damping.
+                // No damping once half of the digits are correct.
                 match damping.judge(correction, next, f64::EPSILON.sqrt() * position) {
                     Verdict::Taken => break next,
                     Verdict::Again => {}
@@ -181,7 +182,7 @@ impl<const N: usize> PositionNewton<N> {
         Err(StepError::NotConverged { residual: change, iterations: ITERATIONS })
     }
 
-    /// The accelerations at the positions that are tried, and what these then lack.
+    /// Evaluates the accelerations and the residual at the trial positions.
     fn evaluate<L: Lagrangian<N>>(&mut self, at: &At<L, N>) {
         for (i, (a, q)) in self.a.iter_mut().zip(&self.trial).enumerate() {
             let (t, x) = (at.t + at.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 });
@@ -211,7 +212,7 @@ impl<const N: usize> PositionNewton<N> {
         })
     }
 
-    /// The largest coordinate of the last iterate, and the largest distance from the start along one.
+    /// The largest coordinate of the trial positions, and the largest component of their distance from the start.
     fn extents(&self, start: &SVector<f64, N>) -> (f64, f64) {
         let of = |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| {
             max_abs_or_nan(self.trial.iter().map(|x| max_abs_or_nan(f(x).iter().copied())))
@@ -220,7 +221,7 @@ impl<const N: usize> PositionNewton<N> {
     }
 }
 
-/// The largest component.
+/// The largest absolute component.
 fn extent(x: &[f64]) -> f64 {
     max_abs_or_nan(x.iter().copied())
 }
@@ -253,8 +254,9 @@ mod tests {
         }
     }
 
-    /// In positions alone the same stages are found as in velocities, actions and factors: to 64 roundings of the largest position
-    /// or force, over the condition of the two systems, which is below 10 at these steps; longer ones have several solutions.
+    /// The stages found from the positions alone are those found from velocities, actions and factors: to 64 units of
+    /// round-off of the largest position or force, times the condition of the two systems, which is below 10 for these
+    /// steps. Longer steps have several solutions.
     #[test]
     fn the_stages_are_those_of_all_equations() {
         let mass: SMatrix<f64, 2, 2> = SMatrix::from(Coupled::MASS);
@@ -282,7 +284,7 @@ mod tests {
         }
     }
 
-    /// A hill that grows like a third power, with a count of the evaluations of L: from a step on there are no stages.
+    /// A cubic potential, with a count of the evaluations of L: for long steps the stage equations have no solution.
     struct Hill {
         count: AtomicUsize,
         claims: Structure,
@@ -298,8 +300,8 @@ mod tests {
         }
     }
 
-    /// A step that has no solution is given up after some 20 iterations' worth of evaluations of forces and second derivatives, by
-    /// both ways to the stages; going through 50 iterations they were 100 at each stage.
+    /// A step without a solution fails after at most 60 evaluations of forces and second derivatives per stage, about
+    /// 20 iterations, by both forms of the stage equations; 50 iterations took 100.
     #[test]
     fn a_step_without_a_solution_is_given_up_early() {
         let condensed = Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() };
@@ -322,7 +324,7 @@ mod tests {
         }
     }
 
-    /// The same in a run, which says why, and keeps the state before.
+    /// A run reports the failure of such a step and keeps the state before it.
     #[test]
     fn a_run_ends_before_the_step_that_has_no_solution() {
         for claims in [

@@ -1,7 +1,7 @@
-//! Simplified Newton iteration of the stage equations: the Jacobian is taken at one point for all stages, so that it falls apart
-//! into one small complex matrix for each mode of the collocation.
+//! Simplified Newton iteration for the stage equations: the derivatives of L are taken at one point for all stages, so
+//! that the Jacobian decouples into one small complex matrix for each eigenvalue of the Butcher matrix.
 //!
-//! It turns a sweep that does not contract into one that does, at about twice its price.
+//! It converges for stiff forces, where fixed-point iteration does not, at about twice the cost of an iteration.
 
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
@@ -22,18 +22,18 @@ use pulp::{Simd, WithSimd};
 type Matrix<const N: usize> = SMatrix<Complex<f64>, N, N>;
 type Vector<const N: usize> = SVector<Complex<f64>, N>;
 
-/// For the accelerations of [`Condensed`] stages, `a = f(q0 + u v0 + B a)`: with `J = f'` at one point a sweep's change `r` of the
-/// accelerations becomes `(1 - B (x) J)^-1 r`, where `(hA)^2 / (1 - gamma hA)` stands for B, which it is but for the error of the
-/// collocation.
+/// Simplified Newton iteration for the accelerations of [`Condensed`] stages, `a = f(q0 + u v0 + B a)`. With `J = f'`
+/// at one point, the change `r` of the accelerations in a fixed-point iteration becomes `(1 - B (x) J)^-1 r`. Here B is
+/// replaced by `(hA)^2 / (1 - gamma hA)`, which agrees with it up to the error of the collocation.
 pub(crate) struct SlopeNewton<const N: usize> {
     modes: &'static Modes,
     s: usize,
-    /// h and gamma.
+    /// The step size h and the rate gamma.
     h: f64,
     gamma: f64,
-    /// `(1 - b J)^-1` with the eigenvalue b of B, and that.
+    /// `(1 - b J)^-1` for each eigenvalue b of B, together with b.
     inverses: Vec<(Matrix<N>, Complex<f64>)>,
-    /// The accelerations that the next sweep starts from.
+    /// The accelerations from which the next iteration starts.
     pub a: [Stages; N],
 }
 
@@ -44,12 +44,12 @@ impl<const N: usize> SlopeNewton<N> {
         SlopeNewton { modes, s: table.s, h: table.h, gamma: table.gamma, inverses, a: [Stages::ZERO; N] }
     }
 
-    /// Takes another J; `false` where a mode's matrix is singular.
+    /// Inverts the matrices of the modes for a new J; `false` if one of them is singular.
     pub fn factorise(&mut self, slope: &SMatrix<f64, N, N>) -> bool {
         self.modes.iter().zip(&mut self.inverses).all(|(mode, (inverse, b))| {
             let mu = mode.value * self.h;
             *b = mu * mu / (-mu * self.gamma + 1.0);
-            // In place, for the sake of the stack.
+            // In place, to save stack space.
             for j in 0..N {
                 for i in 0..N {
                     inverse[(i, j)] = Complex::from(if i == j { 1.0 } else { 0.0 }) - *b * slope[(i, j)];
@@ -59,14 +59,14 @@ impl<const N: usize> SlopeNewton<N> {
         })
     }
 
-    /// Corrects the accelerations that a sweep has found from `self.a`; returns the largest change, and the largest of the
-    /// positions.
+    /// Corrects the accelerations `found` that a fixed-point iteration gives for `self.a`; returns the largest change
+    /// of the accelerations, and that of the positions.
     pub fn correct(&mut self, arch: Instructions, found: &mut [Stages; N]) -> (f64, f64) {
         arch.dispatch(CorrectSlope { newton: self, found })
     }
 }
 
-/// By itself, so that it is compiled once for all Lagrangians.
+/// The kernel of [`SlopeNewton::correct`]; it does not depend on the Lagrangian, so that it is compiled once.
 struct CorrectSlope<'a, const N: usize> {
     newton: &'a mut SlopeNewton<N>,
     found: &'a mut [Stages; N],
@@ -113,8 +113,9 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
     }
 }
 
-/// For the velocities V, actions Z and integrating factors rho of the stages of the general step. With `mu` an eigenvalue of hA and
-/// the derivatives of L at one point, where rho = 1, a mode's equations are
+/// Simplified Newton iteration for the velocities V, actions Z and integrating factors rho of the stages of the general
+/// step. With an eigenvalue `mu` of hA, and the derivatives of L at one point, where rho = 1, the equations of a mode
+/// are
 ///
 /// `(W + mu (L_vq - L_qv) - mu^2 L_qq) dV + (L_vz - mu L_qz) dZ + (L_v - mu L_q) drho = r_V`,
 /// `dZ - mu ((L_v + mu L_q) dV + L_z dZ) = r_Z`, `drho + mu ((L_vz + mu L_qz) dV + L_zz dZ + L_z drho) = r_rho`.
@@ -124,7 +125,7 @@ pub(crate) struct StageNewton<const N: usize> {
     blocks: Vec<Block<N>>,
 }
 
-/// The equations of one mode, with dZ and drho eliminated.
+/// The linear equations of one mode, with dZ and drho eliminated.
 struct Block<const N: usize> {
     inverse: Matrix<N>,
     /// `dZ = z (r_Z + z_v dV)`, `drho = rho (r_rho - rho_v dV - rho_z dZ)`.
@@ -133,13 +134,13 @@ struct Block<const N: usize> {
     rho: Complex<f64>,
     rho_v: Vector<N>,
     rho_z: Complex<f64>,
-    /// The columns of dZ and drho in the first equation.
+    /// The coefficients of dZ and drho in the first equation.
     of_z: Vector<N>,
     of_rho: Vector<N>,
 }
 
 impl<const N: usize> Block<N> {
-    /// `None` where it is singular.
+    /// `None` if the matrix is singular.
     fn new(mu: Complex<f64>, g: &ChartVector<N>, hessian: &Hessian<N>) -> Option<Self> {
         let Hessian { qq, qv, vv, qz, vz, zz } = hessian;
         let with = |at: &SVector<f64, N>, slope: &SVector<f64, N>, factor: Complex<f64>| {
@@ -149,7 +150,7 @@ impl<const N: usize> Block<N> {
         let (z_v, rho_v) = (with(&g.y, &g.x, mu) * mu, with(vz, qz, mu) * mu);
         let (of_z, of_rho, rho_z) = (with(vz, qz, -mu), with(&g.y, &g.x, -mu), mu * *zz);
         let (z_of_v, rho_of_v) = (z_v * z, (rho_v + z_v * (rho_z * z)) * rho);
-        // Entry by entry, for the sake of the stack.
+        // Entry by entry, to save stack space.
         let mut inverse = Matrix::<N>::from_fn(|d, e| {
             let own = mu * (qv[(e, d)] - qv[(d, e)]) - mu * mu * qq[(d, e)] + vv[(d, e)];
             own + of_z[d] * z_of_v[e] - of_rho[d] * rho_of_v[e]
@@ -174,7 +175,7 @@ impl<const N: usize> StageNewton<N> {
         StageNewton { modes, h: table.h, blocks: Vec::with_capacity(modes.iter().count()) }
     }
 
-    /// Takes the derivatives at another point; `false` where a mode's matrix is singular.
+    /// Factorises the equations of the modes with new derivatives of L; `false` if one of the matrices is singular.
     pub fn factorise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
         self.blocks.clear();
         for mode in self.modes.iter() {
@@ -186,7 +187,7 @@ impl<const N: usize> StageNewton<N> {
         true
     }
 
-    /// From the residuals of the stages to their corrections.
+    /// Replaces the residuals of the stages by their corrections.
     #[inline(always)]
     fn solve<S: Simd>(&self, v: &mut [Stages; N], z: &mut Stages, rho: &mut Stages) {
         for x in v.iter_mut().chain([&mut *z, &mut *rho]) {
@@ -207,14 +208,14 @@ impl<const N: usize> StageNewton<N> {
     }
 }
 
-/// A sweep of Newton's method: the start of a step, what L gave at its stages, and the stages. By itself, so that it is compiled
-/// once for all Lagrangians.
+/// One simplified Newton iteration of the general step, from the start of the step, L and its gradient at the stages,
+/// and the stages. It does not depend on the type of the Lagrangian, so that it is compiled once.
 pub(crate) struct CorrectStages<'a, const N: usize> {
     pub newton: &'a StageNewton<N>,
     pub table: &'a StageTable,
     pub start: ([f64; N], [f64; N], f64),
     pub l_v: &'a [Stages; N],
-    /// With the weights `h b`.
+    /// L, force and rate are multiplied by the weights `h b`.
     pub l: &'a Stages,
     pub force: &'a [Stages; N],
     pub rate: &'a Stages,
@@ -222,13 +223,14 @@ pub(crate) struct CorrectStages<'a, const N: usize> {
     pub z: &'a mut Stages,
     /// `1 - rho`.
     pub one_minus_rho_stages: &'a mut Stages,
-    /// The velocities with the weights, and the positions.
+    /// The velocities multiplied by the weights, and the positions.
     pub moved: &'a mut [Stages; N],
     pub x: &'a mut [Stages; N],
 }
 
 impl<const N: usize> WithSimd for CorrectStages<'_, N> {
-    /// The largest change, each in units of the largest of its kind; and that of the positions.
+    /// The largest relative change of velocities, actions and factors, each kind relative to its largest value; and the
+    /// largest relative change of the positions.
     type Output = (f64, f64);
 
     #[inline(always)]
@@ -304,7 +306,7 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
     }
 }
 
-/// Inverts a matrix in place; `false` where it is singular or not finite. A large one on the heap.
+/// Inverts a matrix in place; `false` if it is singular or not finite. Uses the heap for more than eight rows.
 fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     if !m.iter().all(|e| e.is_finite()) {
         return false;

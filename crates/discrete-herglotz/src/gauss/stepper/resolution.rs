@@ -1,4 +1,4 @@
-//! What the steps of a run say of themselves: whether they resolve the motion.
+//! Whether the steps of a run resolve the motion.
 
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample, SAMPLE_SETS};
 use crate::gauss::resolution::sequence::FEW_STAGES;
@@ -16,12 +16,13 @@ use contact_geom::{
 };
 use pulp::{Simd, WithSimd};
 
-/// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
-/// error of its own of 0.01 to 0.1.
+/// The defect between the nodes above which a step of at least three stages does not resolve the motion: for harmonic
+/// motions the error of such a step is then 0.01 to 0.1.
 const UNRESOLVED: f64 = 0.1;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
-    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
+    /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if there is
+    /// no solved step.
     pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
         let curve = self.arch.dispatch(LookAtStages { run: self })?;
         let at = |set| {
@@ -30,8 +31,9 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         (0..sets).map(at).reduce(DefectSample::and)
     }
 
-    /// Follows the mean velocities of steps; those of few stages tell whether they resolve the motion, of others the sharpest turns are
-    /// doubts.
+    /// Updates the sequence of mean velocities after a step. For few stages a defect of the sequence above one flags a
+    /// step as unresolved; a second difference of the velocities that is larger than all before is recorded as a
+    /// suspect interval.
     #[inline(never)]
     pub(crate) fn follow(&mut self) {
         let (end, h) = (self.values(), self.h);
@@ -43,7 +45,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         velocities.rotate_left(1);
         velocities[3] = latest;
         *before = q;
-        // Before the first step velocities changed as they do in the second, for all that is known.
+        // The velocities before the first step are extrapolated linearly from those of the first two steps.
         match self.k {
             0 => velocities.fill(latest),
             1 => velocities[1] = velocities[2] * 2.0 - latest,
@@ -53,7 +55,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
         let few = self.s <= FEW_STAGES;
         if few && let Some(defect) = defect([a, b, c, d], &q, h, self.watch.floor) {
-            // Like those of a rule, seen one step late.
+            // As for quadrature rules, the defect becomes known one step later.
             self.watch.note(self.k.saturating_sub(1), defect);
         }
         if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
@@ -63,18 +65,19 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
     }
 
-    /// The first step that was seen not to resolve the motion, or what a look at the last one shows.
+    /// The first step that was flagged as unresolved; if there is none, the last step if its defect sample is too
+    /// large.
     pub(crate) fn mark(&self) -> Option<UnresolvedStep> {
         if self.of_sigma > 1.0 && self.k > 0 {
             return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
         }
         self.watch.first.or_else(|| {
-            // A linear motion that is not resolved is so in every step, and none was looked at on the way.
+            // A linear motion that is not resolved is unresolved in every step; no step was sampled during the run.
             let sets = if let Route::Linear(..) = &*self.route { SAMPLE_SETS } else { 1 };
             let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
-            // A step of fewer stages is no polynomial between its nodes to speak of.
+            // For fewer stages the defect between the nodes is large even in resolved steps.
             let allowed = if self.s > FEW_STAGES { UNRESOLVED } else { 1.0 };
-            // A NaN is a misfit too.
+            // Written so that a NaN counts as a defect.
             if defect <= allowed {
                 return None;
             }
@@ -86,7 +89,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         })
     }
 
-    /// Whether the step that ends at a time has only the rounding of its forces left, and moves by no more than that.
+    /// Whether the system is at rest at the end of a step: the velocity times h is below the round-off of the
+    /// positions, and the force is its own round-off.
     #[cold]
     #[inline(never)]
     pub(crate) fn is_at_rest(&self, t: f64) -> bool {
@@ -97,8 +101,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             && size(&(force.x + state.p * force.z)) <= ROUNDINGS * size(&rounding.x)
     }
 
-    /// What of the misfits of momenta and of the action in the last step is rounding: that of the forces and of L there, which is all that is
-    /// left of a motion at rest.
+    /// Bounds on the round-off in the defects of the momenta and of the action in the last step, from the round-off of
+    /// the forces and of L. For a motion at rest the defects consist of it.
     #[cold]
     #[inline(never)]
     fn rounding(&self) -> [f64; 2] {
@@ -106,16 +110,17 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let near = self.last_velocity().unwrap_or_else(SVector::zeros);
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
-        // The stages of the integrating factor carry roundings the further, the more it changes in the step.
+        // The stages of the integrating factor amplify round-off the more, the more the factor changes in the step.
         let (of, h) = (|part: &SVector<f64, N>| max_abs_or_nan(part.iter().copied()), self.h.abs());
         let carried = ROUNDINGS * (1.0 + self.sigma().ln().abs());
-        // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
+        // Zero where the bound is not finite. Subnormal numbers have lost digits, which the smallest normal number
+        // bounds.
         [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
             .map(|once| if (carried * once).is_finite() { carried * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }
 
-/// The stages of the last step, for a look between them.
+/// Collects the stages of the last step as a [`Curve`] for defect samples.
 struct LookAtStages<'b, 'a, L, const N: usize> {
     run: &'b GaussStepper<'a, L, N>,
 }

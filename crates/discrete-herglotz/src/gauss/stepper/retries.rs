@@ -1,26 +1,26 @@
-//! What is tried on a step that the sweeps do not solve.
+//! Fallbacks for a step in which the fixed-point iteration does not converge.
 
 use super::{GaussStepper, Route, Solution};
 use crate::gauss::stages::equations::{Given, Products, StageEquations, Workspace};
 use crate::{StepError, Stepper, theory::legendre_inverse};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
-/// What has been tried on a step.
+/// The methods that have been tried on a step.
 #[derive(Default)]
 pub(crate) struct Tried {
-    /// Simplified Newton iteration with the Jacobian at its start.
+    /// Simplified Newton iteration with the Jacobian at the start of the step.
     pub simplified: bool,
     pub newton: bool,
-    /// Why it was refused at first.
+    /// The first error of the step.
     pub refused: Option<StepError>,
 }
 
-/// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
+/// The number of steps by a Newton method after which a less expensive iteration is tried again for the first time.
 pub(crate) const PAUSE: usize = 8;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
-    /// Has the refused step tried again: by simplified Newton iteration, with the Jacobian at its start if that is not so
-    /// already, then by Newton's method. `refused` where all have been tried.
+    /// Selects the next method for a failed step: simplified Newton iteration with the Jacobian at the start of the
+    /// step, then Newton's method. Returns the error `refused` if both have been tried.
     #[cold]
     #[inline(never)]
     pub(crate) fn try_again(&mut self, tried: &mut Tried, refused: StepError) -> Result<(), StepError> {
@@ -28,7 +28,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             return Err(refused);
         }
         tried.refused.get_or_insert(refused);
-        // With that of the simplified iteration, so that later steps allocate nothing.
+        // Together with the workspace of the simplified iteration, so that later steps do not allocate.
         match &mut *self.route {
             Route::Condensed(run) => run.reserve(),
             _ => self.make_newton(),
@@ -49,7 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         Ok(())
     }
 
-    /// Makes what Newton's method works with, for the first step that asks for it.
+    /// Allocates the workspace of Newton's method for the first step that needs it.
     fn make_newton(&mut self) {
         if self.by_newton.is_none() {
             let products = Products::new(self.s, self.h);
@@ -59,15 +59,15 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
     }
 
-    /// Goes over to another solution, for twice as long as the last time.
+    /// Switches to another method of solution, for twice as many steps as the last time.
     fn pause_for(&mut self, solution: Solution) {
         self.solution = solution;
         self.pause = self.pauses;
         self.pauses = self.pauses.saturating_mul(2);
     }
 
-    /// Has the sweeps of the next steps corrected by Newton's method, with the Jacobian at the state; `false` where it is
-    /// singular there, or not finite.
+    /// Solves the next steps by simplified Newton iteration with the Jacobian at the current state; `false` if the
+    /// Jacobian is singular or not finite there.
     fn linearise(&mut self) -> bool {
         let (t, state) = (self.time(), self.state());
         match &mut *self.route {
@@ -84,7 +84,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
     }
 
-    /// Solves the stages of the next step by Newton's method, from a motion without forces or of constant velocity.
+    /// Solves the stage equations of the next step by Newton's method. The initial guess is a motion of constant
+    /// velocity; the condensed route uses the forces of the step before, if they are known, or a motion without forces.
     pub(crate) fn solve_stages(&mut self) -> Result<(), StepError> {
         self.solved = false;
         let (t, from) = (self.time(), self.state());
@@ -105,7 +106,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         Ok(())
     }
 
-    /// Tries the next cheaper solution once its pause is over.
+    /// Returns to the next less expensive method of solution when the pause is over.
     pub(crate) fn resume(&mut self) {
         if self.solution != Solution::FixedPointIteration && self.pause == 0 {
             self.solution = match self.solution {

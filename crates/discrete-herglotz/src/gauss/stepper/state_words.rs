@@ -1,11 +1,11 @@
-//! A run of contact Gauss collocation as words.
+//! Saving and restoring the state of a run of contact Gauss collocation.
 
 use crate::gauss::stepper::{GaussStepper, Route, Sequence, Solution};
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use contact_geom::Lagrangian;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
-    /// All that changes from step to step.
+    /// The data that change from step to step, as 64-bit words.
     pub(crate) fn words(&self) -> Vec<u64> {
         let mut to = Vec::new();
         match &*self.route {
@@ -24,7 +24,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         to
     }
 
-    /// The same back.
+    /// Reads back what [`words`](Self::words) has written; `None` if the words do not fit.
     pub(crate) fn read(&mut self, from: &mut &[u64]) -> Option<()> {
         match &mut *self.route {
             Route::Linear(run, _) => run.load(from)?,

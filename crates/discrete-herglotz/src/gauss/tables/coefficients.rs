@@ -11,34 +11,36 @@ use std::sync::OnceLock;
 
 pub(crate) use crate::numbers::registers::MAX_STAGES;
 
-/// Gauss collocation with `s` stages on `[0, 1]`.
+/// The coefficients of Gauss collocation with `s` stages on `[0, 1]`.
 ///
-/// In twice the working precision, because what a run multiplies with is computed from these once, and its rounding acts in
-/// the same direction in every step: see Hairer, McLachlan and Razakarivony, "Achieving Brouwer's law with implicit Runge-Kutta
-/// methods", BIT 48 (2008).
+/// They are computed in twice the working precision, since the coefficients of a run are derived from them once, and
+/// their round-off acts in the same direction in every step: see Hairer, McLachlan and Razakarivony, "Achieving
+/// Brouwer's law with implicit Runge-Kutta methods", BIT 48 (2008).
 pub(crate) struct Coefficients {
     /// The nodes.
     pub c: [Quad; MAX_STAGES],
     /// The weights.
     pub b: [Quad; MAX_STAGES],
-    /// The integrals of the Lagrange polynomials from 0 to each node.
+    /// The Butcher matrix: the integrals of the Lagrange polynomials from 0 to each node.
     pub a: [[Quad; MAX_STAGES]; MAX_STAGES],
-    /// The values at the next step's nodes of the polynomial through the values at this step's: `[i][j]` for node i.
+    /// The matrix that extrapolates values at the nodes of a step to the nodes of the next step by the interpolation
+    /// polynomial: `[i][j]` for node i of the next step.
     pub extrapolation: [[f64; MAX_STAGES]; MAX_STAGES],
-    /// The weights of the stages in the last two coefficients of the polynomial through them, in Legendre polynomials: of
-    /// `P_(s-1)(2 x - 1)` and the one before, where there is one.
+    /// The weights of the stages in the last two Legendre coefficients of the polynomial through them: of
+    /// `P_(s-1)(2 x - 1)` and, for s > 1, of `P_(s-2)(2 x - 1)`.
     pub last: [[f64; MAX_STAGES]; 2],
-    /// The weights of the stages in the coefficients of the polynomial through them, in the same polynomials: `[j][k]` for stage j.
+    /// The weights of the stages in the Legendre series of the polynomial through them: `[j][k]` for stage j and degree
+    /// k.
     pub series: [[f64; MAX_STAGES]; MAX_STAGES],
-    /// The values at the step's start and end of the Lagrange polynomials of the nodes.
+    /// The values of the Lagrange polynomials of the nodes at the start and at the end of the step.
     pub ends: [[f64; MAX_STAGES]; 2],
 }
 
-/// The Legendre polynomials that any number of stages asks for.
+/// The number of Legendre polynomials that suffices for any number of stages.
 pub(crate) use crate::integration::dense_step::POLYNOMIALS;
 
 impl Coefficients {
-    /// The coefficients for a number of stages from 1 to 16, made once.
+    /// The coefficients for a number of stages from 1 to 16, computed once.
     pub fn of(s: usize) -> &'static Coefficients {
         static TABLES: [OnceLock<Box<Coefficients>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
         TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
@@ -49,15 +51,16 @@ impl Coefficients {
     }
 }
 
-/// Computes the coefficients, all nodes or columns at once in the lanes of an instruction set: a program pays for them before its first step.
+/// Computes the coefficients, for all nodes or columns at once in SIMD lanes, since a program waits for them before its
+/// first step.
 struct Make {
     s: usize,
 }
 
-/// Numbers for the nodes.
+/// One number for each node.
 type Row = ExactRow<MAX_STAGES>;
 
-/// The first Legendre polynomials at points, and zeros.
+/// The values of the Legendre polynomials of degree 0 to s at points; the rows of higher degree are zero.
 #[inline(always)]
 fn legendre_rows(s: usize, x: &Row) -> [Row; POLYNOMIALS] {
     let mut rows = [Row::ZERO; POLYNOMIALS];
@@ -88,7 +91,7 @@ impl WithSimd for Make {
             if i >= s {
                 return Quad::zero();
             }
-            // Tricomi's, then Newton's method to the round-off of one number.
+            // Tricomi's approximation, then Newton's method to the round-off of `f64`.
             let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n + 0.5)).cos();
             for _ in 0..5 {
                 let p = legendre_polynomials::<f64, POLYNOMIALS>(s, x);
@@ -97,7 +100,8 @@ impl WithSimd for Make {
             Quad::from(x)
         };
         let mut nodes = Row::from_fn(guess);
-        // Corrections of which half the digits count, of an error that is squared.
+        // Newton corrections in double-double precision. A slope with the digits of `f64` suffices, since each
+        // correction squares the error.
         for _ in 0..2 {
             let p = legendre_rows(s, &nodes);
             let corrected = |i: usize| {
@@ -135,7 +139,7 @@ impl WithSimd for Make {
         };
         let beyond = legendre_rows(s, &Row::from_fn(|i| nodes.at(i) + one + one));
         let extrapolation = from_fn(|i| if i < s { values(&|k| beyond[k].at(i)) } else { [0.0; MAX_STAGES] });
-        // Gauss' weights integrate products with the Legendre polynomials exactly.
+        // Gauss quadrature of products with the Legendre polynomials is exact.
         let last = from_fn(|i| {
             let k = (s - 1).saturating_sub(i);
             from_fn(|j| (odd(k) * b.at(j) * at[k].at(j)).0)
@@ -191,7 +195,8 @@ impl WithSimd for Lagrange<'_> {
 mod tests {
     use super::*;
 
-    /// Polynomials of degree `s - 1` are those through the nodes, and their integrals exact, to round-off times the size of the entries.
+    /// Polynomials of degree `s - 1` are interpolated and integrated exactly, to round-off times the size of the
+    /// entries.
     #[test]
     fn between_the_nodes() {
         let points: [f64; MAX_STAGES] = from_fn(|i| (0.37 + 0.618 * i as f64).fract());
@@ -207,13 +212,14 @@ mod tests {
                 assert!((value - x.powi(degree)).abs() <= 64.0 * f64::EPSILON * (size + 1.0), "s = {s}, {x}");
                 let exact = x.powi(s as i32) / s as f64;
                 assert!((integral - exact).abs() <= 64.0 * f64::EPSILON * (size_of + 1.0), "s = {s}, {x}");
-                // 0^(s-1) and 1 at the ends.
+                // x^(s-1) at the ends 0 and 1.
                 let ends = g.ends.map(|row| apply(&row));
                 let at_start = if degree == 0 { 1.0 } else { 0.0 };
                 for ((end, size), expected) in ends.into_iter().zip([at_start, 1.0]) {
                     assert!((end - expected).abs() <= 64.0 * f64::EPSILON * (size + 1.0), "s = {s}");
                 }
-                // The last coefficient of x^(s-1) in P_(s-1)(2x - 1) is 1 over that of the highest power there.
+                // The coefficient of P_(s-1)(2x - 1) in x^(s-1) is the reciprocal of that polynomial's leading
+                // coefficient.
                 let last: f64 = (0..s).map(|j| g.last[0][j] * g.c[j].0.powi(degree)).sum();
                 let central = (1..s).fold(1.0, |b, k| b * (s - 1 + k) as f64 / k as f64);
                 assert!((last * central - 1.0).abs() <= 1e-15 * central * s as f64, "s = {s}: {last}");
@@ -221,8 +227,9 @@ mod tests {
         }
     }
 
-    /// Weights integrate all polynomials of degree `2s - 1`, rows of the matrix those of degree `s - 1`, and the matrix is
-    /// symplectic, `b_i a_ij + b_j a_ji = b_i b_j`: all to double-double round-off, 1e-30 for a sum of up to sixteen terms.
+    /// The weights integrate polynomials up to degree `2s - 1`, the rows of the Butcher matrix those up to degree
+    /// `s - 1`, and the coefficients are symplectic, `b_i a_ij + b_j a_ji = b_i b_j`: all to double-double round-off,
+    /// 1e-30 for a sum of up to sixteen terms.
     #[test]
     fn the_coefficients_are_those_of_gauss() {
         let power = |x: Quad, k: usize| (0..k).fold(Quad::one(), |p, _| p * x);
@@ -241,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Polynomials of degree `s - 1` are carried to the next step: to round-off times the size of the extrapolation's entries.
+    /// Polynomials of degree `s - 1` are extrapolated exactly, to round-off times the size of the matrix entries.
     #[test]
     fn extrapolation_is_that_of_the_polynomial() {
         for s in 1..=MAX_STAGES {

@@ -1,4 +1,5 @@
-//! What the stages of a general step say once they are there: whether they satisfy their equations, and resolve the motion.
+//! Checks of the solved stages of a general step: whether they satisfy their equations, and whether the step resolves
+//! the motion.
 
 use crate::gauss::dense::Solved;
 use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, of_sigma};
@@ -14,11 +15,12 @@ use contact_geom::{Lagrangian, VelocityPoint, numbers::max_or_nan, support::grad
 use pulp::Simd;
 use std::array::from_fn;
 
-/// The change of the integrating factor in a step from which on it is compared with the drag's integral.
+/// The change of the integrating factor in a step above which it is compared with the integral of `L_z`.
 const STRONG: f64 = 0.2;
 
 impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
-    /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
+    /// Sets the defect of the last step. `first` is the relative error of its predictor; the stages are checked only if
+    /// it is large, and the conformal factor also if it changes strongly.
     #[inline(always)]
     pub(crate) fn judge<S: Simd>(&mut self, first: f64) {
         self.defect = 0.0;
@@ -36,8 +38,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         }
     }
 
-    /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
-    /// they are determined no better, nor where forces that cancel beside an equilibrium are rounded like the terms that cancel.
+    /// Whether the stages satisfy their equations to round-off although the velocities still change. This occurs if W
+    /// is ill conditioned, and near an equilibrium, where the round-off of a force is that of its cancelling terms.
     #[cold]
     #[inline(never)]
     pub(crate) fn holds<S: Simd>(&self, t: f64) -> bool {
@@ -45,7 +47,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
         let x = VelocityPoint { q, v, z: self.z_stages.0[i] };
         let (of_value, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
-        // `start + M rates` against what it should be, in units of its terms.
+        // Compares `start + M rates` with `sums`, relative to the terms of the sum.
         let holds = |start: f64, rates: &Stages, rounding: f64, sums: &dyn Fn(usize) -> f64| {
             let mut sum = Stages::ZERO;
             self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
@@ -63,7 +65,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             && (0..N).all(|d| holds(self.p[d].value, &self.force[d], of_momentum(d), &|i| rho.0[i] * self.l_v[d].0[i]))
     }
 
-    /// Inverts W at the stages, one by one, on the heap; `false` where it is singular.
+    /// Inverts W at one stage after another, on the heap; `false` if it is singular.
     #[inline(never)]
     pub(crate) fn invert_one_by_one(&mut self, t: f64) -> bool {
         (0..self.table.s).all(|i| {
@@ -87,12 +89,12 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         }
     }
 
-    /// The same of a step in transformed time, in its time: `g V` for the velocities.
+    /// The stages of the last step in transformed time, with `g V` for the velocities.
     pub fn solved_in_transformed_time(&self) -> Solved<N> {
         Solved { v: from_fn(|d| self.unweighted(&self.moved[d])), ..self.solved() }
     }
 
-    /// What was multiplied with the weights, with 0 beyond the last stage.
+    /// Divides stage values by the weights, and pads them with 0.
     fn unweighted(&self, x: &Stages) -> [f64; MAX_STAGES] {
         from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
     }

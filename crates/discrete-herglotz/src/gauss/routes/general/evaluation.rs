@@ -24,7 +24,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         }
     }
 
-    /// Evaluates L and its gradient at the stages; returns the largest change of the rates dt/dtau, relative to the largest, or 0 without one.
+    /// Evaluates L and its gradient at the stages. Returns the largest change of the rates dt/dtau relative to the
+    /// largest rate, or 0 in physical time.
     #[inline(always)]
     pub(crate) fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
         let m = blocks::<S>(self.table.s);
@@ -67,7 +68,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         dg.max_abs_or_nan() / sg.max_abs_or_nan()
     }
 
-    /// L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time.
+    /// Evaluates L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time; returns
+    /// the index of the next block.
     #[inline(always)]
     fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
         let point = VelocityPoint {
@@ -83,7 +85,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         r + T::COUNT
     }
 
-    /// Takes L and its gradient at one block of stages, with the weights of physical time.
+    /// Stores L and its gradient at one block of stages, multiplied by the weights of physical time.
     #[inline(always)]
     fn weigh<S: Simd>(&mut self, r: usize, l: Lanes<S>, d: &ChartVector<N, Lanes<S>>) {
         let (weight, one_minus_rho_stages) =

@@ -1,4 +1,4 @@
-//! Sweeps of the general step.
+//! Fixed-point iteration of the general step.
 
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
@@ -10,7 +10,7 @@ use crate::numbers::registers::{blocks, over_groups};
 use contact_geom::{Lagrangian, Scalar};
 use pulp::Simd;
 
-/// The largest changes of a sweep, and the largest values: of velocities, of factors and of actions.
+/// The largest changes in an iteration, and the largest values: of velocities, integrating factors and actions.
 struct Changes<S: Simd> {
     change: [Lanes<S>; 3],
     size: [Lanes<S>; 3],
@@ -23,7 +23,7 @@ impl<S: Simd> Changes<S> {
         self.size[kind] = self.size[kind].max(value.abs());
     }
 
-    /// The largest change of a kind, in units of the largest value.
+    /// The largest change of one kind of variable, relative to its largest value.
     #[inline(always)]
     fn relative(&self, kind: usize) -> f64 {
         let change = self.change[kind].max_abs_or_nan();
@@ -32,11 +32,11 @@ impl<S: Simd> Changes<S> {
 }
 
 impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
-    /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
-    /// largest of its kind.
+    /// One fixed-point iteration: computes new velocities, positions, actions and factors of the stages. Returns the
+    /// largest change of velocities, factors and actions, each kind relative to its largest value.
     ///
-    /// What is found for some registers stays there until it is used: through memory it would be late. By loops, and not by closures, which may be
-    /// compiled by themselves and for no vector instructions.
+    /// Intermediate results stay in registers until they are used, since a round trip through memory is slower. The
+    /// code uses loops: closures may be compiled as separate functions without vector instructions.
     #[inline(always)]
     pub(crate) fn sweep<S: Simd>(&mut self) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
@@ -49,7 +49,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         if of_action > change || of_action.is_nan() { of_action } else { change }
     }
 
-    /// New factors and velocities of the stages in K registers from the r-th on.
+    /// Computes the factors and velocities of the stages in K registers from the r-th on.
     #[inline(always)]
     fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
         let (s, zero, one) = (self.table.s, Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
@@ -90,7 +90,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         }
     }
 
-    /// New positions and actions of the stages in K registers from the r-th on.
+    /// Computes the positions and actions of the stages in K registers from the r-th on.
     #[inline(always)]
     fn move_stages<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
         let s = self.table.s;

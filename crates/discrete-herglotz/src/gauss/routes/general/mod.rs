@@ -24,35 +24,38 @@ use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, Ve
 use pulp::Simd;
 use std::array::from_fn;
 
-/// The coordinates up to which W is inverted at several stages at once: the matrices take room on the stack.
+/// The largest dimension for which W is inverted at several stages at once, in SIMD lanes; the matrices are on the
+/// stack.
 const MOST_IN_LANES: usize = 8;
 
 /// The state and the workspace of the general step.
 ///
-/// The unknowns are the velocities V, the actions Z and the integrating factors rho of the stages:
-/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A sweep takes the right-hand sides
-/// from the gradients of L before, and the velocities from the momenta by `W^-1`.
+/// The unknowns are the velocities V, the actions Z and the integrating factors rho of the stages: `Q = q0 + hA V`,
+/// `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A fixed-point iteration computes the
+/// right-hand sides from the last gradients of L, and corrects the velocities by `W^-1` times the residual of the
+/// momenta.
 ///
-/// In a transformed time they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
-/// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
-/// the time at the start, where L does not depend on t.
+/// In transformed time the equations are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`,
+/// `t = t0 + hA g`, `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`. Here
+/// `rho p_t = p_t0`, the momentum conjugate to t at the start, since L does not depend on t.
 ///
-/// Herglotz' principle says what the action takes over from the positions: among curves with the same start, near a motion, `dZ = L_v dQ`.
-/// So a sweep that has moved the stages by dQ has moved their actions by that, to first order, and need not evaluate L to know it. Where
-/// z acts on the motion other than by a rate, this spares one sweep in ten to twenty per cent of them.
+/// By Herglotz' principle the actions of curves with the same start near a motion satisfy `dZ = L_v dQ`. An iteration
+/// that changes the stage positions by dQ therefore changes their actions by `L_v dQ` to first order, which is added
+/// without an evaluation of L. If L is not affine in z this saves one iteration in ten to twenty per cent of the steps.
 ///
-/// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
-/// carried instead of rho, and enters by sums of which the rounding depends on the motion.
+/// A rate that is the same in every step has the same round-off in every step. Therefore `1 - rho`, which is small if
+/// the rate is small, is stored instead of rho, and enters through sums whose round-off depends on the motion.
 ///
-/// The matrix of the sweeps and what it multiplies lie together, as in [`SeparableStages`](crate::gauss::routes::separable::SeparableStages).
+/// The matrix of the iteration and the vectors that it multiplies are adjacent, as in
+/// [`SeparableStages`](crate::gauss::routes::separable::SeparableStages).
 #[repr(C)]
 pub(crate) struct General<'a, L, P, const N: usize> {
     /// The `m` of the table.
     pub(crate) m: StageMap,
-    /// The stages: velocities and `L_v`.
+    /// The velocities of the stages, and `L_v`.
     pub(crate) v: [Stages; N],
     pub(crate) l_v: [Stages; N],
-    /// With the weights `h b`, and g where there is a time transformation: V, `rho L_q`, L and `rho L_z`.
+    /// V, `rho L_q`, L and `rho L_z`, multiplied by the weights `h b`, and by g in transformed time.
     pub(crate) moved: [Stages; N],
     pub(crate) force: [Stages; N],
     pub(crate) l: Stages,
@@ -65,7 +68,7 @@ pub(crate) struct General<'a, L, P, const N: usize> {
     pub extension: Extension<P>,
     pub table: StageTable,
     pub mass: Mass<N>,
-    /// Whether the actions of the stages follow their positions within a sweep.
+    /// Whether the stage actions are updated by `L_v dQ` within an iteration.
     pub(crate) follows: bool,
     pub q: [CompensatedSum; N],
     pub p: [CompensatedSum; N],
@@ -73,26 +76,28 @@ pub(crate) struct General<'a, L, P, const N: usize> {
     /// `1 - rho` at the end of the last step.
     pub one_minus_rho: f64,
     pub(crate) warm: bool,
-    /// Corrects the sweeps where they do not contract by themselves.
+    /// Simplified Newton iteration, used while the fixed-point iteration does not converge.
     pub newton: Option<Box<StageNewton<N>>>,
-    /// The steps that Newton's Jacobian has served.
+    /// The number of steps since the Jacobian of the simplified Newton iteration was computed.
     pub(crate) age: u32,
     pub(crate) tail: Tail,
-    /// Above one where the last step has not resolved the motion, or its drag.
+    /// The defect of the last step; above one if it does not resolve the motion, or its conformal factor.
     pub defect: f64,
-    /// The same while it is not used.
+    /// The simplified Newton iteration while it is not used.
     suspended_newton: Option<Box<StageNewton<N>>>,
-    /// Whether the stages of the next step are solved: v, l and falling are theirs.
+    /// Whether the stages of the next step are solved already, with their solution in `v`, `l` and
+    /// `one_minus_rho_stages`.
     pub(crate) solved: bool,
-    /// Whether these are a prediction of it.
+    /// Whether `v`, `l` and `one_minus_rho_stages` are a prediction of the next step.
     predicted: bool,
-    /// A velocity of the motion at the end of the last step, or before it: an iteration that fails leaves none in the stages.
+    /// The velocity at the last stage of the last successful step, or at the start of the run; kept separately, since a
+    /// failed iteration overwrites the stages.
     pub(crate) known: [f64; N],
     pub evaluations: u64,
 }
 
 impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L, P, N> {
-    /// From a state with a velocity that belongs to it, or a guess of it; `driven` says that z acts on the motion other than by a rate.
+    /// The step from a state with its velocity, or a guess of it; `driven` states that L is not affine in z.
     pub fn new(
         lagrangian: &'a L,
         extension: Extension<P>,
@@ -109,7 +114,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             extension,
             table,
             mass,
-            // In transformed time the times of the stages move too.
+            // In transformed time the times of the stages change too.
             follows: driven && P::PHYSICAL,
             q: [0.0.into(); N],
             p: [0.0.into(); N],
@@ -147,13 +152,14 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         SVector::from(self.known)
     }
 
-    /// Guesses the next step to be a motion of constant velocity.
+    /// Takes a motion of constant velocity as the initial guess of the next step.
     pub fn guess(&mut self, v: &SVector<f64, N>) {
         self.v = from_fn(|i| Stages([v[i]; MAX_STAGES]));
         self.warm = false;
     }
 
-    /// Has the sweeps corrected by Newton's method, with these derivatives of L from now on; `false` where that is not possible.
+    /// Switches to simplified Newton iteration with these derivatives of L; `false` if the Jacobian is singular or not
+    /// finite.
     pub fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
         if self.newton.is_none() {
             self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
@@ -161,22 +167,22 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
     }
 
-    /// Takes the sweeps as they are again.
+    /// Returns to fixed-point iteration.
     pub fn suspend_newton(&mut self) {
         self.suspended_newton = self.newton.take();
     }
 
-    /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
+    /// Sets the solved stages of the next step: their velocities, values of L and integrating factors.
     pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
         self.predict(stages);
         (self.predicted, self.solved) = (false, true);
     }
 
-    /// Has the iteration of the next step begin from the same of stages that are near.
+    /// Sets the initial guess of the next step: velocities, values of L and integrating factors of the stages.
     pub fn predict(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
         self.l = Stages::ZERO;
         for (i, (v, l, rho)) in stages.enumerate() {
-            // Beyond the last stage it is repeated.
+            // The last stage is repeated in the padding.
             for d in 0..N {
                 self.v[d].0[i..].fill(v[d]);
             }
@@ -186,7 +192,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         (self.warm, self.predicted) = (false, true);
     }
 
-    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
+    /// Recomputes the Jacobian of the simplified Newton iteration at the middle stage of the last step.
     #[cold]
     #[inline(never)]
     fn renew(&mut self, t: f64) {
@@ -204,7 +210,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         Values { q: self.q, p: self.p, z: self.z, t, p_t, one_minus_rho: self.one_minus_rho }
     }
 
-    /// Goes on from other values; the velocities of the stages are the guess.
+    /// Continues from other values; the velocities of the stages are the initial guess.
     pub fn reset(&mut self, values: &Values<N>) {
         Values {
             q: self.q,
@@ -222,7 +228,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
     }
 
-    /// What the velocities of the stages move the positions by.
+    /// Computes the stage velocities multiplied by the weights, and by g in transformed time.
     #[inline(always)]
     fn weighted_velocities<S: Simd>(&mut self) {
         for r in 0..blocks::<S>(self.table.s) {
@@ -236,7 +242,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         }
     }
 
-    /// Inverts W at the stages where it is not constant; `false` where it is singular.
+    /// Inverts W at the stages if it is not constant; `false` if it is singular.
     #[inline(always)]
     fn invert_mass<S: Simd>(&mut self, t: f64) -> bool {
         if matches!(self.mass, Mass::Constant(_)) {
@@ -255,7 +261,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         true
     }
 
-    /// The positions and the actions of the stages from their velocities and Lagrangians.
+    /// Computes the positions and the actions of the stages from their velocities and values of L.
     #[inline(always)]
     fn stage_positions<S: Simd>(&mut self) {
         self.weighted_velocities::<S>();
@@ -268,7 +274,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         m.apply(&self.l, s, &mut self.z_stages, |_| z);
     }
 
-    /// The guesses of a step: the last one's polynomials carried on.
+    /// The predictor of a step: extrapolates the polynomials of the last step.
     #[inline(always)]
     fn extrapolate<S: Simd>(&mut self) {
         let s = self.table.s;
@@ -279,7 +285,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             let before = *x;
             extrapolation.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
         }
-        // rho starts from 1 again.
+        // rho is 1 at the start of each step.
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
         for (x, factor) in scaled.chain([(&mut self.l, 1.0)]) {
             let before = *x;
@@ -294,7 +300,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         let (solved, predicted) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.predicted));
-        // Without a step before, from a motion of constant velocity.
+        // Without a preceding step the initial guess is a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
         if self.warm && !solved {
             self.extrapolate::<S>();
@@ -316,9 +322,11 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             return IterationOutcome::NonFinite;
         }
         let mut sweeps = FixedPointIteration::until(1.0, 0.25);
-        // The momenta that are carried on are no L_v of the velocities that are: both may be those of the step before, and the next sweep tell.
+        // The extrapolated L_v are not those of the extrapolated velocities. A small first change then proves nothing,
+        // and the convergence test starts again with the next iteration.
         let mut carried = !cold && !solved;
-        // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
+        // L is evaluated at one place in the code, so that it is inlined into this loop and compiled for its
+        // instruction set.
         loop {
             let change = if cold || solved {
                 f64::INFINITY
@@ -364,7 +372,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         }
     }
 
-    /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
+    /// One simplified Newton iteration, in place of [`sweep`](Self::sweep).
     #[cold]
     #[inline(never)]
     fn correct(&mut self) -> (f64, f64) {
@@ -405,7 +413,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         if one_minus_rho >= 1.0 {
             return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
         }
-        // sigma_d - 1, so that a small rate does not round the whole.
+        // sigma_d - 1: adding this to 1 would round it if the rate is small.
         let grow = one_minus_rho / (1.0 - one_minus_rho);
         let single = |head| Unevaluated { head, tail: 0.0 };
         let (mut dq, mut dp) = ([Unevaluated::default(); N], [Unevaluated::default(); N]);
@@ -417,7 +425,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         if branched() {
             return IterationOutcome::Branched;
         }
-        // The largest change over lanes may hide a NaN; one of `one_minus_rho` is in `dp`.
+        // The maximum over lanes may hide a NaN; a NaN in `one_minus_rho` shows in `dp`.
         if !finite(&dq, &dp, single(dz)) {
             return IterationOutcome::NonFinite;
         }

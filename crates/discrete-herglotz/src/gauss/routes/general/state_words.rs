@@ -1,4 +1,4 @@
-//! The general routes as words.
+//! Saving and restoring the state of the general route.
 
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::simplified_newton::StageNewton;

@@ -1,4 +1,4 @@
-//! The slope of the force: in the matrix of the sweeps, and along a secant between them.
+//! The slope of the force: its estimate in the matrix of the iteration, and secant steps between iterations.
 
 use crate::gauss::routes::separable::SeparableStages;
 use crate::numbers::lanes::Lanes;
@@ -6,12 +6,13 @@ use crate::numbers::registers::{Stages, blocks};
 use contact_geom::Lagrangian;
 use pulp::Simd;
 
-/// The steps after which a matrix is expected to last.
+/// The number of steps after which the matrix of the iteration is expected to be kept for long.
 const LASTING: usize = 64;
 
 impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
-    /// Notes the positions and what the force adds there; with a sweep `ahead` that evaluates no force, but goes along the secant through
-    /// those of the last two sweeps. Of one coordinate alone: a force of several has no such slope.
+    /// Stores the positions and `rest` of this iteration in `[x, rest]`. With `ahead` it first takes a secant step,
+    /// which uses the slope of the force between the last two iterations instead of an evaluation. For one coordinate
+    /// only: a force of several coordinates has no such slope.
     #[inline(always)]
     pub(crate) fn sweep_ahead<S: Simd>(&mut self, [x, rest]: &mut [Stages; 2], ahead: bool) {
         let (s, base) = (self.table.s, &self.base[0]);
@@ -19,13 +20,13 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
         if ahead {
             self.left.head.b.apply(&self.rest[0], s, &mut next, |r| base.block::<S>(r));
         }
-        // What is steeper comes of round-off.
+        // A steeper secant is due to round-off.
         let (most, least) = (Lanes::<S>::splat(self.left.kappa.abs()), Lanes::<S>::splat(f64::MIN_POSITIVE));
         for r in 0..blocks::<S>(s) {
             let (now, added) = (self.x[0].block::<S>(r), self.rest[0].block::<S>(r));
             if ahead {
                 let (moved, more) = (now - x.block(r), added - rest.block(r));
-                // Where nothing has moved the slope is zero.
+                // The slope is zero for stages that have not moved.
                 let slope = more * moved / moved.mul_add(moved, least);
                 let slope = -(-slope.max(-most)).max(-most);
                 self.rest[0].set(r, slope.mul_add(next.block::<S>(r) - now, added));
@@ -36,7 +37,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
         }
     }
 
-    /// The largest of what the force adds to the linear one.
+    /// The largest absolute value of `rest`.
     #[inline(always)]
     pub(crate) fn largest_rest<S: Simd>(&self) -> f64 {
         let mut largest = Lanes::<S>::splat(0.0);
@@ -48,7 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
         largest.max_abs_or_nan()
     }
 
-    /// Looks at the slope of the force, and refines matrices that last.
+    /// Estimates the slope of the force, and refines the matrices if they are expected to be kept for long.
     pub(crate) fn look_again(&mut self) {
         self.adapt();
         if self.taken >= LASTING {
@@ -56,8 +57,8 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
         }
     }
 
-    /// Takes the slope of the force anew from the stages of the last step, by least squares, where it has changed enough to
-    /// be worth a new matrix.
+    /// Estimates the slope of the force from the stages of the last step by least squares, and computes a new matrix if
+    /// the slope has changed enough.
     #[inline(never)]
     fn adapt(&mut self) {
         let s = self.table.s;
@@ -72,7 +73,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
             }
         }
         let kappa = -products / squares;
-        // The longer a matrix is expected to last, the smaller a change is worth it.
+        // The longer a matrix is expected to be kept, the smaller the change of slope that justifies a new one.
         let worth = f64::min(0.02, 50.0 / (self.taken * self.taken) as f64);
         if !kappa.is_finite() || (kappa - self.left.kappa).abs() <= worth * kappa.abs() {
             return;
@@ -96,7 +97,7 @@ mod tests {
     use contact_geom::nalgebra::SVector;
     use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 
-    /// `v.v/2 - x^4/4 + cos x - 0.001 z` with x the first coordinate: the others are free.
+    /// `v.v/2 - x^4/4 + cos x - 0.001 z` with x the first coordinate; no force acts on the others.
     #[derive(Clone, Copy)]
     struct Anharmonic;
 
@@ -109,7 +110,8 @@ mod tests {
         }
     }
 
-    /// The first coordinate after 100 units of time, the sweeps of a step, and the steps by Newton's method.
+    /// The first coordinate after 100 units of time, the iterations per step, and the number of steps by Newton
+    /// methods.
     fn motion<const N: usize>(stages: usize, h: f64) -> (f64, f64, u64) {
         let gauss = Gauss::new::<N>(Anharmonic, stages, h).unwrap();
         let start = PhasePoint::new(std::array::from_fn(|i| 1.2 * (i == 0) as u8 as f64), [0.0; N], 0.0);
@@ -121,8 +123,9 @@ mod tests {
         (run.state().q[0], sweeps, run.newton_steps())
     }
 
-    /// A motion of one coordinate is the same beside a coordinate at rest, where no sweep goes along a secant; and it needs fewer sweeps, and
-    /// Newton's method more seldom. Of the positions half a thousand roundings may differ, of about a hundred oscillations.
+    /// The motion of one coordinate agrees with the same motion beside a second coordinate at rest, for which no secant
+    /// steps are taken; it needs fewer iterations, and no more steps by Newton methods. The positions may differ by 500
+    /// units of round-off after about a hundred oscillations.
     #[test]
     fn secants_spare_sweeps_and_change_nothing() {
         for (stages, h, part) in [(8, 0.25, 0.9), (8, 0.5, 0.85), (16, 0.5, 0.9), (16, 1.0, 0.9)] {

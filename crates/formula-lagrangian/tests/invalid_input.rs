@@ -1,4 +1,4 @@
-//! Random texts and random changes of good ones: an answer or an error, and nothing else.
+//! Random texts, and random changes of valid texts: each gives a value or an error, and never panics.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -67,7 +67,7 @@ const GOOD: [&str; 6] = [
     "# comment\nu = x^-1.5 ; w = u**2 \n L = w*x'^2 - log1p(abs(y)) + y'^2*cosh(t)",
 ];
 
-/// Reads a text and does with what it gives all that can be done.
+/// Parses a text and applies all operations to the result. Returns whether the text is valid.
 fn attack(text: &str) -> bool {
     match Formula::parse(text, &["x", "y"], &[("a", 1.5), ("gamma", -0.1)]) {
         Ok(formula) => {
@@ -92,7 +92,7 @@ fn random_words() {
         let text: String = (0..length).map(|_| WORDS[random.below(WORDS.len())]).collect();
         good += usize::from(attack(&text));
     }
-    // Not all are refused at the first word.
+    // Not all texts are rejected at the first word.
     assert!(good > 500, "{good}");
 }
 
@@ -120,18 +120,18 @@ fn changes_of_good_texts() {
     assert!(good > 2_000, "{good}");
 }
 
-/// Bytes of any kind, most of them no text.
+/// Random bytes, most of which are not valid text.
 #[test]
 fn random_bytes() {
     let mut random = Random(0x1234_5678_9abc_def1);
     let mut good = 0;
     for _ in 0..50_000 {
         let length = random.below(24);
-        // Half of them printable, so that some are read beyond the first.
+        // Half of the bytes are printable, so that some texts are parsed beyond the first byte.
         let byte = |random: &mut Random| if random.below(2) == 0 { random.below(256) } else { 32 + random.below(95) };
         let bytes: Vec<u8> = (0..length).map(|_| byte(&mut random) as u8).collect();
         good += usize::from(attack(&String::from_utf8_lossy(&bytes)));
     }
-    // Single digits and names at least.
+    // At least single digits and names are valid.
     assert!(good > 10, "{good}");
 }

@@ -4,9 +4,9 @@ use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
 use crate::signals::heard;
 use crate::system::System;
+use herglotz::runtime::{Interrupt, Start};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use herglotz::runtime::{Interrupt, Start};
 use std::sync::atomic::Ordering;
 
 /// The contact geometry of a Lagrangian at a time and a point, by name.
