@@ -27,8 +27,11 @@ use exact_lagrangian::statements as exact;
 use std::collections::BTreeSet;
 use table::Row;
 
-/// The tables of each section, and the statements with tests of their own.
-const SECTIONS: [(&str, &[&[Row]], &[Statement]); 5] = [
+/// A section: its name, its tables, and the statements that have tests of their own.
+type Section = (&'static str, &'static [&'static [Row]], &'static [Statement]);
+
+/// The sections of the paper.
+const SECTIONS: [Section; 5] = [
     ("2", &[section_2::AT_POINTS, section_2::WITH_METHODS, section_2::ALONG_MOTIONS], section_2::BY_NAME),
     ("3", &[section_3::WITH_METHODS], section_3::BY_NAME),
     ("4", &[section_4::ALONG_MOTIONS], &[]),

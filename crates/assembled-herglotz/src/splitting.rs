@@ -19,7 +19,7 @@ const LOOK: usize = 256;
 /// that of `-V` is the kick `m v -= s V_q`. Both are exact, with their action, and conformal contact maps, so that
 /// every step has `sigma_d = e^(gamma h)`. If the drag depends on time, `sigma_d` is the exponential of its integral,
 /// which is computed by a Gauss formula of order 12 along each drift. The map is that of
-/// [`Splitting`](discrete_herglotz::Splitting) on a small system.
+/// [`Splitting`](discrete_herglotz::splitting::Splitting) on a small system.
 ///
 /// A kick and the drift after it are one pass over memory, block by block: the forces of a block are evaluated, and its
 /// velocities and positions are updated, while it is in the L1 cache. The new positions go to a second vector, so that

@@ -4,7 +4,7 @@
 //! `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = 0`, `sigma_d = 1 + Dz L_d`, advance the position. The flow on
 //! T\*Q x R is conformally contact by construction: it contracts the contact form, and every momentum of a symmetry, by
 //! exactly `sigma_d`. A [`Problem`] is a Lagrangian with a start; by an [`Integrator`] and some [`Steps`] it becomes a [`Run`], which
-//! [`Observer`]s look at. A [`Method`] makes discrete Lagrangians from Lagrangians, [`statements`] checks the theory on them.
+//! [`Observer`]s look at. A [`Method`](rules::Method) makes discrete Lagrangians from Lagrangians, [`statements`](theory::statements) checks the theory on them.
 //!
 //! ```
 //! use contact_geom::{VelocityPoint, systems::DoublePendulum};

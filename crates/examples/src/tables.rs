@@ -1,4 +1,4 @@
-//! Checks that the tables of the README agree with those that the code generates.
+//! Checks that the tables of the guide agree with those that the code generates.
 
 use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
 use discrete_herglotz::{AnyIntegrator, Integrator, MethodInfo};
@@ -71,16 +71,16 @@ fn taken(integrator: &AnyIntegrator) -> usize {
     taken.1
 }
 
-/// The text of the README between `<!-- name -->` and `<!-- end name -->`.
+/// The text of the guide between `<!-- name -->` and `<!-- end name -->`.
 fn part(name: &str) -> &'static str {
-    let readme = include_str!("../../../docs/guide.md");
-    let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
+    let guide = include_str!("../../../docs/guide.md");
+    let (_, rest) = guide.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
     rest.split_once(&format!("<!-- end {name} -->")).unwrap_or_default().0
 }
 
 #[test]
-fn the_readme_has_the_tables_of_the_code() {
+fn the_guide_has_the_tables_of_the_code() {
     for (name, table) in [("integrators", integrators()), ("systems", systems())] {
-        assert!(part(name) == table, "README.md is to have, between the marks of {name}:\n{table}");
+        assert!(part(name) == table, "docs/guide.md is to have, between the marks of {name}:\n{table}");
     }
 }

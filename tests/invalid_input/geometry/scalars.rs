@@ -86,7 +86,8 @@ fn maxima(report: &mut Report) {
             let most = max_or_nan(a, b);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a && most >= b };
             report.check(good, || format!("max_or_nan({a}, {b}) = {most}"));
-            report.check(a.max_or_nan(b).to_bits() == most.to_bits() || most.is_nan(), || format!("{a}.max_or_nan({b})"));
+            report
+                .check(a.max_or_nan(b).to_bits() == most.to_bits() || most.is_nan(), || format!("{a}.max_or_nan({b})"));
             let most = SVector::from([a, 1.0, b]).max_abs_or_nan();
             report.check(most.is_nan() == (a.is_nan() || b.is_nan()), || format!("[{a}, 1, {b}].largest() = {most}"));
             let most = max_abs_or_nan([a, 1.0, b]);

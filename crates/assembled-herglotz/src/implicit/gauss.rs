@@ -13,7 +13,7 @@ use crate::system::{AssembledSystem, State};
 use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solve::ITERATION_LIMIT};
 
 /// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms. The
-/// stage equations are those of [`Gauss`](discrete_herglotz::Gauss):
+/// stage equations are those of [`Gauss`](discrete_herglotz::gauss::Gauss):
 ///
 /// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`.
 ///

@@ -1,4 +1,4 @@
-//! Ensembles to a wanted error.
+//! Ensembles with a requested error.
 
 use crate::ensemble::builder::Ensemble;
 use crate::ensemble::step_control::StepControl;
@@ -6,13 +6,15 @@ use crate::{GaussCollocation, Run};
 use contact_geom::Lagrangian;
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// The same to an error of (q, p) at the end, relative to its size there; where no integrator is named, by contact Gauss collocation of 8
-    /// stages, or 12 below 1e-10.
+    /// Requests an error of (q, p) at the end, relative to its size there. If no integrator is given, contact Gauss
+    /// collocation is used, with 8 stages, or with 12 for errors below 1e-10.
     ///
-    /// In lanes all members take steps of one length: those of the worst of four members by trial runs, an eighth more. Each member is run by
-    /// twice as many too, and its error is the distance of the two. One that is beyond what is wanted has a run of its own, by steps of its
-    /// own, as have all members where there is no kernel; if it cannot be had, the member is refused with the error that was reached. So what is
-    /// promised holds for each member, as far as two runs that agree are right; three times the work of given steps is its price.
+    /// In lanes all members take the same steps: trial runs of four members determine the largest number of steps among
+    /// them, which is increased by an eighth. Each member is also run with twice as many steps, and its error is the
+    /// distance of the two runs. A member whose error exceeds the request has a run of its own with its own step size,
+    /// as have all members if there is no kernel for them; if the accuracy cannot be reached, the member is refused
+    /// with the error that was reached. So the error bound holds for each member, as far as two runs that agree are
+    /// right. The cost is three times that of given steps.
     pub fn accuracy(self, wanted: f64) -> Self {
         fn within<'p, 'o, L: Lagrangian<N>, const N: usize>(run: Run<'p, 'o, L, N>, wanted: f64) -> Run<'p, 'o, L, N> {
             run.accuracy(wanted)

@@ -1,4 +1,4 @@
-//! An ensemble as it is put together, and its run.
+//! The builder of an ensemble, and its run.
 
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
@@ -14,30 +14,34 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// The members of an ensemble that get all checks of a run before it begins.
+/// The number of members of an ensemble that get all checks of a run before it starts.
 const SAMPLE: usize = 4;
 
-/// A member by its index: its Lagrangian and its start.
+/// The Lagrangian and the start of a member, as a function of its index.
 type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
 
-/// Many motions, by one integrator and the same steps.
+/// Many motions with one integrator and the same steps.
 ///
-/// Where the [integrator](Integrator::batch_kernel) has a kernel for it the motions lie in the lanes of the processor's vector registers, so that a whole
-/// pack takes a step together: every [`SplittingScheme`] for separable Lagrangians with linear drag, and [`GaussCollocation`] for those
-/// of a constant rate. All other members, and those that a lane cannot finish (what is not finite, an iteration that does not contract, a
-/// formula that branches), have a run of their own. Packs are shared among threads, in shards; the fold is given the members in the order of
-/// their index, on the thread of the caller, while others are computed, so that the memory does not grow with the count. What a member is
-/// drawn from should be a function of its index, as a random number seeded with it.
+/// If the [integrator](Integrator::batch_kernel) has a kernel for them, the motions are placed in the SIMD lanes of
+/// vector registers, so that a whole pack takes a step together: for every [`SplittingScheme`] if the Lagrangian is
+/// separable with linear drag, and for [`GaussCollocation`] if it is separable with a constant rate. All other members,
+/// and those that a lane cannot finish (a state that is not finite, an iteration that does not converge, a formula that
+/// branches), have a run of their own. Packs are distributed over threads in shards. The fold is called with the
+/// members in the order of their index, on the calling thread, while others are computed, so that memory does not grow
+/// with the number of members. The start of a member should be a function of its index, for example with a random
+/// number generator that is seeded with it.
 ///
-/// A member's bits depend on that member alone: not on the number of threads, the width of the registers, its neighbours or the order. By
-/// splittings they are those of a single run, as long as L is made of sums, products, quotients and roots. The sine and the cosine of a lane are within 2
-/// units in the last place, as those of the standard library are within one, so that with them a member differs from a single run by what
-/// its rounding makes of it. By collocation both are exact but for rounding.
+/// The result of a member depends bitwise on that member only: not on the number of threads, the register width, the
+/// other members or the order. For splittings it is bitwise that of a single run, if L consists of sums, products,
+/// quotients and square roots. The sine and cosine in lanes are accurate to 2 units in the last place, those of the
+/// standard library to one, so that with them a member differs from a single run by the effect of this round-off. For
+/// collocation both are accurate up to round-off.
 ///
-/// Of what a single run looks at: the claims of the structure are probed for some members, the first and the last among them, and not along
-/// all motions; a start must be finite, a motion must end finite. Whether steps resolve the motion is looked at in lanes at one drift of each
-/// step of a splitting, and at the accelerations of each step of collocation. A member with a step in doubt has a run of its own
-/// too, and the [`unresolved`](Ending::unresolved) of that; its state is that of the lane.
+/// Not all checks of a single run are made: the claims of structure are checked for some members, among them the first
+/// and the last, and not along all motions; a start and a final state must be finite. In lanes, whether the steps
+/// resolve the motion is checked at one drift of each step of a splitting, and from the accelerations of each step of
+/// collocation. A member with a suspect step also has a run of its own, from which its
+/// [`unresolved`](Ending::unresolved) is taken; its state is that of the lane.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -64,7 +68,7 @@ pub struct Ensemble<'a, L, const N: usize> {
     pub(crate) integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
     pub(crate) length: Option<StepControl<L, N>>,
     pub(crate) action: bool,
-    /// The steps from one recorded row to the next.
+    /// The number of steps from one recorded row to the next.
     pub(crate) rows: Option<usize>,
     pub(crate) watched: bool,
     pub(crate) threads: Option<usize>,
@@ -75,7 +79,8 @@ pub struct Ensemble<'a, L, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
-    /// So many motions of it from other starts, at the same time: each a function of its index.
+    /// An ensemble of motions of this Lagrangian from the same initial time; the start of each is a function of its
+    /// index.
     pub fn ensemble<X: Into<Start<N>>>(
         &self,
         count: usize,
@@ -89,7 +94,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// So many motions of one Lagrangian from the time `t0`: the start of each is a function of its index.
+    /// An ensemble of motions of one Lagrangian from the time `t0`; the start of each is a function of its index.
     pub fn new<X: Into<Start<N>>>(
         lagrangian: &'a L,
         t0: f64,
@@ -100,8 +105,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ensemble { shared: true, ..Self::of(t0, count, members) }
     }
 
-    /// So many motions from the time `t0`: Lagrangian and start of each are functions of its index, as in a study of parameters. Those in
-    /// sequence that have the same Lagrangian share their registers.
+    /// An ensemble of motions from the time `t0`: the Lagrangian and the start of each are functions of its index, as
+    /// in a parameter study. Consecutive members with the same Lagrangian share registers.
     pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'a L, X) + Sync + 'a) -> Self {
         let members = move |index: usize| {
             let (lagrangian, start) = member(index);
@@ -125,75 +130,77 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
     }
 
-    /// The same by this integrator.
+    /// Sets the integrator.
     pub fn by(self, integrator: impl Integrator<'a, L, N> + Sync + 'a) -> Self {
         Ensemble { integrator: Some(Box::new(integrator)), ..self }
     }
 
-    /// The same by steps of a given length or number.
+    /// Sets the size or the number of the steps.
     pub fn steps(self, steps: Steps) -> Self {
         Ensemble { length: Some(StepControl::Given(steps)), ..self }
     }
 
-    /// The same on so many threads; as many as there are processors where nothing is said.
+    /// Sets the number of threads; the default is the number of processors.
     pub fn threads(self, threads: usize) -> Self {
         Ensemble { threads: Some(threads), ..self }
     }
 
-    /// Without the action: where z does not act back on the motion it is not computed.
+    /// Omits the action: it is not computed if z does not act back on the motion.
     pub fn without_action(self) -> Self {
         Ensemble { action: false, ..self }
     }
 
-    /// Without a look in lanes whether the steps resolve the motion. Where they do not, as is known, each member would else have a run of its
-    /// own.
+    /// Omits the check in lanes whether the steps resolve the motion. For steps that are known not to resolve it, each
+    /// member would otherwise have a run of its own.
     pub fn unwatched(self) -> Self {
         Ensemble { watched: false, ..self }
     }
 
-    /// With the states of each member in its [rows](Member::rows): the start, the state after every so many steps, and the end, as by
-    /// [`Rows::every`]. They are recorded in lanes too; at a time there are those of the members under way alone, of eight shards of 384
-    /// for each thread.
+    /// Records states of each member in its [rows](Member::rows): the start, the state after every `steps` steps, and
+    /// the end, as [`Rows::every`] does. They are recorded in lanes too. Only the rows of members in progress are kept
+    /// in memory: of eight shards of 384 members for each thread.
     pub fn rows_every(self, steps: usize) -> Self {
         Ensemble { rows: Some(steps), ..self }
     }
 
-    /// With a file of the shards that are done. Where it is there already, the ensemble goes on with the others: the fold is given the members of those
-    /// again, to the last bit, and the rest is computed. A process that is killed loses the shards under way. Members that have failed
-    /// are run again for their cause.
+    /// Keeps a file of the completed shards. If the file exists, the ensemble is resumed: the fold is called again with
+    /// the members of these shards, bitwise the same, and the others are computed. A process that is killed loses the
+    /// shards in progress. Members that failed are run again to find the cause.
     pub fn checkpoint(self, path: impl Into<PathBuf>) -> Self {
         Ensemble { checkpoint: Some(path.into()), ..self }
     }
 
-    /// With a function that is told, on the thread of the caller, which part of the members is done.
+    /// Sets a function that is called on the calling thread with the completed fraction of the members.
     pub fn progress(self, tell: impl Fn(f64) + 'a) -> Self {
         Ensemble { progress: Some(Box::new(tell)), ..self }
     }
 
-    /// With a question that is asked from time to time: once it is true, the members under way and those that follow end where they are, with a
-    /// [`Status::Stopped`] by an [`INTERRUPTION`](crate::INTERRUPTION), or with [`InputError::Interrupted`] where they have not begun.
+    /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
+    /// that follow end at their current state, with [`Status::Stopped`] by an [`INTERRUPTION`](crate::INTERRUPTION), or
+    /// with [`InputError::Interrupted`] if they have not started.
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
         Ensemble { interrupt: Some(interrupt), ..self }
     }
 
-    /// Only with these instructions.
+    /// Restricts the run to these instructions.
     #[cfg(test)]
     pub(crate) fn only(self, instructions: Instructions) -> Self {
         Ensemble { instructions, ..self }
     }
 
-    /// Runs it, and hands each member at its end to a fold, in the order of the index, on this thread.
+    /// Runs the ensemble, and calls the fold with each completed member, in the order of the index, on this thread.
     ///
     /// # Errors
-    /// [`EnsembleError`]: no members or threads; what every member's run is refused for, or a false claim of the Lagrangian's structure, found at some
-    /// of them; a checkpoint of another ensemble, a damaged one, or one that cannot be written. A member that cannot begin by itself, or
-    /// whose motion fails, is handed to the fold with the cause, and the others go on.
+    /// [`EnsembleError`]: no members or threads; an error for which the run of every member is refused, or a false
+    /// claim of structure that was found at some of them; a checkpoint of another ensemble, a damaged one, or one that
+    /// cannot be written. If a single member cannot start, or its motion fails, the fold is called with the cause, and
+    /// the other members continue.
     pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
         let sharded = self.in_shards(until)?;
         let threads = self.some_threads()?;
         let mut merge = self.merge(&sharded)?;
         merge.resume(&mut fold)?;
-        // Processes that shared the work may have left gaps in a checkpoint.
+        // Several processes may have left gaps in a checkpoint.
         let missing: Vec<usize> = (merge.handed_on()..sharded.count()).filter(|shard| !merge.has(*shard)).collect();
         let mut error = None;
         shards::in_order(
@@ -211,14 +218,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         error.map_or(Ok(merge.tally()), Err)
     }
 
-    /// Tells how many of the shards are done.
+    /// Reports how many of the shards are completed.
     pub(crate) fn tell(&self, done: usize, shards: usize) {
         if let Some(tell) = &self.progress {
             tell(done as f64 / shards as f64);
         }
     }
 
-    /// The threads, one at least.
+    /// The number of threads; at least one.
     pub(crate) fn some_threads(&self) -> Result<usize, EnsembleError> {
         let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         match self.threads.unwrap_or_else(processors) {
@@ -227,13 +234,13 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
     }
 
-    /// Members spread over the ensemble, the first and the last among them.
+    /// Members distributed over the ensemble, among them the first and the last.
     pub(crate) fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
         let (count, sample) = (self.count, self.count.min(SAMPLE));
         (0..sample).map(move |i| i * (count - 1) / (sample - 1).max(1))
     }
 
-    /// Checks what all members have in common, and some of them wholly.
+    /// Checks the common input of all members, and all input of some of them.
     pub(crate) fn task(&self, until: Until) -> Result<Task<'_, 'a, L, N>, EnsembleError> {
         if self.count == 0 {
             return Err(EnsembleError::Empty);

@@ -1,4 +1,4 @@
-//! A file of the shards that are done.
+//! The checkpoint file of an ensemble: the completed shards.
 
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Ending, Member};
@@ -13,30 +13,30 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// What a file begins with, and the version of what follows.
+/// The first word of the file, and the version of its format.
 const MAGIC: u64 = u64::from_le_bytes(*b"ensemble");
 const VERSION: u64 = 2;
 
-/// The words before the shards: those two, the fingerprint, and their digest.
+/// The number of words before the shards: these two, the fingerprint, and their digest.
 const HEAD: usize = 4;
 
-/// The words that a shard has at the most: what says more is damaged.
+/// The largest number of words of a shard; a larger number means that the file is damaged.
 const LONGEST: u64 = 1 << 31;
 
-/// The shards that are done, in any order, each whole or not there: it is written at once, behind those before it, with its length in front and a
-/// digest at its end. What was cut off in the middle of it is the last of the file, and is done again.
+/// The completed shards, in any order. A shard is appended as a whole, with its length before it and a digest at its
+/// end. If a write was cut off, the incomplete shard is the last in the file, and is computed again.
 pub(crate) struct Shards {
     path: PathBuf,
     file: BufReader<File>,
-    /// How much of the file is whole.
+    /// The length of the intact part of the file, in bytes.
     whole: u64,
     length: u64,
-    /// Where each shard is: the byte behind its length, and the words before its digest.
+    /// The position of each shard: the byte after its length, and the number of its words before the digest.
     places: BTreeMap<usize, (u64, usize)>,
 }
 
 impl Shards {
-    /// Opens the file of an ensemble with this fingerprint and so many shards, or begins it.
+    /// Opens the file of an ensemble with this fingerprint and number of shards, or creates it.
     pub fn open(path: &Path, fingerprint: u64, count: usize) -> Result<Self, EnsembleError> {
         let shards = || -> Result<Self, CheckpointError> {
             let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
@@ -67,20 +67,20 @@ impl Shards {
         Err(shards.error(cause))
     }
 
-    /// Finds all shards behind the head, and cuts off what is left of one that was not written to its end.
+    /// Finds all shards after the head, and truncates the file after the last complete one.
     fn find(&mut self, count: usize) -> Result<(), CheckpointError> {
         while let Some(words) = self.next_words()? {
             let Some(shard) = words.first().and_then(|word| usize::try_from(*word).ok()).filter(|s| *s < count) else {
                 return Err(CheckpointError::Damaged);
             };
-            // The digest is behind the words.
+            // The digest follows the words.
             let place = self.whole - 8 * (words.len() as u64 + 1);
             self.places.insert(shard, (place, words.len()));
         }
         Ok(self.file.get_mut().set_len(self.whole)?)
     }
 
-    /// Whether a shard is there.
+    /// Whether the file has a shard.
     pub fn has(&self, shard: usize) -> bool {
         self.places.contains_key(&shard)
     }
@@ -89,7 +89,7 @@ impl Shards {
         EnsembleError::checkpoint(&self.path, cause)
     }
 
-    /// So many words more, or as many as there are.
+    /// Reads the next `count` words, or fewer at the end of the file.
     fn words(&mut self, count: usize) -> Result<Vec<u64>, CheckpointError> {
         let mut bytes = Vec::new();
         self.file.by_ref().take(8 * count as u64).read_to_end(&mut bytes)?;
@@ -111,7 +111,7 @@ impl Shards {
         Ok(())
     }
 
-    /// A shard of so many members, where it is there.
+    /// Reads a shard with this number of members, if the file has it.
     pub fn read<const N: usize>(&mut self, shard: usize, members: usize) -> Result<Option<Shard<N>>, EnsembleError> {
         let Some((place, count)) = self.places.get(&shard).copied() else { return Ok(None) };
         let words = match self.file.seek(SeekFrom::Start(place)) {
@@ -125,7 +125,7 @@ impl Shards {
         }
     }
 
-    /// The words of the next shard; `None` where it is not there, or not to its end.
+    /// The words of the next shard; `None` at the end of the file, or if the shard is incomplete.
     fn next_words(&mut self) -> Result<Option<Vec<u64>>, CheckpointError> {
         let [count] = self.words(1)?[..] else { return Ok(None) };
         if count > LONGEST {
@@ -144,7 +144,7 @@ impl Shards {
         Ok(Some(words.split_off(1)))
     }
 
-    /// Writes a shard behind the others.
+    /// Appends a shard.
     pub fn write<const N: usize>(&mut self, shard: usize, of: &Shard<N>) -> Result<(), EnsembleError> {
         let mut words = words_of(shard, of);
         let (place, count) = (self.whole + 8, words.len());
@@ -155,7 +155,7 @@ impl Shards {
     }
 }
 
-/// A shard as words, its number first. Of a member that has not completed they say no more than that.
+/// Encodes a shard as words, its number first. For a member that has not completed only this fact is encoded.
 pub(crate) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
     let mut words = vec![shard as u64];
     of.batch_kernel.save(&mut words);
@@ -174,7 +174,7 @@ pub(crate) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> 
     words
 }
 
-/// A shard from its words, and its number; members that have not completed are those which [`Task`](super::Task) runs again.
+/// Decodes a shard and its number from words; members that have not completed are run again by [`Task`](super::Task).
 pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
     let from = &mut from;
     let (mut shard, mut batch_kernel, mut count) = (0usize, 0, 0);
@@ -218,7 +218,7 @@ fn save_rows<const N: usize>(rows: &[Row<N>], to: &mut Vec<u64>) {
 fn load_rows<const N: usize>(from: &mut &[u64]) -> Option<Vec<Row<N>>> {
     let mut count = 0;
     count.load(from)?;
-    // A row has a word at the least.
+    // A row has at least one word.
     let mut rows = Vec::with_capacity(from.len().min(count));
     for _ in 0..count {
         let (mut t, mut x) = (0.0, [SVector::zeros(); 2]);

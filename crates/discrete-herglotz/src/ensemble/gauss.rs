@@ -1,4 +1,4 @@
-//! Contact Gauss collocation with trajectories in lanes: the stages of a step are a loop.
+//! Contact Gauss collocation for many motions in SIMD lanes; the stages of a step are computed in a loop.
 
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
@@ -22,12 +22,13 @@ use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;
 
-/// The steps of contact Gauss collocation condensed to the positions, for many motions of one Lagrangian: the equations are those of
-/// [`Condensed`], which see.
+/// The steps of contact Gauss collocation condensed to the positions, for many motions of one Lagrangian; the equations
+/// are those of [`Condensed`].
 ///
-/// A sweep takes the stages in their order, each from the newest accelerations of the others (Gauss and Seidel's iteration); the first takes the
-/// newest of all, those of the step before among them, as points of a polynomial, which guesses a step one stage at a time. Lanes end their
-/// sweeps each for itself, by the rules of `gauss/sweeps.rs`; what has ended is kept while others go on.
+/// An iteration computes the stages in their order, each from the newest accelerations of the others (Gauss-Seidel
+/// iteration). In the first iteration of a step the predictor of a stage is the polynomial through the newest
+/// accelerations, which include those of the step before. The iteration ends in each lane separately, by the rules of
+/// `gauss/stages/fixed_point.rs`; converged lanes keep their values while others continue.
 pub(crate) struct GaussPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     table: Box<Table>,
@@ -37,7 +38,8 @@ pub(crate) struct GaussPacks<'a, L, const N: usize> {
     interrupt: Option<Interrupt<'a>>,
 }
 
-/// What a step multiplies with, in two parts where it acts in the same direction in every step.
+/// The coefficients of a step, with high and low parts where their round-off would act in the same direction in every
+/// step.
 struct Table {
     s: usize,
     b: [[f64; MAX_STAGES]; MAX_STAGES],
@@ -51,19 +53,22 @@ struct Table {
     end_b: [Pair; MAX_STAGES],
     grow: Pair,
     end_v: [Pair; MAX_STAGES],
-    /// What takes the last coefficient of the polynomial through the accelerations.
+    /// The weights of the last Legendre coefficient of the accelerations.
     last: [f64; MAX_STAGES],
 }
 
-/// The last coefficient of the accelerations in the Legendre polynomials, in units of the largest of them, that is a doubt. A run of its own marks steps from
-/// one half on, and looks between the nodes of the last one.
+/// The last Legendre coefficient of the accelerations, relative to the largest acceleration, above which a step is
+/// suspect. A single run flags steps as unresolved from one half on, and samples the defect between the nodes of the
+/// last step.
 const TAIL: f64 = 0.1;
 
-/// Of few stages, which have no such tail: the change of the acceleration from step to step, times the step, in units of the velocity. Two of them in
-/// sequence that make more than one together are marked by a run of its own, and motions do not turn evenly.
+/// For few stages, which have no such coefficient: the change of the acceleration from step to step, times the step
+/// size, relative to the velocity, above which a step is suspect. A single run flags two consecutive changes as
+/// unresolved if their sum exceeds one; in general the two are not equal.
 const TURN: f64 = 0.4;
 
-/// What is left from one step to the next of the largest velocity, which that is compared with: a run of its own takes that of three steps.
+/// The factor by which the largest velocity for this comparison decreases from step to step; a single run compares with
+/// the largest velocity of three steps.
 const KEPT: f64 = 0.5;
 
 impl Table {
@@ -89,7 +94,7 @@ impl Table {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
-    /// With what is read of L at a start.
+    /// The kernel for a Lagrangian, whose constants are read at a start.
     pub fn new(
         lagrangian: &'a L,
         stages: usize,
@@ -104,7 +109,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let condensed = Condensed::new(stages, h, gamma)?;
-        // A drag that no step resolves: each member says so by itself.
+        // The steps do not resolve the drag: each member has a run of its own, which reports this.
         if of_sigma(1.0 + condensed.grow.head, gamma * h) > 1.0 {
             return Err(InputError::Step { h });
         }
@@ -112,8 +117,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         Ok(GaussPacks { form, table, t0, h, steps, interrupt: None })
     }
 
-    /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One whose steps could not be solved, or
-    /// that is not finite, is not finite then.
+    /// Takes all steps of some motions in place, and records a state after every `rows` steps. The final state is not
+    /// finite if the equations of a step could not be solved, or if the motion is not finite.
     pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
         let stride = wants.rows.unwrap_or(self.steps);
         if action {
@@ -128,7 +133,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
     packs: &'s GaussPacks<'a, L, N>,
     lanes: &'s mut [Lane<N>],
-    /// The steps from one state that is recorded to the next.
+    /// The number of steps from one recorded state to the next.
     stride: usize,
 }
 
@@ -138,7 +143,7 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
-        // As with splittings.
+        // The widths of the packs are those for splittings.
         if const { N == 1 } {
             packs.all::<S, 4, ACTION>(lanes, stride);
         } else {
@@ -147,8 +152,8 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     }
 }
 
-/// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
-/// the first cache.
+/// The largest number of packs that compute a stage one after the other: while one waits for its results, the work of
+/// the next ones fills the pipeline. Their data fit into the first-level cache.
 const PACKS_IN_FLIGHT: usize = 2;
 
 /// The state and the workspace of the motions of a pack.
@@ -159,24 +164,26 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     /// The accelerations of the stages, and their positions.
     a: [[SimdBatch<S, K>; N]; MAX_STAGES],
     x: [[SimdBatch<S, K>; N]; MAX_STAGES],
-    /// What the positions begin with: what comes of the state, and of the parts that rounding of the coefficients leaves out.
+    /// The part of the positions that is the same in all iterations: the contributions of the state, and of the low
+    /// parts of the coefficients.
     base: [[SimdBatch<S, K>; N]; MAX_STAGES],
-    /// 1 in lanes whose sweeps go on; and in those that have failed.
+    /// 1 in lanes whose iteration continues, and 1 in lanes that have failed.
     going: SimdBatch<S, K>,
     failed: SimdBatch<S, K>,
-    /// Whether the sweeps of a lane go on, and of all; the largest change and the largest term of the last.
+    /// Whether the iteration continues in some lane, and whether it continues in all lanes; the largest change and the
+    /// largest term of the last iteration.
     open: bool,
     whole: bool,
     change: SimdBatch<S, K>,
     size: SimdBatch<S, K>,
     judge: Judge<S, K>,
-    /// The largest velocity of the last steps, and 1 in lanes with a step in doubt.
+    /// The largest velocity of the last steps, and 1 in lanes with a suspect step.
     fast: SimdBatch<S, K>,
     doubt: SimdBatch<S, K>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
-    /// The same with a question that is asked from time to time: then no member is finished.
+    /// Sets an interrupt that is polled during the steps; members that it ends count as not completed.
     pub fn with_interrupt(self, interrupt: Option<Interrupt<'a>>) -> Self {
         Self { interrupt, ..self }
     }
@@ -209,7 +216,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// From some motions; what is beyond the last repeats it.
+    /// The pack of some motions; lanes beyond the last motion repeat it.
     #[inline(always)]
     fn start<S: Simd, const K: usize>(&self, some: &[Lane<N>]) -> Moving<S, K, N> {
         let zero = SimdBatch::zero();
@@ -237,7 +244,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// The state in a lane; one that has failed is not finite.
+    /// The state in a lane; not finite if the lane has failed.
     fn state<S: Simd, const K: usize>(&self, m: &Moving<S, K, N>, i: usize) -> PhasePoint<N> {
         let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
         PhasePoint {
@@ -289,7 +296,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// The accelerations of all stages in their order, by a matrix that takes them to positions.
+    /// Computes the accelerations of all stages in their order; the matrix `rows` maps accelerations to positions.
     #[inline(always)]
     fn sweep<S: Simd, const K: usize, const ACTION: bool>(
         &self,
@@ -307,7 +314,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// The acceleration of one stage, from the newest of the others.
+    /// The acceleration of one stage, from the newest accelerations of the others.
     #[inline(always)]
     fn stage<S: Simd, const K: usize, const ACTION: bool>(
         &self,
@@ -323,10 +330,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         for d in 0..N {
             let before = m.a[i][d];
             if judged {
-                m.change = m.change.max_or_nan((a[d] - before).abs());
-                m.size = m.size.max_or_nan(a[d].abs());
+                m.change = m.change.max((a[d] - before).abs());
+                m.size = m.size.max(a[d].abs());
             }
-            // What has ended stays, whatever its neighbours do.
+            // A converged lane keeps its values, whatever the other lanes do.
             m.a[i][d] = if m.whole { a[d] } else { m.going.at_most(zero, before, a[d]) };
             if ACTION {
                 m.x[i][d] = if m.whole { x[d] } else { m.going.at_most(zero, m.x[i][d], x[d]) };
@@ -334,22 +341,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// Looks whether a step resolves the motion, before it is taken: by its accelerations, and the first of the step before.
+    /// Checks whether a step resolves the motion, before it is taken: by its accelerations, and by the first
+    /// acceleration of the step before.
     #[inline(always)]
     fn look<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, last: Option<&[SimdBatch<S, K>; N]>, s: usize) {
         let (zero, one) = (SimdBatch::<S, K>::zero(), SimdBatch::splat(1.0));
         let mut wide = zero;
         for d in 0..N {
-            wide = wide.max_or_nan(m.q[d].value.abs());
+            wide = wide.max(m.q[d].value.abs());
         }
         let h = self.h.abs();
         if s > FEW_STAGES {
             let tails = combined(&self.table.last, &m.a, s);
             let (mut tail, mut size) = (zero, zero);
             for d in 0..N {
-                tail = tail.max_or_nan(tails[d].abs());
+                tail = tail.max(tails[d].abs());
                 for a in &m.a[..s] {
-                    size = size.max_or_nan(a[d].abs());
+                    size = size.max(a[d].abs());
                 }
             }
             let moves = (tail * (h * h)).at_most(wide * MOVED, m.doubt, one);
@@ -358,9 +366,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
         let (mut turn, mut fast) = (zero, m.fast * KEPT);
         for d in 0..N {
-            fast = fast.max_or_nan(m.v[d].value.abs());
+            fast = fast.max(m.v[d].value.abs());
             if let Some(last) = last {
-                turn = turn.max_or_nan((m.a[0][d] - last[d]).abs());
+                turn = turn.max((m.a[0][d] - last[d]).abs());
             }
         }
         m.fast = fast;
@@ -368,7 +376,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         m.doubt = (turn * h).at_most(fast * TURN, m.doubt, moves);
     }
 
-    /// What the sweeps of a step have in common; with the parts that rounding of the coefficients leaves out, once accelerations are about known.
+    /// The terms that all iterations of a step have in common; with `tails` including those of the low parts of the
+    /// coefficients, once the accelerations are approximately known.
     #[inline(always)]
     fn begin<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, s: usize, tails: bool) {
         for i in 0..s {
@@ -376,7 +385,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             let of_tails = if tails { combined(&self.table.b_tail[i], &m.a, s) } else { [SimdBatch::zero(); N] };
             for d in 0..N {
                 let (q, v) = (m.q[d], m.v[d]);
-                // The small terms first: a sum that has been rounded would not know them.
+                // The small terms are added first, so that they are not lost in the round-off of the large ones.
                 let small = u.mul_add(v.rest, q.rest) + u_tail.mul_add(v.value, of_tails[d]);
                 m.base[i][d] = q.value + u.mul_add(v.value, small);
             }
@@ -392,7 +401,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         crate::ensemble::splitting::velocity(&self.form, &force)
     }
 
-    /// The end of the step from its accelerations.
+    /// The end of the step, from its accelerations.
     #[inline(always)]
     fn finish<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, s: usize) {
         let Table { end_u, end_b, grow, end_v, d: velocities, inverse_rho, times, .. } = &*self.table;
@@ -421,12 +430,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     }
 }
 
-/// The matrix `B` of the first sweep of a step: row i takes the last accelerations that are known there, those of the step's stages before i and of the
-/// step before it from i on, to the position that the polynomial through them foretells.
+/// The matrix `B` of the first iteration of a step: row i maps the newest known accelerations, those of the stages
+/// before i in this step and those from i on in the step before, to the position that the polynomial through them
+/// predicts.
 fn first_sweep(condensed: &Condensed) -> [[f64; MAX_STAGES]; MAX_STAGES] {
     let (s, c) = (condensed.s, &Coefficients::of(condensed.s).c);
     let zero = Quad::zero();
-    // From the nodes of a step to those of this one and of the one before, and one over them.
+    // The distances from the nodes of a step to the nodes of the same step and of the step before, and their
+    // reciprocals.
     let (mut apart, mut inverse) = ([[[zero; MAX_STAGES]; MAX_STAGES]; 2], [[[zero; MAX_STAGES]; MAX_STAGES]; 2]);
     for (j, k, before) in (0..2 * s * s).map(|at| (at / 2 % s, at / 2 / s, at % 2)) {
         let distance = c[j] - c[k] + Quad::from(before as f64);
@@ -446,7 +457,8 @@ fn first_sweep(condensed: &Condensed) -> [[f64; MAX_STAGES]; MAX_STAGES] {
                 _ => product * inverse[0][k][m],
             })
         });
-        // Lagrange's polynomials of the nodes k at the nodes j: all distances of j but the one to k, over those of k to the others.
+        // The Lagrange polynomials of the nodes k at the nodes j: the product of the distances of j to all nodes except
+        // k, divided by the product of those of k to the others.
         for j in i..s {
             let all = (0..s).fold(condensed.b[i][j], |all, m| all * apart[before(m)][j][m]);
             for k in 0..s {
@@ -458,7 +470,8 @@ fn first_sweep(condensed: &Condensed) -> [[f64; MAX_STAGES]; MAX_STAGES] {
     rows
 }
 
-/// The sum over the stages of a row of coefficients with the values there; in two parts, which do not wait for each other.
+/// The sum over the stages of a row of coefficients times the values there, as two independent partial sums that can be
+/// computed in parallel.
 #[inline(always)]
 fn combined<S: Simd, const K: usize, const N: usize>(
     row: &[f64; MAX_STAGES],
@@ -485,14 +498,15 @@ fn combined<S: Simd, const K: usize, const N: usize>(
 mod tests {
     use super::*;
 
-    /// Where the accelerations of two steps are a polynomial that the stages of one determine, the first sweep has the positions that the others
-    /// converge to, to the round-off of its sums: of s terms, and of what the coefficients were rounded by.
+    /// If the accelerations of two consecutive steps lie on one polynomial that the stages of a single step determine,
+    /// the first iteration gives the positions to which the iteration converges, up to the round-off of its sums of s
+    /// terms and of the coefficients.
     #[test]
     fn first_sweeps_foretell_polynomials() {
         for (s, h, gamma) in [(1, 0.3, -0.1), (2, 0.7, 0.0), (5, 1.1, -0.2), (10, 1.1, 0.1), (16, 2.0, -1.0)] {
             let condensed = Condensed::new(s, h, gamma).unwrap();
             let (rows, c) = (first_sweep(&condensed), &Coefficients::of(s).c);
-            // Chebyshev's polynomial of degree s - 1 over the two steps, of size one.
+            // The Chebyshev polynomial of degree s - 1 over the two steps, of size one.
             let a = |x: f64| ((s - 1) as f64 * x.acos()).cos();
             for i in 0..s {
                 let before = |j: usize| a(if j < i { c[j].0 } else { c[j].0 - 1.0 });
@@ -502,7 +516,7 @@ mod tests {
                     position += condensed.b[i][j].0 * a(c[j].0);
                     size += rows[i][j].abs() + condensed.b[i][j].0.abs();
                 }
-                // The values of the polynomial are off by eps s^2, by how steep it is.
+                // The error of the values of the polynomial is `eps s^2`, since its slope is up to s^2.
                 let bound = ((s * s) as f64 + 4.0) * f64::EPSILON * size;
                 assert!((foretold - position).abs() <= bound, "{s} stages, {i}: {foretold:e} {position:e}");
             }

@@ -1,18 +1,18 @@
-//! Whether the sweeps of Gauss collocation go on, lane by lane.
+//! The convergence test of the iteration for Gauss collocation, lane by lane.
 
 use crate::numbers::simd_batch::SimdBatch;
 use num_traits::Zero;
 use pulp::Simd;
 
-/// The sweeps after which an iteration counts as not contracting.
+/// The number of iterations after which the iteration counts as not converging.
 const LIMIT: u32 = 60;
 
-/// See `FixedPointIteration` of `gauss/sweeps.rs`, lane by lane.
+/// The convergence test `FixedPointIteration` of `gauss/stages/fixed_point.rs`, lane by lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Judge<S: Simd, const K: usize> {
     before: SimdBatch<S, K>,
     ratio: SimdBatch<S, K>,
-    /// 1 where the next sweep is the last.
+    /// 1 where the next iteration is the last.
     last: SimdBatch<S, K>,
     risen: SimdBatch<S, K>,
     pub count: u32,
@@ -25,14 +25,15 @@ impl<S: Simd, const K: usize> Judge<S, K> {
         Judge { before: zero, ratio: zero, last: zero, risen: zero, count: 0 }
     }
 
-    /// Judges a sweep by the largest change and the largest term of each lane: 1 where it goes on, in the second where it is given up.
+    /// Tests an iteration by the largest change and the largest term of each lane. The first result is 1 where the
+    /// iteration continues, the second where it has failed.
     #[inline(always)]
     pub fn judge(&mut self, change: SimdBatch<S, K>, size: SimdBatch<S, K>) -> [SimdBatch<S, K>; 2] {
         let [zero, one] = [0.0, 1.0].map(SimdBatch::splat);
         self.count += 1;
         let round_off = size * (0.5 * f64::EPSILON);
         let near = round_off * 256.0;
-        // Not `less` the other way: a NaN goes on, and is given up below.
+        // Written so that a lane with a NaN continues here, and fails below.
         let enough = change.at_most(round_off * (1.0 / 16.0), one, self.last * change.at_most(near, one, zero));
         let mut going = one - enough;
         let mut given_up = one - (change + size).at_most(SimdBatch::splat(f64::MAX), one, zero);

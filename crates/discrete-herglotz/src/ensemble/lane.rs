@@ -1,32 +1,32 @@
-//! Members on their way in lanes.
+//! Members in SIMD lanes.
 
 use crate::Row;
 use contact_geom::PhasePoint;
 
-/// What is wanted of members in lanes beside their ends.
+/// The requests for members in lanes, in addition to their final states.
 #[derive(Clone, Copy)]
 pub(crate) struct LaneOptions {
-    /// A row after each so many steps.
+    /// The number of steps from one row to the next, if rows are recorded.
     pub rows: Option<usize>,
-    /// Marks where steps do not resolve the motion.
+    /// Whether members are flagged whose steps may not resolve the motion.
     pub watched: bool,
 }
 
-/// A member on its way in a lane.
+/// A member in a lane.
 #[derive(Clone, Debug)]
 pub(crate) struct Lane<const N: usize> {
-    /// How far it has come.
+    /// The current state.
     pub state: PhasePoint<N>,
-    /// Its rows, where they are recorded.
+    /// The rows, if they are recorded.
     pub rows: Option<Vec<Row<N>>>,
-    /// Whether a step may not have resolved its motion.
+    /// Whether a step may not have resolved the motion.
     pub doubtful: bool,
-    /// Whether its rows have the action.
+    /// Whether the rows include the action.
     action: bool,
 }
 
 impl<const N: usize> Lane<N> {
-    /// At its start, with room for so many rows where they are recorded.
+    /// A member at its start, with capacity for `rows` rows if they are recorded.
     pub fn new(t0: f64, state: PhasePoint<N>, rows: Option<usize>, action: bool) -> Self {
         let rows = rows.map(|most| {
             let mut rows = Vec::with_capacity(most);
@@ -36,7 +36,7 @@ impl<const N: usize> Lane<N> {
         Lane { state, rows, doubtful: false, action }
     }
 
-    /// Takes in a state of which a row is recorded, where any are.
+    /// Updates the state, and records a row if rows are recorded.
     pub fn reach(&mut self, t: f64, state: PhasePoint<N>) {
         self.state = state;
         if let Some(rows) = &mut self.rows {
@@ -49,7 +49,7 @@ fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bo
     Row { t, q, v: None, p, z: action.then_some(z), energy: None, log_factor: None, columns: Vec::new() }
 }
 
-/// Marks members as not finished: each then has a run of its own, which says how far it has come.
+/// Flags members as not completed: each then has a run of its own, which reports how far it came.
 pub(crate) fn interrupted<const N: usize>(some: &mut [Lane<N>]) {
     some.iter_mut().for_each(|lane| lane.state.z = f64::NAN);
 }

@@ -1,31 +1,31 @@
-//! What becomes of a member of an ensemble.
+//! The result of a member of an ensemble.
 
 use crate::{InputError, Outcome, Row, Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 
-/// One motion of an ensemble, at its end.
+/// One motion of an ensemble, with its result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member<const N: usize> {
-    /// Which one, counted from 0.
+    /// The index of the member, counted from 0.
     pub index: usize,
-    /// Where its motion has led to; an error where it could not begin, as that of a single run.
+    /// The result of the motion; an error if it could not start, as in a single run.
     pub ending: Result<Ending<N>, InputError>,
-    /// Its states on the way, where [rows](crate::Ensemble::rows_every) are recorded.
+    /// The recorded states, if [rows](crate::Ensemble::rows_every) are requested.
     pub rows: Vec<Row<N>>,
 }
 
-/// Where the motion of a member has led to. Where it was ended before its time, that is what was computed before.
+/// The result of the motion of a member: the final state, or the last state that was computed if the run ended early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ending<const N: usize> {
-    /// How it ended.
+    /// How the run ended.
     pub status: Status,
-    /// The first step that was seen not to have resolved the motion, where it was watched.
+    /// The first unresolved step that was detected, if steps were monitored.
     pub unresolved: Option<UnresolvedStep>,
-    /// The steps taken.
+    /// The number of steps taken.
     pub steps: usize,
-    /// The time reached.
+    /// The final time.
     pub t: f64,
-    /// The state `(q, p, z)`; the action is the start's where it was not asked for.
+    /// The state `(q, p, z)`; z is the initial action if the action was not requested.
     pub state: PhasePoint<N>,
 }
 
@@ -36,22 +36,22 @@ impl<const N: usize> From<Outcome<N>> for Ending<N> {
     }
 }
 
-/// How many members have ended in which way.
+/// The numbers of members by the way in which they ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Those that were handed to the fold.
+    /// The members with which the fold was called.
     pub members: usize,
-    /// Those that took all of their steps.
+    /// The members that took all of their steps.
     pub completed: usize,
-    /// Those that an observer has ended.
+    /// The members that an observer ended.
     pub stopped: usize,
-    /// Those whose run failed, or that could not begin.
+    /// The members whose run failed or could not start.
     pub failed: usize,
-    /// Those with an unresolved step.
+    /// The members with an unresolved step.
     pub unresolved: usize,
-    /// Those that were advanced in lanes; the others had a run of their own.
+    /// The members that were computed in lanes; the others had a run of their own.
     pub batch_kernel: usize,
-    /// The first that failed.
+    /// The index of the first member that failed.
     pub first_failed: Option<usize>,
 }
 

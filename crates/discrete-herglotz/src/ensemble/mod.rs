@@ -1,4 +1,4 @@
-//! Ensembles: many motions at once, each in a lane of a vector register.
+//! Ensembles: many motions at once, each in a SIMD lane.
 
 mod accuracy;
 pub(crate) mod builder;

@@ -1,4 +1,4 @@
-//! Ensembles of which each member has an observer of its own.
+//! Ensembles with an observer for each member.
 
 use crate::ensemble::builder::Ensemble;
 use crate::ensemble::error::EnsembleError;
@@ -8,10 +8,10 @@ use crate::{InputError, Observer, Until};
 use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 
-/// The members that are computed and handed on together.
+/// The number of members that are computed and handed on together.
 const SHARD: usize = 16;
 
-/// An [`Ensemble`] of which each member is observed: made by [`Ensemble::observe`].
+/// An [`Ensemble`] with an observer for each member, created by [`Ensemble::observe`].
 ///
 /// ```
 /// use contact_geom::{PhasePoint, VelocityPoint, systems::Pendulum};
@@ -21,7 +21,7 @@ const SHARD: usize = 16;
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.5], [0.0], 0.0))?;
 /// let ensemble = problem.ensemble(10, |i| VelocityPoint::new([0.1 + 0.1 * i as f64], [0.0], 0.0));
 /// let ensemble = ensemble.by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
-/// // RowTimes each pendulum hangs down.
+/// // The times at which each pendulum hangs down.
 /// let downward = |_: usize| Ok(Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]));
 /// let times = |events: Events<'_, 1>| events.crossings.iter().map(|crossing| crossing.t).collect::<Vec<f64>>();
 /// ensemble.observe(downward, times).run(Until::Time(10.0), |member, times| println!("{}: {times:?}", member.index))?;
@@ -34,11 +34,12 @@ pub struct ObservedEnsemble<'a, L, F, T, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// The same under the eyes of an [`Observer`] for each member, a function of its index. What `seen` makes of it at the end comes to the
-    /// fold: the observer itself stays on the thread of the run.
+    /// Adds an [`Observer`] for each member, a function of its index. `seen` extracts a result from the observer at the
+    /// end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
     ///
-    /// Members have a run of their own each, over the threads: what an observer may ask of a run (the velocity, the energy, the last step
-    /// with the motion inside) no lane has. For states after every so many steps there is [`rows_every`](Self::rows_every), in lanes.
+    /// Each member has a run of its own, distributed over the threads, since observers may request quantities of a run
+    /// (the velocity, the energy, the last step with dense output) that lanes do not have. To record states after a
+    /// number of steps in lanes, use [`rows_every`](Self::rows_every).
     pub fn observe<O: Observer<N>, S: Send, F, T>(self, observer: F, seen: T) -> ObservedEnsemble<'a, L, F, T, N>
     where
         F: Fn(usize) -> Result<O, InputError> + Sync,
@@ -49,12 +50,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 }
 
 impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T, N> {
-    /// Runs it, and hands each member at its end to a fold with what its observer has seen, in the order of the index, on this thread.
-    /// That is `None` where the member could not begin.
+    /// Runs the ensemble, and calls the fold with each completed member and the result of its observer, in the order of
+    /// the index, on this thread. The result is `None` if the member could not start.
     ///
     /// # Errors
-    /// Those of [`Ensemble::run`]; [`EnsembleError::Observed`] with a checkpoint. A member whose run its observer refuses is handed to the
-    /// fold with the cause.
+    /// Those of [`Ensemble::run`]; [`EnsembleError::Observed`] with a checkpoint. If an observer refuses the run of its
+    /// member, the fold is called with the cause.
     pub fn run<O: Observer<N>, S: Send>(
         &self,
         until: Until,

@@ -1,4 +1,4 @@
-//! An ensemble in shards, for those who compute them in other processes.
+//! An ensemble in shards, which can be computed in several processes.
 
 use crate::Until;
 use crate::ensemble::builder::Ensemble;
@@ -10,11 +10,11 @@ use crate::ensemble::task::{SHARD, Shard, Task};
 use contact_geom::Lagrangian;
 use std::collections::VecDeque;
 
-/// An [`Ensemble`] after its checks, in shards: a few hundred members each, that are computed, sent and kept together.
+/// An [`Ensemble`] after its checks, in shards of a few hundred members that are computed, sent and saved together.
 ///
-/// Any number of processes that make the same ensemble compute shards of it, in any order, and one of them merges the results. It hands the
-/// members to its fold in the order of their index, so that what comes out has the same bits as [`Ensemble::run`], which works by the same
-/// two parts.
+/// Any number of processes that create the same ensemble compute shards of it, in any order, and one of them merges the
+/// results. It calls its fold with the members in the order of their index, so that the results are bitwise those of
+/// [`Ensemble::run`], which consists of the same two parts.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -38,18 +38,19 @@ pub struct ShardedEnsemble<'e, 'a, L, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// The shards of the ensemble, to be computed by several processes. [`Ensemble::threads`] is not heeded.
+    /// The shards of the ensemble, to be computed by several processes. [`Ensemble::threads`] is ignored.
     ///
     /// # Errors
-    /// As [`Ensemble::run`] before work begins.
+    /// Those of [`Ensemble::run`] before the computation starts.
     pub fn in_shards(&self, until: Until) -> Result<ShardedEnsemble<'_, 'a, L, N>, EnsembleError> {
         Ok(ShardedEnsemble { task: self.task(until)? })
     }
 
-    /// Begins to merge the shards of this ensemble; with a [checkpoint](Ensemble::checkpoint), behind those that its file has.
+    /// Starts merging the shards of this ensemble; with a [checkpoint](Ensemble::checkpoint), after those that its file
+    /// contains.
     ///
     /// # Errors
-    /// [`EnsembleError`], where the checkpoint is of another ensemble, damaged, or cannot be written.
+    /// [`EnsembleError`] if the checkpoint belongs to another ensemble, is damaged, or cannot be written.
     pub fn merge<'s, 'e>(
         &'s self,
         sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
@@ -62,73 +63,75 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 }
 
 impl<L: Lagrangian<N> + Sync, const N: usize> ShardedEnsemble<'_, '_, L, N> {
-    /// What the ensemble is, as one number: the same in all processes that have made the same one. It is a digest of the integrator, the steps, the count,
-    /// and of starts and Lagrangian at some members.
+    /// A digest that identifies the ensemble, the same in all processes that create the same one. It depends on the
+    /// integrator, the steps, the number of members, and the starts and Lagrangians of some members.
     pub fn fingerprint(&self) -> u64 {
         self.task.fingerprint
     }
 
-    /// How many shards there are.
+    /// The number of shards.
     pub fn count(&self) -> usize {
         self.task.count.div_ceil(SHARD)
     }
 
-    /// Computes the members of a shard, on this thread: their ends as words of 64 bits, for [`Merge::add`]. There are none in a shard
-    /// that the ensemble does not have.
+    /// Computes the members of a shard on this thread, and returns their results as words of 64 bits, for
+    /// [`Merge::add`]. A shard that the ensemble does not have has no members.
     pub fn compute(&self, shard: usize) -> Vec<u64> {
         checkpoint::words_of(shard, &self.task.shard(shard))
     }
 }
 
-/// Shards of an ensemble that are merged in the order of their members, whatever the order in which they come.
+/// Merges shards of an ensemble in the order of their members, whatever the order in which they arrive.
 pub struct Merge<'s, 'e, 'a, L, const N: usize> {
     sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
     progress: Option<&'s (dyn Fn(f64) + 'a)>,
     file: Option<Shards>,
-    /// Those that came before their turn, in order; only where there is no file that they can be read from.
+    /// The shards that arrived before their turn, in order; only if there is no file from which they can be read.
     waiting: VecDeque<(usize, Shard<N>)>,
     handed_on: usize,
     tally: Tally,
 }
 
 impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
-    /// Whether a shard has come, or was in the checkpoint.
+    /// Whether a shard has arrived, or was in the checkpoint.
     pub fn has(&self, shard: usize) -> bool {
         let kept = |file: &Shards| file.has(shard);
         shard < self.handed_on || self.place(shard).is_ok() || self.file.as_ref().is_some_and(kept)
     }
 
-    /// Where a shard waits, or would.
+    /// The position of a waiting shard, or the position at which it would be inserted.
     fn place(&self, shard: usize) -> Result<usize, usize> {
         self.waiting.binary_search_by_key(&shard, |(number, _)| *number)
     }
 
-    /// The shards whose members were handed to the fold: those before this one.
+    /// The number of shards whose members have been passed to the fold: all shards before this one.
     pub fn handed_on(&self) -> usize {
         self.handed_on
     }
 
-    /// Whether all were.
+    /// Whether the members of all shards have been passed to the fold.
     pub fn is_complete(&self) -> bool {
         self.handed_on == self.sharded.count()
     }
 
-    /// How the members have ended that were handed to the fold.
+    /// The tally of the members that have been passed to the fold.
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// The shard before which all may be computed now by so many processes or threads. The results that wait for a slow shard need
-    /// memory, eight shards for each; with a checkpoint they wait in its file, and there is no bound.
+    /// The shard up to which, exclusively, shards may be computed now by this number of processes or threads. The
+    /// results that wait for a slow shard need memory: the bound is eight shards for each worker. With a checkpoint
+    /// they wait in its file, and there is no bound.
     pub fn bound(&self, workers: usize) -> usize {
         let window = WINDOW_OF_A_THREAD.saturating_mul(workers.max(1));
         if self.file.is_some() { usize::MAX } else { self.handed_on.saturating_add(window) }
     }
 
-    /// Hands on what the checkpoint has from the first shard on. To be called once before shards are computed.
+    /// Passes to the fold the shards that the checkpoint contains, from the first shard on without a gap. To be called
+    /// once before shards are computed.
     ///
     /// # Errors
-    /// [`EnsembleError`], where the checkpoint cannot be read.
+    /// [`EnsembleError`] if the checkpoint cannot be read.
     pub fn resume(&mut self, fold: &mut impl FnMut(&Member<N>)) -> Result<(), EnsembleError> {
         while let Some(shard) = self.waiting_next()? {
             self.hand_on(shard, fold);
@@ -136,8 +139,8 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         Ok(())
     }
 
-    /// Takes a shard that was [computed](ShardedEnsemble::compute) anywhere, keeps it in the checkpoint, and hands on what has its turn. One
-    /// that is there already is of no effect.
+    /// Adds a shard that was [computed](ShardedEnsemble::compute) by any process, saves it in the checkpoint, and
+    /// passes the shards to the fold whose turn has come. Adding a shard again has no effect.
     ///
     /// # Errors
     /// [`EnsembleError`]: the words are not a shard of this ensemble, or the checkpoint cannot be written or read.
@@ -173,7 +176,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         Ok(())
     }
 
-    /// The next shard in the order, where it is there.
+    /// The next shard in the order, if it has arrived.
     fn waiting_next(&mut self) -> Result<Option<Shard<N>>, EnsembleError> {
         match &mut self.file {
             Some(file) => file.read(self.handed_on, self.sharded.task.members_of(self.handed_on).len()),

@@ -1,20 +1,20 @@
-//! Work in shards, by several threads, handed on in order.
+//! Work in shards on several threads, with results in order.
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The shards that may be done, or under way, before one of them that is not: what a slow one holds up.
+/// The number of shards per thread that may be completed or in progress while an earlier shard is not completed.
 pub(crate) const WINDOW_OF_A_THREAD: usize = 8;
 
-/// What the threads share.
+/// The state that the threads share.
 struct Window<R> {
-    /// The next shard to be taken.
+    /// The next shard to be computed.
     next: usize,
-    /// The shards that were handed on.
+    /// The number of shards that have been handed on.
     handed_on: usize,
-    /// Those that are done and were not handed on, with their numbers: a few.
+    /// The results that are completed and have not been handed on, with their numbers: a few.
     done: Vec<(usize, R)>,
-    /// No more are wanted, or a thread has panicked.
+    /// Whether no more results are requested, or a thread has panicked.
     over: bool,
 }
 
@@ -24,7 +24,7 @@ struct Shared<R> {
 }
 
 impl<R> Window<R> {
-    /// Whether a shard may be taken, of so many.
+    /// Whether another of `count` shards may be computed now.
     fn has_work(&self, count: usize, most: usize) -> bool {
         self.next < count && self.next - self.handed_on < most
     }
@@ -34,7 +34,7 @@ impl<R> Window<R> {
         self.next - 1
     }
 
-    /// The result of a shard, where it is done.
+    /// The result of a shard, if it is completed.
     fn result(&mut self, shard: usize) -> Option<R> {
         let place = self.done.iter().position(|(number, _)| *number == shard)?;
         Some(self.done.swap_remove(place).1)
@@ -61,7 +61,8 @@ impl<R> Shared<R> {
     }
 }
 
-/// Ends the work of all when it is dropped: also when a closure of the user panics, so that no thread waits for ever.
+/// Ends the work of all threads when it is dropped, also if a closure of the user panics, so that no thread waits
+/// forever.
 struct AtTheEnd<'s, R>(&'s Shared<R>, bool);
 
 impl<R> Drop for AtTheEnd<'_, R> {
@@ -72,10 +73,12 @@ impl<R> Drop for AtTheEnd<'_, R> {
     }
 }
 
-/// Does so many shards by so many threads, the caller's among them, and hands each result on, in the order of the shards, on the
-/// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
+/// Computes a number of shards on several threads, the calling thread among them, and hands on each result in the order
+/// of the shards, on the calling thread, until `hand_on` breaks. At most [`WINDOW_OF_A_THREAD`] results per thread are
+/// kept at a time.
 ///
-/// The caller computes too: with a thread that only waits to hand on, the others would make room for it after each shard.
+/// The calling thread computes too: a thread that only waits to hand on results would displace the others after each
+/// shard.
 pub(crate) fn in_order<R: Send>(
     threads: usize,
     count: usize,

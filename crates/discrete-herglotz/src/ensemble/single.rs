@@ -1,4 +1,4 @@
-//! A member by a run of its own.
+//! The run of a single member.
 
 use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::step_control::StepControl;
@@ -9,7 +9,7 @@ use crate::{
 };
 use contact_geom::Lagrangian;
 
-/// The integrator of an ensemble, for as long as a run of one member lasts.
+/// The integrator of an ensemble, for the lifetime of the run of one member.
 pub(crate) struct OfMember<'i, 'a, L, const N: usize> {
     pub integrator: &'i (dyn Integrator<'a, L, N> + Sync + 'a),
     pub lagrangian: &'a L,
@@ -43,13 +43,13 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
     }
 }
 
-/// What all members have in common.
+/// The settings that all members have in common.
 pub(crate) struct Common<L, const N: usize> {
     pub t0: f64,
     pub length: StepControl<L, N>,
     pub until: Until,
     pub action: bool,
-    /// The steps from one recorded row to the next.
+    /// The number of steps from one recorded row to the next.
     pub rows: Option<usize>,
 }
 
@@ -62,7 +62,7 @@ impl<L, const N: usize> Clone for Common<L, N> {
 impl<L, const N: usize> Copy for Common<L, N> {}
 
 impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
-    /// Does something with the run of a member.
+    /// Calls a function with the run of a member.
     pub fn with<'a, R>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
@@ -76,7 +76,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         then(if self.action { run } else { run.without_action() })
     }
 
-    /// Runs a member, with all checks of a run, under the eyes of an observer.
+    /// Runs a member with all checks of a run, and with an observer if there is one.
     pub fn run<'a>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
@@ -107,12 +107,12 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         Member { index, ending: outcome.map(Ending::from), rows }
     }
 
-    /// The rows of so many steps, where they are recorded: the start, every stride, and the end.
+    /// The number of rows for a number of steps, if they are recorded: the start, every stride, and the end.
     pub fn rows_of(&self, steps: usize) -> usize {
         self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
-    /// The step and the number of steps of a member's run, after all checks of a plan.
+    /// The step size and the number of steps of the run of a member, after all checks of a plan.
     pub fn plan<'a>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),

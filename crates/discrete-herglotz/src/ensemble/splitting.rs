@@ -1,4 +1,4 @@
-//! Splittings with trajectories in lanes.
+//! Splittings for many motions in SIMD lanes.
 
 use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
 use crate::integration::interrupt::BETWEEN;
@@ -26,25 +26,25 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
     interrupt: Option<Interrupt<'a>>,
 }
 
-/// A look at one drift of each step, the longest: whether it resolves the motion.
+/// The check whether a step resolves the motion, at its longest drift.
 ///
-/// A run of its own watches all drifts, which takes a third of its time. Two drifts of lengths s1, s2 in sequence that it marks turn an oscillation of
-/// frequency omega by `omega^2 (s1^2 + s2^2) > 1` (see `run/watch.rs`), so that the longest of all, s, turns it by more than
-/// `s^2 / (s1^2 + s2^2)` of its momentum: the change of the force in the drift times s, against the momentum. What does so has the run of
-/// its own, which judges.
+/// A single run monitors all drifts, which takes a third of its time. Two consecutive drifts of lengths s1, s2 that it
+/// flags as unresolved satisfy `omega^2 (s1^2 + s2^2) > 1` for an oscillation of frequency omega (see
+/// `resolution/monitor.rs`). In the longest drift, of length s, the change of the force times s then exceeds `s^2 /
+/// (s1^2 + s2^2)` of the momentum. A member for which this holds has a run of its own, which decides.
 struct DefectSample {
-    /// Which drift, and its length.
+    /// The index of the drift, and its length.
     stage: usize,
     span: f64,
-    /// The square of the turn, in units of the momentum, that is a doubt.
+    /// The square of this change, relative to the momentum, above which a step is suspect.
     turn: f64,
 }
 
-/// The part of a turn that is a doubt, for motions that do not turn evenly.
+/// The fraction of the bound above which a step is suspect, for motions that do not turn uniformly.
 const MARGIN: f64 = 0.8;
 
-/// What is left from one step to the next of the square of the largest momentum: a force that acts as the motion turns back is compared
-/// with the momenta of the steps around.
+/// The factor by which the square of the largest momentum for this comparison decreases from step to step: a force that
+/// acts near a turning point is compared with the momenta of neighbouring steps.
 const KEPT: f64 = 0.9;
 
 impl DefectSample {
@@ -63,7 +63,7 @@ impl DefectSample {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
-    /// With what is read of L at a start.
+    /// The kernel for a Lagrangian, whose constants are read at a start.
     pub fn new(
         lagrangian: &'a L,
         scheme: &SplittingScheme,
@@ -78,13 +78,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         Ok(SplittingPacks { form, drag, table, look, h, t0, steps, interrupt: None })
     }
 
-    /// Whether a run of its own would compensate the sums of a motion.
+    /// Whether a single run would use compensated sums for a motion.
     pub fn is_tiny(&self, state: &PhasePoint<N>) -> bool {
         self.form.has_tiny_steps(self.h, state, &self.form.force(self.t0, &state.q, state.z))
     }
 
-    /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
-    /// its end is not finite then.
+    /// Takes all steps of some motions in place, and records a state after every `rows` steps. If a motion is not
+    /// finite at its start or at its end, its final state is not finite.
     pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
         let stride = wants.rows.unwrap_or(self.steps);
         match (action, wants.watched) {
@@ -96,15 +96,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 }
 
-/// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
-/// the first cache.
+/// The largest number of packs that compute a stage one after the other: while one waits for its results, the work of
+/// the next ones fills the pipeline. Their data fit into the first-level cache.
 const PACKS_IN_FLIGHT: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
     lanes: &'s mut [Lane<N>],
-    /// The steps from one state that is recorded to the next.
+    /// The number of steps from one recorded state to the next.
     stride: usize,
 }
 
@@ -116,7 +116,8 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
-        // The registers of a pack share the constants that a stage reads; more of them than the processor has would wait in memory.
+        // The registers of a pack share the constants that a stage reads; if a pack had more registers than the
+        // processor, they would be spilled to memory.
         if const { N == 1 } {
             packs.all::<S, 4, ACTION, WATCH>(lanes, stride);
         } else {
@@ -125,23 +126,23 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
     }
 }
 
-/// What a step moves, as [`Motion`](crate::splitting) does for one motion.
+/// The state that a step advances, as [`Motion`](crate::splitting) for a single motion.
 #[derive(Clone, Copy)]
 struct Moving<S: Simd, const K: usize, const N: usize> {
     q: SVector<SimdBatch<S, K>, N>,
     p: SVector<SimdBatch<S, K>, N>,
-    /// What rounding has taken from the damping of p so far.
+    /// The accumulated round-off of the damping of p.
     carry: SVector<SimdBatch<S, K>, N>,
     z: SimdBatch<S, K>,
     force: SVector<SimdBatch<S, K>, N>,
     value: SimdBatch<S, K>,
-    /// The square of the largest momentum of the last steps, and 1 in lanes with a step in doubt.
+    /// The square of the largest momentum of the last steps, and 1 in lanes with a suspect step.
     fast: SimdBatch<S, K>,
     doubt: SimdBatch<S, K>,
 }
 
 impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
-    /// From some motions; what is beyond the last repeats it.
+    /// The pack of some motions; lanes beyond the last motion repeat it.
     #[inline(always)]
     fn from_lanes(some: &[Lane<N>]) -> Self {
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
@@ -165,7 +166,7 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
-    /// The same with a question that is asked from time to time: then no member is finished.
+    /// Sets an interrupt that is polled during the steps; members that it ends count as not completed.
     pub fn with_interrupt(self, interrupt: Option<Interrupt<'a>>) -> Self {
         Self { interrupt, ..self }
     }
@@ -195,8 +196,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         }
     }
 
-    /// The operations of a single run, in its order. What is reached after each stride, and at the end, is handed on. Whether it came to its
-    /// end: false where it was interrupted.
+    /// Takes all steps, with the operations of a single run in the same order. `reach` is called after each stride and
+    /// at the end. Returns false if it was interrupted.
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
         &self,
@@ -238,7 +239,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             }
             taken = next;
             for (w, m) in moving.iter().enumerate() {
-                // Completed on a copy: what the next step has in common with the last goes on.
+                // The step is completed on a copy, since the next step continues from the stage that it shares with
+                // this one.
                 let mut at = *m;
                 self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
                 reach(t0 + taken as f64 * h, w, &at);
@@ -247,7 +249,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         true
     }
 
-    /// Looks at the drift, by the force before it.
+    /// Checks the drift, by the change from the force `before` it.
     #[inline(always)]
     fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
         let zero = SimdBatch::splat(0.0);
@@ -258,8 +260,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             fast = m.p[d].mul_add(m.p[d], fast);
             wide = m.q[d].mul_add(m.q[d], wide);
         }
-        m.fast = fast.max_or_nan(m.fast * KEPT);
-        // What moves the position by less than its rounding is none.
+        m.fast = fast.max(m.fast * KEPT);
+        // A change that moves the position by less than its round-off does not count.
         let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.doubt, SimdBatch::splat(1.0));
         m.doubt = turn.at_most(m.fast * self.look.turn, m.doubt, moves);
     }
@@ -270,7 +272,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
         let (value, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &rest);
         m.force = force;
-        // What is stored is computed.
+        // A stored value is always computed: it is stored only if it is used.
         if ACTION {
             m.value = value;
         }
@@ -310,7 +312,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 }
 
-/// `M^-1 p`, by the operations of a product of a matrix with one vector, in their order.
+/// `M^-1 p`, by the operations of a matrix-vector product, in their order.
 #[inline(always)]
 pub(crate) fn velocity<L, S: Simd, const K: usize, const N: usize>(
     form: &SeparableForm<L, N>,

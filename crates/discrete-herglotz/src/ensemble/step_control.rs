@@ -6,10 +6,10 @@ use contact_geom::Lagrangian;
 /// [`Run::accuracy`].
 type Within<L, const N: usize> = for<'p, 'o> fn(Run<'p, 'o, L, N>, f64) -> Run<'p, 'o, L, N>;
 
-/// How long the steps of the members are.
+/// How the steps of the members are determined.
 pub(crate) enum StepControl<L, const N: usize> {
     Given(Steps),
-    /// For a wanted error: in a program that asks for none trial runs are not compiled.
+    /// For a requested error, as a function pointer: trial runs are not compiled into programs that request none.
     For(f64, Within<L, N>),
 }
 
@@ -22,7 +22,7 @@ impl<L, const N: usize> Clone for StepControl<L, N> {
 impl<L, const N: usize> Copy for StepControl<L, N> {}
 
 impl<L: Lagrangian<N>, const N: usize> StepControl<L, N> {
-    /// A run by such steps.
+    /// A run with these steps.
     pub fn of<'p, 'o>(&self, run: Run<'p, 'o, L, N>) -> Run<'p, 'o, L, N> {
         match self {
             StepControl::Given(steps) => run.steps(*steps),

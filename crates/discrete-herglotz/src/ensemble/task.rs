@@ -1,4 +1,4 @@
-//! A run of an ensemble after its checks, shard by shard.
+//! An ensemble after its checks, which is computed shard by shard.
 
 use crate::ensemble::gauss::GaussPacks;
 use crate::ensemble::lane::{Lane, LaneOptions};
@@ -15,7 +15,8 @@ use crate::{InputError, Integrator, Interrupt, Observer, Rows, Start, Status};
 use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, VelocityPoint, legendre};
 use std::ops::Range;
 
-/// The members that are computed, kept and handed on together: whole packs of one to four registers of at most eight lanes.
+/// The number of members that are computed, saved and handed on together: whole packs of one to four registers of at
+/// most eight lanes.
 pub(crate) const SHARD: usize = 384;
 
 /// How the members of one Lagrangian are advanced.
@@ -26,11 +27,11 @@ pub(crate) enum Kernel<'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
-    /// Whether a motion is left to a run of its own, since lanes would lose what its steps add.
+    /// Whether a motion needs a run of its own, since sums in lanes would lose the increments of its steps.
     pub(crate) fn leaves(&self, state: &PhasePoint<N>) -> bool {
         match self {
             Kernel::Splitting(packs) => packs.is_tiny(state),
-            // Their sums are in two parts.
+            // The collocation kernel uses compensated sums.
             Kernel::Gauss(_) | Kernel::OneByOne => false,
         }
     }
@@ -44,7 +45,7 @@ impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
     }
 }
 
-/// A run of an ensemble after its checks.
+/// An ensemble after its checks.
 pub(crate) struct Task<'e, 'a, L, const N: usize> {
     pub members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
     pub count: usize,
@@ -52,24 +53,25 @@ pub(crate) struct Task<'e, 'a, L, const N: usize> {
     pub watched: bool,
     pub integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
     pub common: Common<L, N>,
-    /// The step, and how many.
+    /// The step size and the number of steps.
     pub plan: (f64, usize),
     pub interrupt: Option<Interrupt<'a>>,
-    /// Those of all members, where they have one Lagrangian.
+    /// The kernels of all members, if they have one Lagrangian.
     pub kernels: Option<[Kernel<'a, L, N>; 2]>,
     pub fingerprint: u64,
 }
 
-/// The members of a shard at their ends.
+/// The members of a shard, with their results.
 pub(crate) struct Shard<const N: usize> {
     pub members: Vec<Member<N>>,
     pub batch_kernel: usize,
-    /// Whether members that have not completed say why; those that were read from words do not.
+    /// Whether members that have not completed contain the cause; those that were decoded from words do not.
     pub with_causes: bool,
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
-    /// The kernels for a Lagrangian, by what is read of it at a state: by the steps, and by twice as many where they are judged by those.
+    /// The kernels for a Lagrangian, whose constants are read at a state: for the steps and, if an error is requested,
+    /// for twice as many steps.
     pub(crate) fn kernels_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> [Kernel<'a, L, N>; 2] {
         let (h, steps) = self.plan;
         let finer = self.common.length.wanted().map(|_| self.kernel_of(lagrangian, state, (0.5 * h, 2 * steps)));
@@ -83,7 +85,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         plan: (f64, usize),
     ) -> Kernel<'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
-        // Steps end on kinks at times of their own in each member.
+        // With switching functions, steps end on kinks, at different times for each member.
         let start = VelocityPoint { q: state.q, v: state.p, z: state.z };
         if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
@@ -99,11 +101,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             }
             _ => Ok(Kernel::OneByOne),
         };
-        // Where L cannot be read a run of the member says why.
+        // If the kernel cannot be created, the runs of the members report the cause.
         kernel.unwrap_or(Kernel::OneByOne)
     }
 
-    /// What the ensemble is, by some of its members: of the integrator, the steps, starts, and of L there.
+    /// A digest that identifies the ensemble: of the integrator, the steps, and the starts and L of some members.
     pub(crate) fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
         let Common { t0, action, length, .. } = self.common;
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
@@ -130,14 +132,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         first..self.count.min(first.saturating_add(SHARD))
     }
 
-    /// Runs members again that have not completed.
+    /// Runs the members again that have not completed.
     pub(crate) fn run_again(&self, shard: &mut Shard<N>) {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
             *member = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
         }
     }
 
-    /// Runs a member by itself, under the eyes of an observer.
+    /// Runs a member with a run of its own, and with an observer if there is one.
     pub(crate) fn by_itself(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
         let (lagrangian, start) = (self.members)(index);
         self.common.run(self.integrator, lagrangian, (index, start), observer, self.interrupt)
@@ -151,7 +153,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut members: Vec<_> = range.map(member).collect();
         let mut batch_kernel = 0;
         let mut from = 0;
-        // Members in sequence that have one Lagrangian.
+        // Consecutive members with the same Lagrangian.
         for group in starts.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
             batch_kernel += self.group(group, &mut members[from..from + group.len()]);
             from += group.len();
@@ -159,7 +161,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         Shard { members, batch_kernel, with_causes: true }
     }
 
-    /// Runs members of one Lagrangian; returns how many of them in lanes.
+    /// Runs members of one Lagrangian; returns how many of them were completed in lanes.
     pub(crate) fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
         let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
         let (Common { t0, action, rows, length, .. }, (h, steps)) = (self.common, self.plan);
@@ -241,12 +243,13 @@ impl<const N: usize> Start<N> {
     }
 }
 
-/// Refuses, as what is not finite, what is farther from where twice as many steps lead.
+/// Refuses members whose distance from the result with twice as many steps exceeds the requested error: their state is
+/// set to NaN.
 fn refuse_beyond<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], finer: &[Lane<N>]) {
     let square = |x: &PhasePoint<N>| x.q.norm_squared() + x.p.norm_squared();
     for (Lane { state: x, .. }, Lane { state: fine, .. }) in lanes.iter_mut().zip(finer) {
         let apart = square(&PhasePoint { q: x.q - fine.q, p: x.p - fine.p, z: 0.0 });
-        // What is not a number is not within either.
+        // Written so that a NaN is not within the bound.
         let within = apart <= wanted * wanted * square(fine);
         if !within {
             x.z = f64::NAN;

@@ -18,7 +18,7 @@ fn instruction_sets() -> Vec<Instructions> {
     sets.into_iter().map(Instructions::only).collect()
 }
 
-/// Sine and cosine of arguments, as many as there are lanes at a time.
+/// Evaluates sine and cosine, for as many arguments at a time as there are lanes.
 struct Evaluate<'a>(&'a [f64]);
 
 impl WithSimd for Evaluate<'_> {
@@ -35,8 +35,10 @@ impl WithSimd for Evaluate<'_> {
     }
 }
 
-/// Within 2 units in the last place, and the `1e-33 x` that two parts of pi leave out, of the standard library's, which are exact to half of one, at
-/// arguments of all sizes and beside the multiples of pi/2, with the same bits in all instruction sets; beyond the range of the reduction they are not numbers.
+/// Sine and cosine in lanes agree with the standard library, whose error is at most half a unit in the last place, up
+/// to 2 units in the last place and the `1e-33 x` that the two parts of pi omit, at arguments of all sizes and near
+/// multiples of pi/2. They are bitwise the same in all instruction sets, and NaN beyond the range of the argument
+/// reduction.
 #[test]
 fn sines_of_all_widths_are_the_same() {
     let mut arguments = vec![0.0, -0.0];
@@ -68,7 +70,7 @@ fn sines_of_all_widths_are_the_same() {
     }
 }
 
-/// The ends of all members in the lanes of one instruction set.
+/// The results of all members in the lanes of one instruction set.
 fn ends<const N: usize>(
     lagrangian: &(impl Lagrangian<N> + Sync),
     start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy,
@@ -86,7 +88,8 @@ fn ends<const N: usize>(
     all
 }
 
-/// Each width of registers gives the same bits, of both kernels; what sits in which lane differs.
+/// The results of both kernels are bitwise the same for all register widths, although members are placed in different
+/// lanes.
 #[test]
 fn members_in_all_widths_are_the_same() {
     let pendulum = Pendulum { gamma: -0.1 };

@@ -27,8 +27,8 @@ use contact_geom::{
 use stages::equations::{Given, Products, StageEquations, Workspace};
 pub(crate) use tables::coefficients::MAX_STAGES;
 
-/// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian: the discrete Lagrangian
-/// `L_d(q0, q1, z0) = z1 - z0` of the stage equations
+/// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian. Its discrete Lagrangian is
+/// `L_d(q0, q1, z0) = z1 - z0`, defined by the stage equations
 ///
 /// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`,
 ///

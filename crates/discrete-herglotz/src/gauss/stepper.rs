@@ -1,4 +1,4 @@
-//! Runs of contact Gauss collocation.
+//! Stepper of contact Gauss collocation with equal steps in physical time.
 
 mod resolution;
 mod retries;

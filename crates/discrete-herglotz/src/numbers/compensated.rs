@@ -1,10 +1,10 @@
-//! Sums that lose nothing over many steps.
+//! Compensated summation.
 
 use crate::numbers::state_words::saved;
 use qd::Quad;
 use std::ops::{Add, Mul};
 
-/// A number with the part that its last digit leaves out, so that a sum of small changes loses nothing.
+/// A compensated sum: its value, and the compensation term `rest` with the accumulated round-off of the additions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CompensatedSum {
     pub value: f64,
@@ -18,7 +18,7 @@ impl From<f64> for CompensatedSum {
 }
 
 impl CompensatedSum {
-    /// Adds a change in two parts, of which the tail is below the round-off of the head and would be lost in their sum.
+    /// Adds an increment `head + tail`, where the tail is below the round-off of the head.
     #[inline(always)]
     pub fn add(&mut self, Unevaluated { head, tail }: Unevaluated) {
         let (change, lost) = exact_sum(head, tail + self.rest);
@@ -27,7 +27,7 @@ impl CompensatedSum {
     }
 }
 
-/// A sum with what its rounding takes away, by Knuth: either number may be the larger.
+/// The sum and its round-off error, by Knuth's TwoSum; either number may be the larger.
 #[inline(always)]
 pub(crate) fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -35,8 +35,8 @@ pub(crate) fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - (sum - of_b)) + (b - of_b))
 }
 
-/// A number in two parts that are not added: what the coefficients of a step leave out of one double acts in the same
-/// direction in every step, and so it is carried along.
+/// An unevaluated sum `head + tail`. The round-off of the coefficients of a step acts in the same direction in every
+/// step; the tail keeps it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Unevaluated {
     pub head: f64,
@@ -60,8 +60,8 @@ impl Mul<f64> for Unevaluated {
 }
 
 impl Unevaluated {
-    /// The product with a compensated number, exact but for what is below the round-off of the tail. To be compiled for
-    /// instruction sets with a fused product, which is slow where there is none.
+    /// The product with a compensated sum, up to the round-off of the tail. To be compiled for instruction sets with
+    /// fused multiply-add, without which it is slow.
     #[inline(always)]
     pub fn times(self, x: CompensatedSum) -> Self {
         let head = self.head * x.value;
@@ -69,7 +69,7 @@ impl Unevaluated {
         Unevaluated { head, tail: lost + (self.tail * x.value + self.head * x.rest) }
     }
 
-    /// The sum, exact but for what is below the round-off of the tail.
+    /// The sum, up to the round-off of the tail.
     #[inline(always)]
     pub fn plus(self, b: Self) -> Self {
         let (head, lost) = exact_sum(self.head, b.head);
@@ -83,13 +83,14 @@ impl From<Quad> for Unevaluated {
     }
 }
 
-/// Whether changes of positions, of velocities or momenta, and of the action are finite: a sum hides no NaN.
+/// Whether the increments of positions, of velocities or momenta, and of the action are finite; any NaN or infinity
+/// makes their sum not finite.
 #[inline(always)]
 pub(crate) fn finite<const N: usize>(dq: &[Unevaluated; N], dy: &[Unevaluated; N], dz: Unevaluated) -> bool {
     (0..N).fold(dz.head, |sum, d| sum + (dq[d].head + dy[d].head)).is_finite()
 }
 
-/// Adds changes.
+/// Adds increments to compensated sums.
 #[inline(always)]
 pub(crate) fn add<const N: usize>(x: &mut [CompensatedSum; N], changes: &[Unevaluated; N]) {
     x.iter_mut().zip(changes).for_each(|(x, change)| x.add(*change));

@@ -1,13 +1,13 @@
-//! Sums of packs that lose nothing over many steps, as those of `gauss/compensated.rs`.
+//! Compensated summation of SIMD batches, as that of numbers in `numbers/compensated.rs`.
 
 use crate::numbers::simd_batch::SimdBatch;
 use num_traits::Zero;
 use pulp::Simd;
 
-/// A coefficient with the part that one double leaves out.
+/// A coefficient in two parts, `[head, tail]`; the tail is the round-off of the head.
 pub(crate) type Pair = [f64; 2];
 
-/// A number with the part that its last digit leaves out.
+/// A compensated sum: its value, and the compensation term `rest` with the accumulated round-off of the additions.
 #[derive(Clone, Copy)]
 pub(crate) struct CompensatedBatch<S: Simd, const K: usize> {
     pub value: SimdBatch<S, K>,
@@ -21,7 +21,7 @@ impl<S: Simd, const K: usize> From<SimdBatch<S, K>> for CompensatedBatch<S, K> {
     }
 }
 
-/// A sum with what its rounding takes away, by Knuth: either number may be the larger.
+/// The sum and its round-off error, by Knuth's TwoSum; either number may be the larger.
 #[inline(always)]
 fn exact_sum<S: Simd, const K: usize>(a: SimdBatch<S, K>, b: SimdBatch<S, K>) -> CompensatedBatch<S, K> {
     let value = a + b;
@@ -35,7 +35,7 @@ impl<S: Simd, const K: usize> CompensatedBatch<S, K> {
         SimdBatch::zero().into()
     }
 
-    /// `c x`, exact but for what is below the round-off of the rest.
+    /// `c x`, up to the round-off of the rest.
     #[inline(always)]
     pub fn product([head, tail]: Pair, x: Self) -> Self {
         let [head, tail] = [head, tail].map(SimdBatch::splat);
@@ -43,7 +43,7 @@ impl<S: Simd, const K: usize> CompensatedBatch<S, K> {
         CompensatedBatch { value, rest: head.mul_add(x.value, -value) + tail.mul_add(x.value, head * x.rest) }
     }
 
-    /// With one more product: the parts each for themselves.
+    /// `self + c x`, with the values and the rests summed separately.
     #[inline(always)]
     pub fn plus(self, [head, tail]: Pair, x: SimdBatch<S, K>) -> Self {
         CompensatedBatch {
@@ -52,13 +52,13 @@ impl<S: Simd, const K: usize> CompensatedBatch<S, K> {
         }
     }
 
-    /// The sum of the parts, each for itself.
+    /// `self + b`, with the values and the rests summed separately.
     #[inline(always)]
     pub fn with(self, b: Self) -> Self {
         CompensatedBatch { value: self.value + b.value, rest: self.rest + b.rest }
     }
 
-    /// With a change in two parts, of which the rest is below the round-off of the value and would be lost in their sum.
+    /// The compensated sum with an increment whose rest is below the round-off of its value.
     #[inline(always)]
     pub fn add(self, change: Self) -> Self {
         let change = exact_sum(change.value, change.rest + self.rest);

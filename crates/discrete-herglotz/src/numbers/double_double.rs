@@ -1,11 +1,11 @@
-//! Rows of numbers in double-double precision, in the lanes of an instruction set with a fused product.
+//! Double-double arithmetic on rows of numbers, in SIMD lanes with fused multiply-add.
 
 use crate::numbers::compensated::exact_sum;
 use crate::numbers::instructions::Instructions;
 use pulp::{Simd, WithSimd};
 use qd::Quad;
 
-/// A row of numbers: heads and tails apart, so that both fill registers.
+/// A row of double-double numbers; heads and tails are stored separately, so that both fill SIMD registers.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct ExactRow<const W: usize> {
@@ -13,14 +13,14 @@ pub(crate) struct ExactRow<const W: usize> {
     tail: [f64; W],
 }
 
-/// `head + tail`, the head rounded from it; the head was the larger.
+/// Renormalises `head + tail` by Dekker's FastTwoSum; the head must be the larger.
 #[inline(always)]
 fn renormalised(head: f64, tail: f64) -> (f64, f64) {
     let sum = head + tail;
     (sum, tail - (sum - head))
 }
 
-/// `sum + factor x` to double-double round-off, where the head of the result is not small by cancellation.
+/// `sum + factor x` to double-double round-off, unless the terms cancel.
 #[inline(always)]
 fn sum_of_product(sum: (f64, f64), factor: Quad, x: (f64, f64)) -> (f64, f64) {
     let product = factor.0 * x.0;
@@ -54,7 +54,7 @@ impl<const W: usize> ExactRow<W> {
         }
     }
 
-    /// The products with the entries of another row.
+    /// The entrywise product with another row.
     #[inline(always)]
     pub fn times(&self, x: &Self) -> Self {
         let mut row = Self::ZERO;
@@ -66,8 +66,8 @@ impl<const W: usize> ExactRow<W> {
     }
 }
 
-/// Solves `M X = R` in double-double precision, by Gauss and Jordan with row pivoting; rows of `n` unknowns followed by the right-hand
-/// sides, which are left as the solution. `false` where M is singular.
+/// Solves `M X = R` in double-double precision, by Gauss-Jordan elimination with row pivoting. Each row has the `n`
+/// entries of M followed by those of R, which are replaced by the solution. `false` if M is singular.
 pub(crate) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
     let width = rows.first().map_or(0, Vec::len);
     let mut parts: Vec<f64> = Vec::with_capacity(2 * width * rows.len());
@@ -83,7 +83,7 @@ pub(crate) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
     regular
 }
 
-/// The elimination, on rows of `width` heads followed by as many tails.
+/// The kernel of the elimination, on rows of `width` heads followed by as many tails.
 struct Eliminate<'a> {
     parts: &'a mut [f64],
     width: usize,
@@ -116,7 +116,7 @@ impl WithSimd for Eliminate<'_> {
             let (above_head, above_tail) = above.split_at(width);
             for (i, row) in parts.chunks_exact_mut(2 * width).enumerate() {
                 let (head, tail) = row.split_at_mut(width);
-                // The row of the pivot becomes its own part of 1 / entry.
+                // The pivot row is divided by its pivot: factor = 1 / entry - 1.
                 let factor = if i == k { inverse - Quad::from(1.0) } else { -(Quad(head[k], tail[k]) * inverse) };
                 let row = head[k..].iter_mut().zip(&mut tail[k..]);
                 for ((head, tail), x) in row.zip(above_head[k..].iter().zip(&above_tail[k..])) {
@@ -132,7 +132,8 @@ impl WithSimd for Eliminate<'_> {
 mod tests {
     use super::*;
 
-    /// A Hilbert matrix of condition 1e7 times what is solved for is the right-hand side, to the round-off of 1e-32 times the condition.
+    /// The solution for a Hilbert matrix of condition 1e7 satisfies its equations to round-off, 1e-32 times the
+    /// condition.
     #[test]
     fn systems_are_solved_in_twice_the_precision() {
         let n = 6;

@@ -1,36 +1,36 @@
-//! The instruction set of the kernels.
+//! The choice of the SIMD instruction set of the kernels.
 
 use pulp::WithSimd;
 
 /// The instruction set that kernels are compiled for and run with.
 ///
-/// As a rule they are compiled for all that a processor of this kind may have, and the best is picked at run time. A build for processors with wide
-/// registers (`target-cpu=native` on one of them) has no use for narrower ones, and most often none for wider ones: it compiles each kernel once
-/// instead of three times.
+/// By default kernels are compiled for all instruction sets of the target architecture, and the best one is selected at
+/// run time. A build for processors with wide registers (for example with `target-cpu=native`) compiles each kernel
+/// once instead of three times, for the widest instruction set that it enables.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instructions(chosen::Set);
 
 impl Instructions {
-    /// The best that the processor has.
+    /// The best instruction set of the processor.
     #[inline]
     pub fn new() -> Self {
         Instructions(chosen::set())
     }
 
-    /// Only with these.
+    /// The given instruction set.
     #[cfg(test)]
     pub fn only(set: pulp::Arch) -> Self {
         Instructions(set)
     }
 
-    /// Runs a kernel.
+    /// Runs a kernel with this instruction set.
     #[inline(always)]
     pub fn dispatch<K: WithSimd>(self, kernel: K) -> K::Output {
         chosen::run(self.0, kernel)
     }
 }
 
-/// An item for builds that meet a condition, and one for all others.
+/// One item for builds that satisfy a condition, and another for all other builds.
 macro_rules! either {
     ($condition:meta => $item:item otherwise $other:item) => {
         #[cfg($condition)]
@@ -40,8 +40,8 @@ macro_rules! either {
     };
 }
 
-/// The module of a build in which there is one set.
-#[allow(unused_macros)] // In builds for any processor there is a choice.
+/// The module for a build with a single instruction set.
+#[allow(unused_macros)] // Not used in builds that select the instruction set at run time.
 macro_rules! only {
     ($set:ident) => {
         mod chosen {
@@ -49,10 +49,11 @@ macro_rules! only {
 
             pub type Set = $set;
 
-            #[allow(unsafe_code)] // There is no other way to the token without a branch that is never taken, and compiled.
+            #[allow(unsafe_code)] // The safe constructor compiles a branch that is never taken.
             #[inline(always)]
             pub fn set() -> Set {
-                // SAFETY: the whole build takes for granted that the processor has each of these instructions: it is configured so below.
+                // SAFETY: this module is used only in builds whose target features include all of these instructions,
+                // as configured below.
                 unsafe { $set::new_unchecked() }
             }
 
@@ -64,7 +65,8 @@ macro_rules! only {
     };
 }
 
-// What the tokens ask for and these do not imply each other. The crate's own tests compare all widths.
+// The features that the tokens V3 and V4 need, listed separately since they do not imply each other. Excluded for the
+// tests of this crate, which compare all register widths.
 either! {
     all(
         not(test),

@@ -1,4 +1,4 @@
-//! Lanes of a vector register as numbers that a Lagrangian can be written over.
+//! The lanes of a SIMD register as a scalar type over which a Lagrangian can be evaluated.
 
 use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
 use contact_geom::nalgebra::SVector;
@@ -8,48 +8,49 @@ use std::cell::Cell;
 use std::fmt::{Debug, Formatter};
 use std::ops::Neg;
 
-/// As many numbers as a register of the instruction set `S` has lanes, worked on at once.
+/// One SIMD register of the instruction set `S`, with one number per lane.
 ///
-/// The instruction set is found at run time: kernels are generic over `S` and entered through `Instructions::dispatch`, so that a
-/// default build uses what the processor has. Lanes are made inside such kernels only, and never leave them.
+/// The instruction set is selected at run time: kernels are generic over `S` and run through `Instructions::dispatch`,
+/// so that a default build uses the instructions of the processor. Lanes exist only inside such kernels.
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes<S: Simd>(pub S::f64s);
 
-/// The token of an instruction set, out of nothing.
-#[allow(unsafe_code)] // The trait has no other way to a token; why it is sound is said below.
+/// The token of an instruction set, made without a check of the processor.
+#[allow(unsafe_code)] // The trait has no other way to a token; see below for soundness.
 #[inline(always)]
 pub(crate) fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0, "a token carries nothing") };
-    // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
-    // makes them only below `Instructions::dispatch`, which has handed out a token of the same type there.
+    // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this
+    // crate and is made only in kernels run by `Instructions::dispatch`, which holds a token of the same type.
     unsafe { std::mem::zeroed() }
 }
 
 thread_local! {
-    /// Whether one value was asked of lanes that differ.
+    /// Whether a single value was requested of lanes that differ.
     static ASKED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether, since [`forget_branches`], one value was asked on this thread of lanes that differ, by `re`, `extent` or `==`: a
-/// formula has branched, in the same way for all of them. What was computed from it may be wrong.
+/// Whether, since [`forget_branches`], a single value was requested on this thread of lanes that differ, by `re`,
+/// `extent` or `==`: a formula has then branched in the same way for all lanes, and its results may be wrong.
 #[inline(always)]
 pub(crate) fn branched() -> bool {
     ASKED.get()
 }
 
-/// Notes that a formula has branched.
+/// Records that a formula has branched.
 #[cold]
 pub(crate) fn note_branch() {
     ASKED.set(true);
 }
 
-/// Begins anew to watch for branches.
+/// Resets the record of branches.
 #[inline(always)]
 pub(crate) fn forget_branches() {
     ASKED.set(false);
 }
 
-/// A vector of registers, by a loop: nalgebra's `from_fn` may be compiled by itself, and for no vector instructions.
+/// A vector of registers. It is filled by a loop, since nalgebra's `from_fn` may be compiled as a separate function
+/// without vector instructions.
 #[inline(always)]
 pub(crate) fn vector<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
     let mut x = [T::from(0.0); N];
@@ -60,7 +61,7 @@ pub(crate) fn vector<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVec
 }
 
 impl<S: Simd> Lanes<S> {
-    /// The lanes of a register.
+    /// The number of lanes of a register.
     pub const COUNT: usize = S::F64_LANES;
 
     #[inline(always)]
@@ -68,7 +69,7 @@ impl<S: Simd> Lanes<S> {
         Lanes(token::<S>().splat_f64s(x))
     }
 
-    /// `self * b + c`, fused where the instruction set can.
+    /// `self * b + c`, fused if the instruction set has fused multiply-add.
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
         Lanes(token::<S>().mul_add_e_f64s(self.0, b.0, c.0))
@@ -76,12 +77,12 @@ impl<S: Simd> Lanes<S> {
 
     #[inline(always)]
     pub fn abs(self) -> Self {
-        // Not by the set's own, which is a call in some of them.
+        // The instruction set's own function is a call in some sets.
         let set = token::<S>();
         Lanes(set.and_f64s(self.0, set.splat_f64s(f64::from_bits(u64::MAX >> 1))))
     }
 
-    /// Lane by lane the larger; where one is not a number, the result may be either, other than that of [`Scalar::max`].
+    /// The lane-wise maximum. If one value is NaN, the result may be either of them, unlike that of [`Scalar::max`].
     #[inline(always)]
     pub fn max(self, b: Self) -> Self {
         Lanes(token::<S>().max_f64s(self.0, b.0))
@@ -93,7 +94,7 @@ impl<S: Simd> Lanes<S> {
     }
 
     #[inline(always)]
-    pub fn max_abs_or_nan(self) -> f64 {
+    pub fn reduce_max(self) -> f64 {
         token::<S>().reduce_max_f64s(self.0)
     }
 
@@ -103,7 +104,7 @@ impl<S: Simd> Lanes<S> {
         bytemuck::cast_slice(std::slice::from_ref(&self.0))
     }
 
-    /// A function of one number, lane by lane: for the functions that are rare in mechanics.
+    /// Applies a function of one number lane by lane, for functions that are rare in mechanics.
     #[inline]
     fn each(mut self, f: impl Fn(f64) -> f64) -> Self {
         for x in bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut self.0)) {
@@ -115,12 +116,12 @@ impl<S: Simd> Lanes<S> {
     /// Whether all lanes are within the range of the argument reduction.
     #[inline(always)]
     fn reducible(self) -> bool {
-        self.abs().max_abs_or_nan() < REDUCIBLE
+        self.abs().reduce_max() < REDUCIBLE
     }
 }
 
 impl<S: Simd> Register for Lanes<S> {
-    /// The sets with four lanes and more have it.
+    /// The instruction sets with at least four lanes have fused multiply-add.
     const FUSED: bool = S::F64_LANES >= 4;
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -166,7 +167,7 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        // Not by the set's own, which is a call in some of them.
+        // The instruction set's own function is a call in some sets.
         let set = token::<S>();
         Lanes(set.xor_f64s(self.0, set.splat_f64s(-0.0)))
     }
@@ -244,7 +245,7 @@ impl<S: Simd> Scalar for Lanes<S> {
     fn ln_1p(self) -> Self {
         self.each(f64::ln_1p)
     }
-    /// Two polynomials with nothing shared: where one of the results is not used, its work is dropped.
+    /// Two separate polynomials, so that the compiler removes one if its result is not used.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         (Scalar::sin(self), Scalar::cos(self))
@@ -298,7 +299,7 @@ impl<S: Simd> Scalar for Lanes<S> {
 mod tests {
     use super::*;
 
-    /// Sine and cosine of arguments, as many as there are lanes at a time.
+    /// Evaluates sine and cosine of the arguments in SIMD lanes.
     struct Evaluate<'a>(&'a [f64]);
 
     impl WithSimd for Evaluate<'_> {
@@ -315,8 +316,9 @@ mod tests {
         }
     }
 
-    /// Within 2 units in the last place, and the `1e-33 x` that two parts of pi leave out, of the standard library's, which are exact to half of
-    /// one, at random arguments of all sizes and beside the multiples of pi/2; beyond the range of the reduction they are those functions.
+    /// Sine and cosine agree with those of the standard library, which are accurate to half a unit in the last place,
+    /// to 2 units and `1e-33 |x|`, the error of pi in two parts. The arguments are random of all sizes, and neighbours
+    /// of multiples of pi/2. Beyond the range of the argument reduction the standard library is used.
     #[test]
     fn sines_are_those_of_one_number() {
         let mut arguments = Vec::new();
@@ -325,7 +327,7 @@ mod tests {
             random = (random + 0.618_033_988_749_894_9f64).fract();
             let size = 10f64.powi(k % 24 - 16);
             arguments.push((2.0 * random - 1.0) * size);
-            // The neighbours of multiples, where the rest after the reduction is smallest.
+            // Multiples of pi/2 and their neighbours, where the reduced argument is smallest.
             let multiple = f64::from(k * 8) * std::f64::consts::FRAC_PI_2;
             arguments.extend([multiple, multiple.next_up(), -multiple, f64::from(k) * std::f64::consts::FRAC_PI_2]);
         }
@@ -349,10 +351,10 @@ mod tests {
         }
     }
 
-    /// Choices of numbers by pairs, as many as there are lanes at a time.
+    /// Evaluates [`choices`] for pairs of numbers in SIMD lanes.
     struct ChooseLanes<'a>(&'a [f64], &'a [f64]);
 
-    /// `if_less` of a, b and 10, 20; the larger, the smaller, the size and the sign of a.
+    /// `if_less` of a, b and 10, 20; the maximum and minimum of a and b; the absolute value and the sign of a.
     fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
         [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
     }
@@ -393,10 +395,10 @@ mod tests {
         }
     }
 
-    /// Powers of numbers, and of their squares, with their slopes; as many as there are lanes at a time.
+    /// Evaluates [`slopes`] of numbers in SIMD lanes.
     struct Powers<'a>(&'a [f64]);
 
-    /// The slopes of powers and of a choice by x.
+    /// The derivatives of powers of x, and of a case distinction by x.
     fn slopes<T: Scalar>(x: T) -> [T; 5] {
         let x = contact_geom::support::KernelDual { re: x, d: SVector::<T, 1>::new(T::one()) };
         let zero = num_traits::Zero::zero();
@@ -438,7 +440,7 @@ mod tests {
         }
     }
 
-    /// Asks for one value of the lanes of two numbers in turn, in all ways that there are.
+    /// Requests a single value of lanes that hold two numbers, in each of the possible ways.
     struct Ask(f64, f64);
 
     impl WithSimd for Ask {

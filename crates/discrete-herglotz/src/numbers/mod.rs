@@ -1,4 +1,4 @@
-//! Numbers that the kernels compute with: vector registers, batches of them, sums that lose nothing, double-double numbers.
+//! Arithmetic of the kernels: SIMD registers and batches of them, compensated summation, double-double arithmetic.
 
 pub(crate) mod compensated;
 pub(crate) mod compensated_batch;

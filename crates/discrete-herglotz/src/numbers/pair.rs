@@ -1,4 +1,4 @@
-//! Several registers as one number.
+//! Several SIMD registers as one scalar.
 
 use crate::numbers::lanes::{Lanes, note_branch};
 use crate::numbers::registers::{MAX_STAGES, Stages};
@@ -6,9 +6,9 @@ use contact_geom::{Scalar, scalar_operators};
 use pulp::Simd;
 use std::ops::Neg;
 
-/// The values at so many stages as fill one register or more, as one number.
+/// The values at the stages in one or more SIMD registers, as one scalar.
 pub(crate) trait Registers<S: Simd>: Scalar {
-    /// How many registers it fills.
+    /// The number of registers.
     const COUNT: usize;
     /// The values of the blocks of stages from the r-th on.
     fn of(x: &Stages, r: usize) -> Self;
@@ -16,24 +16,25 @@ pub(crate) trait Registers<S: Simd>: Scalar {
     fn register(&self, i: usize) -> Lanes<S>;
 }
 
-/// Two numbers as one. Of registers: a formula that is read instruction by instruction is read once for both, and while one of them waits for its last
-/// operation, the other keeps the processor busy. Lane by lane the same bits as [`Lanes`].
+/// Two scalars as one. With registers, an interpreted formula is decoded once for both, and the operations of one
+/// overlap the latency of the other. Each lane has the same bits as with [`Lanes`].
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))] // Registers that lie across cache lines are slow to read after they were written.
+#[repr(align(64))] // A register that crosses a cache line is slow to read after it was written.
 pub(crate) struct Pair<T>(pub T, pub T);
 
-/// Two registers as one number.
+/// Two registers as one scalar.
 pub(crate) type Two<S> = Pair<Lanes<S>>;
 
-/// Four registers as one number.
+/// Four registers as one scalar.
 pub(crate) type Four<S> = Pair<Two<S>>;
 
-/// Whether formulas are evaluated over two registers at once: not over single lanes, which have a value to branch on.
+/// Whether formulas are evaluated over two registers at once: not for registers of a single lane, which have a value to
+/// branch on.
 pub(crate) const fn by_two<S: Simd>() -> bool {
     S::F64_LANES > 1
 }
 
-/// Whether they are over four: where there may be as many.
+/// Whether formulas are evaluated over four registers at once: if the stages can fill as many.
 pub(crate) const fn by_four<S: Simd>() -> bool {
     by_two::<S>() && 4 * S::F64_LANES <= MAX_STAGES
 }
@@ -62,7 +63,7 @@ impl<S: Simd, T: Registers<S>> Registers<S> for Pair<T> {
     }
 }
 
-/// What both of two say, where it is the same.
+/// The common value of two numbers; records a branch and returns NaN if they differ.
 fn agreed(a: f64, b: f64) -> f64 {
     if a == b || a.is_nan() && b.is_nan() {
         return a;
@@ -150,7 +151,7 @@ impl<T: Scalar> Scalar for Pair<T> {
     }
 }
 
-/// A method over as many registers at once as a formula is read for: one where L is compiled.
+/// Calls a method over as many registers at once as a formula is decoded for: one if L is compiled.
 macro_rules! over_registers {
     ($this:ident.$method:ident($($argument:expr),*); $l:ident, $s:ident, $left:expr) => {{
         use $crate::numbers::{lanes::Lanes, pair};

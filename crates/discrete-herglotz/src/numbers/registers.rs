@@ -1,4 +1,4 @@
-//! Values at the stages of a collocation step, and linear maps between them, in vector lanes.
+//! Values at the stages of a collocation step, and linear maps between them, in SIMD registers.
 
 use crate::numbers::compensated::Unevaluated;
 use crate::numbers::lanes::Lanes;
@@ -10,8 +10,8 @@ use std::array::from_fn;
 /// The largest number of stages.
 pub(crate) const MAX_STAGES: usize = 16;
 
-/// One number for each stage, padded to whole registers. What is beyond the last stage repeats it, so that formulas that are
-/// regular at the stages are so everywhere, or is multiplied by 0.
+/// One number for each stage, padded to whole registers. The padding repeats the last stage, so that formulas that are
+/// regular at the stages are regular there too, or it is multiplied by 0.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Stages(pub [f64; MAX_STAGES]);
@@ -25,7 +25,7 @@ impl Stages {
 
     #[inline(always)]
     pub fn block<S: Simd>(&self, r: usize) -> Lanes<S> {
-        // As a number: what is only moved the compiler takes for bytes, and moves by halves where it prefers those.
+        // The double negation marks the value as a number; otherwise the compiler may move it as bytes, in halves.
         -(-Lanes(S::as_simd_f64s(&self.0).0[r]))
     }
 
@@ -42,7 +42,7 @@ impl Stages {
         }
     }
 
-    /// The sum of what is 0 beyond the last stage.
+    /// The sum over the stages, for values with padding 0.
     #[inline(always)]
     pub fn sum<S: Simd>(&self, s: usize) -> f64 {
         let mut sum = Lanes::<S>::splat(0.0);
@@ -53,21 +53,21 @@ impl Stages {
     }
 }
 
-/// The registers that hold `s` stages.
+/// The number of registers that hold `s` stages.
 #[inline(always)]
 pub(crate) fn blocks<S: Simd>(s: usize) -> usize {
     s.div_ceil(Lanes::<S>::COUNT)
 }
 
-/// Numbers for the stages in double-double precision, with 0 beyond the last.
+/// One double-double number for each stage, padded with 0.
 pub(crate) type DoubleDoubleStages = [Quad; MAX_STAGES];
 
-/// The leading parts of numbers for the stages, the last one repeated beyond it.
+/// The heads of double-double numbers for the stages; the last one is repeated in the padding.
 pub(crate) fn padded(x: &DoubleDoubleStages, s: usize) -> Stages {
     Stages(from_fn(|i| x[i.min(s - 1)].0))
 }
 
-/// Weights of the stages, 0 beyond the last, with the part that one double leaves out.
+/// Double-double weights of the stages, padded with 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Weights {
     head: Stages,
@@ -92,7 +92,7 @@ impl Weights {
     }
 }
 
-/// Does something for all registers of the stages, K of them from the r-th on at a time: four, two and one.
+/// Repeats an expression for all registers of the stages, in groups of K = 4, 2 and 1 registers from the r-th on.
 macro_rules! over_groups {
     ($s:ident, $blocks:expr, $r:ident, $k:ident => $work:expr) => {
         over_groups!($s, $blocks, $r, $k at most 4 => $work)
@@ -121,7 +121,8 @@ macro_rules! over_groups {
 
 pub(crate) use over_groups;
 
-/// K registers from the r-th on. A loop: what `from_fn` calls may be compiled by itself, for no vector instructions.
+/// K registers from the r-th on. It uses a loop, since a closure in `from_fn` may be compiled as a separate function
+/// without vector instructions.
 #[inline(always)]
 fn group<S: Simd, const K: usize>(of: &impl Fn(usize) -> Lanes<S>, r: usize) -> [Lanes<S>; K] {
     let mut group = [Lanes::splat(0.0); K];
@@ -136,7 +137,7 @@ fn group<S: Simd, const K: usize>(of: &impl Fn(usize) -> Lanes<S>, r: usize) -> 
 pub(crate) struct StageMap(pub [Stages; MAX_STAGES]);
 
 impl StageMap {
-    /// The map with these rows.
+    /// The map with the given rows.
     pub fn new(rows: &[[f64; MAX_STAGES]; MAX_STAGES], s: usize) -> Self {
         StageMap(from_fn(|j| Stages(from_fn(|i| rows[i.min(s - 1)][j]))))
     }
@@ -167,7 +168,8 @@ impl StageMap {
         });
     }
 
-    /// `y_d = start_d + M x_d` of N vectors: two at a time, so that the matrix is loaded half as often. The same bits.
+    /// `y_d = start_d + M x_d` for N vectors, two at a time, so that the matrix is loaded half as often. The results
+    /// are bitwise those of [`apply`](Self::apply).
     #[inline(always)]
     pub fn apply_to_each<S: Simd, const N: usize>(
         &self,
@@ -190,9 +192,10 @@ impl StageMap {
         }
     }
 
-    /// The same of D vectors for the K registers from the r-th on.
+    /// `start_d + M x_d` for D vectors, in the K registers from the r-th on.
     ///
-    /// Even and odd columns apart: the sums that are under way keep the multipliers busy.
+    /// Even and odd columns are summed separately, so that more independent sums overlap the latency of the
+    /// multiplications.
     #[inline(always)]
     pub fn rows<S: Simd, const K: usize, const D: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! Several registers of lanes as one number, each lane a trajectory of its own.
+//! Several SIMD registers as one scalar, with one trajectory per lane.
 
 use crate::numbers::lanes::{Lanes, note_branch, token};
 use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
@@ -7,16 +7,17 @@ use pulp::{Simd, bytemuck};
 use std::fmt::{Debug, Formatter};
 use std::ops::Neg;
 
-/// `K` registers of the instruction set `S`: while one of them waits for its last operation, the others keep the processor busy.
+/// `K` registers of the instruction set `S`; the operations of one overlap the latency of the others.
 ///
-/// A lane's bits depend on that lane alone, and are the same in all instruction sets: products that are fused are so in all of them. A formula that asks for one value of the lanes
-/// (`re`, `extent`, `==`) gets none, whether they agree or not: see [`branched`](crate::numbers::lanes::branched).
+/// The bits of a lane depend on that lane alone, and are the same in all instruction sets, since the same products are
+/// fused in all of them. A formula that requests a single value of the lanes (`re`, `extent`, `==`) gets NaN or `false`
+/// and is recorded as a branch, whether the lanes agree or not: see [`branched`](crate::numbers::lanes::branched).
 #[derive(Clone, Copy)]
-#[repr(align(64))] // Registers that lie across cache lines are slow to read after they were written.
+#[repr(align(64))] // A register that crosses a cache line is slow to read after it was written.
 pub(crate) struct SimdBatch<S: Simd, const K: usize>(pub [S::f64s; K]);
 
 impl<S: Simd, const K: usize> SimdBatch<S, K> {
-    /// The lanes of all registers.
+    /// The number of lanes of all registers.
     pub const COUNT: usize = S::F64_LANES * K;
 
     #[inline(always)]
@@ -42,7 +43,7 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
         bytemuck::cast_slice_mut(&mut self.0)
     }
 
-    /// `self b + c` with one rounding, in every instruction set.
+    /// `self b + c` with one rounding, in all instruction sets.
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
         let set = token::<S>();
@@ -54,14 +55,14 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
         SimdBatch(self.0.map(f))
     }
 
-    /// A function of one number, lane by lane.
+    /// Applies a function of one number lane by lane.
     #[inline]
     fn each(mut self, f: impl Fn(f64) -> f64) -> Self {
         self.lanes_mut().iter_mut().for_each(|x| *x = f(*x));
         self
     }
 
-    /// `then` in lanes that are at most those of `b`, `otherwise` in all others, those that are not numbers among them.
+    /// `then` in the lanes with `self <= b`, `otherwise` in all others, including those with a NaN.
     #[inline(always)]
     pub fn at_most(self, b: Self, then: Self, otherwise: Self) -> Self {
         let set = token::<S>();
@@ -70,23 +71,24 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
         }))
     }
 
-    /// Lane by lane the larger; where one is not a number, the result may be either.
+    /// The lane-wise maximum. If one value is NaN, the result may be either of them.
     #[inline(always)]
-    pub fn max_or_nan(self, b: Self) -> Self {
+    pub fn max(self, b: Self) -> Self {
         let set = token::<S>();
         SimdBatch(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
     }
 
-    /// Whether a lane is not 0.
+    /// Whether any lane is not 0.
     #[inline(always)]
     pub fn any(self) -> bool {
         self.lanes().iter().any(|x| *x != 0.0)
     }
 
-    /// A function of an argument that is within the range of the reduction; not a number where the argument is beyond it.
+    /// The value of a function whose argument is within the range of the argument reduction; NaN for arguments beyond
+    /// it.
     ///
-    /// A lane that gets there leaves the pack, and is run by itself. A branch to the function of the standard library would have all registers
-    /// wait in memory for it.
+    /// A trajectory with such an argument leaves the batch and is computed by itself. A branch to the function of the
+    /// standard library would force all registers to memory.
     #[inline(always)]
     fn within_range(self, argument: Self) -> Self {
         let set = token::<S>();
@@ -181,7 +183,7 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     fn sqrt(self) -> Self {
         self.map(|x| token::<S>().sqrt_f64s(x))
     }
-    /// The products of `f64::powi`, in its order.
+    /// The products of `f64::powi`, in the same order.
     #[inline(always)]
     fn powi(self, n: i32) -> Self {
         let (mut power, mut base, mut left) = (Self::splat(1.0), self, n.unsigned_abs());
@@ -211,7 +213,7 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     fn ln_1p(self) -> Self {
         self.each(f64::ln_1p)
     }
-    /// Two polynomials with nothing shared: where one of the results is not used, its work is dropped.
+    /// Two separate polynomials, so that the compiler removes one if its result is not used.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         (Scalar::sin(self), Scalar::cos(self))

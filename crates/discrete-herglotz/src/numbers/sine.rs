@@ -1,25 +1,29 @@
-//! Sine and cosine of numbers that lie in vector registers.
+//! Sine and cosine in SIMD registers.
 
 use std::ops::{Add, Mul, Sub};
 
-/// The arguments below which sine and cosine are reduced by three parts of pi: the half turns then have at most 19 binary digits.
+/// The bound on the arguments that are reduced modulo pi with pi in three parts: the number of half turns then has at
+/// most 19 binary digits.
 pub(crate) const REDUCIBLE: f64 = 5e5;
 
-/// 1.5 * 2^52: a number of a smaller size added to it is rounded to an integer, whose last digit is the last of the sum's.
+/// 1.5 * 2^52: adding it rounds a smaller number to an integer, whose last binary digit is that of the sum.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
-/// pi to 107 binary digits. With fused products the first difference is exact: a multiple of the last digits of both, and below 2.
+/// pi to 107 binary digits, for fused multiply-add. The first difference is then exact: it is a multiple of the last
+/// digits of both terms, and below 2.
 const PI: [f64; 2] = [std::f64::consts::PI, f64::from_bits(0x3ca1_a626_3314_5c07)];
 
-/// pi to 140 binary digits: 33, 33 and the rest. The products of the first two with the turns are exact without fusing.
+/// pi to 140 binary digits, in parts of 33, 33 and the remaining digits. The products of the first two parts with the
+/// number of half turns are exact without fused multiply-add.
 const PI_IN_PARTS: [f64; 3] = [
     f64::from_bits(0x4009_21fb_5440_0000),
     f64::from_bits(0x3de0_b461_1a60_0000),
     f64::from_bits(0x3bb3_198a_2e03_7073),
 ];
 
-/// The polynomial of degree 7 in `r^2` nearest to `(sin r / r - 1) / r^2` for `|r| <= pi/2` (Remez): it is off by 3.4e-19 of the sine, with its
-/// coefficients rounded by 3.6e-17, a third of the rounding of the sine itself. The Taylor series needs eleven terms.
+/// The minimax polynomial (Remez) of degree 7 in `r^2` for `(sin r / r - 1) / r^2` on `|r| <= pi/2`. The relative error
+/// of the sine is 3.4e-19, and 3.6e-17 with rounded coefficients, a third of the round-off of the sine itself. The
+/// Taylor series needs eleven terms.
 const SINE: [f64; 8] = [
     2.731428986122616e-15,
     -7.643969031052769e-13,
@@ -31,35 +35,35 @@ const SINE: [f64; 8] = [
     -0.166_666_666_666_666_66,
 ];
 
-/// What the functions of this module ask of registers.
+/// The operations on registers that the functions of this module use.
 pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// Whether [`mul_add`](Self::mul_add) rounds once for certain.
+    /// Whether [`mul_add`](Self::mul_add) is fused, with a single rounding.
     const FUSED: bool;
     /// A constant in all lanes.
     fn splat(x: f64) -> Self;
     /// `self b + c`.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// With the other sign in the lanes in which the last binary digit of `of` is 1.
+    /// `self` with its sign changed in the lanes in which the last binary digit of `of` is 1.
     fn turned(self, of: Self) -> Self;
 }
 
-/// `sin x` for `|x|` below [`REDUCIBLE`], within 2 units in the last place and `1e-33 |x|`, which two parts of pi leave out.
+/// `sin x` for `|x|` below [`REDUCIBLE`], to 2 units in the last place and `1e-33 |x|`, the error of pi in two parts.
 #[inline(always)]
 pub(crate) fn sine<R: Register>(x: R) -> R {
     let rounded = x.mul_add(R::splat(std::f64::consts::FRAC_1_PI), R::splat(ROUNDING));
     reduced(x, rounded - R::splat(ROUNDING), rounded)
 }
 
-/// `cos x = sin(x + pi/2)`, the quarter turn put among the turns.
+/// `cos x = sin(x + pi/2)`, with the shift by pi/2 included in the number of half turns.
 #[inline(always)]
 pub(crate) fn cosine<R: Register>(x: R) -> R {
-    // The half is added before it is rounded to an integer.
+    // The half is added before the sum is rounded to an integer.
     let half = x.mul_add(R::splat(std::f64::consts::FRAC_1_PI), R::splat(0.5));
     let rounded = half + R::splat(ROUNDING);
     reduced(x, (rounded - R::splat(ROUNDING)) - R::splat(0.5), rounded)
 }
 
-/// `(-1)^k sin(x - turns pi)` where the last binary digit of `rounded` is that of k.
+/// `(-1)^k sin(x - turns pi)`, where k has the last binary digit of `rounded`.
 #[inline(always)]
 fn reduced<R: Register>(x: R, turns: R, rounded: R) -> R {
     let part = |r: R, part: f64| turns.mul_add(R::splat(-part), r);

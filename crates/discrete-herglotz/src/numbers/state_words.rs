@@ -1,14 +1,15 @@
-//! Steppers as words, so that a run can be interrupted and go on as if it had not been.
+//! Saving and restoring the state of steppers, so that an interrupted run can be resumed bitwise.
 
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Complex, SMatrix};
 
-/// What changes along a run: written as words of 64 bits, and read back in place. The rest is made anew from problem and integrator.
+/// Data that change in a run, written as 64-bit words and read back in place. All other data are recomputed from
+/// problem and integrator.
 pub(crate) trait Saved {
     /// Appends the words.
     fn save(&self, to: &mut Vec<u64>);
 
-    /// Takes its words from the front; `None` where they are not those of such a thing.
+    /// Reads the value from the front of the words; `None` if they are not those of such a value.
     fn load(&mut self, from: &mut &[u64]) -> Option<()>;
 }
 
@@ -50,7 +51,7 @@ impl<T: Saved, const M: usize> Saved for [T; M] {
     }
 }
 
-/// Of the same length.
+/// The length must be the same when it is read back.
 impl<T: Saved> Saved for Vec<T> {
     fn save(&self, to: &mut Vec<u64>) {
         self.iter().for_each(|x| x.save(to));
@@ -99,7 +100,8 @@ impl Saved for Complex<f64> {
     }
 }
 
-/// Implements [`Saved`] by some fields, in their order, and by two methods for the rest where it is named.
+/// Implements [`Saved`] for a type by the listed fields, in their order, and optionally by two methods for further
+/// data.
 macro_rules! saved {
     ([$($generics:tt)*] $kind:ty { $($field:ident),+ $(,)? } $(and $save:ident, $load:ident)?) => {
         impl<$($generics)*> $crate::numbers::state_words::Saved for $kind {
@@ -119,7 +121,7 @@ pub(crate) use saved;
 
 saved!([const N: usize] PhasePoint<N> { q, p, z });
 
-/// What may be there or not, where it can be made without its words.
+/// Saves an optional value.
 pub(crate) fn save_option<T: Saved>(option: Option<&T>, to: &mut Vec<u64>) {
     option.is_some().save(to);
     if let Some(x) = option {
@@ -127,7 +129,7 @@ pub(crate) fn save_option<T: Saved>(option: Option<&T>, to: &mut Vec<u64>) {
     }
 }
 
-/// The same back, from one that `make` makes.
+/// Reads an optional value back, in place of one that `make` returns.
 pub(crate) fn load_option<T: Saved>(from: &mut &[u64], make: impl FnOnce() -> T) -> Option<Option<T>> {
     let mut there = false;
     there.load(from)?;
@@ -139,7 +141,7 @@ pub(crate) fn load_option<T: Saved>(from: &mut &[u64], make: impl FnOnce() -> T)
     Some(Some(x))
 }
 
-/// FNV-1a, by words.
+/// A digest of words: FNV-1a applied to 64-bit words, with a rotation.
 pub(crate) fn digest(words: &[u64]) -> u64 {
     words.iter().fold(0xcbf2_9ce4_8422_2325, |sum, word| (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
 }

@@ -3,7 +3,7 @@
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
-use crate::solve::newton::{Linearised, NewtonStart, max_abs_or_nan, newton};
+use crate::solve::newton::{Linearised, NewtonStart, max_abs, newton};
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
@@ -209,7 +209,7 @@ impl<L, R: Rule> Quadrature<L, R> {
                 frame.accumulate::<SVector<f64, N>, N>(&self.lagrangian, 0, 0, &mut sums);
             }
         }
-        let size = max_abs_or_nan(&from.p) + max_abs_or_nan(&sums.right) * max_abs_or_nan(u);
+        let size = max_abs(&from.p) + max_abs(&sums.right) * max_abs(u);
         if !implicit {
             return Linearised {
                 residual: sums.residual,
@@ -224,7 +224,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         Linearised {
             residual: sums.residual + sums.right_z * z_change,
             jacobian: sums.right + sums.right_z * z_slope.transpose(),
-            size: size + max_abs_or_nan(&sums.right_z) * (from.z.abs() + (h * sums.value).abs()),
+            size: size + max_abs(&sums.right_z) * (from.z.abs() + (h * sums.value).abs()),
             z_change,
             z_slope,
         }
@@ -243,7 +243,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let (resolution, impulse) = ((max_abs_or_nan(&from.q) / h).abs(), max_abs_or_nan(&from.p) * h.abs());
+        let (resolution, impulse) = ((max_abs(&from.q) / h).abs(), max_abs(&from.p) * h.abs());
         let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
         let rounding = |u: &SVector<f64, N>, z1: f64| {
             let x = VelocityPoint { q: from.q + u * (0.5 * h), v: *u, z: z1 };
@@ -311,8 +311,7 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
 ) -> [f64; 2] {
     let (of_value, once) = gradient_rounding(lagrangian, t, x);
     let of_action = value_rounding(of_value, &once.x, &x.q);
-    [h.abs() * (max_abs_or_nan(&once.x) + max_abs_or_nan(p) * once.z) + max_abs_or_nan(&once.y), h.abs() * of_action]
-        .map(|e| ROUNDINGS * e)
+    [h.abs() * (max_abs(&once.x) + max_abs(p) * once.z) + max_abs(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
 }
 
 /// The node, or its mirror image for the adjoint rule.

@@ -131,7 +131,7 @@ impl Display for AnyIntegrator {
     }
 }
 
-/// From the name.
+/// Parses the name.
 impl FromStr for AnyIntegrator {
     type Err = UnknownIntegrator;
 
@@ -161,7 +161,7 @@ impl serde::Serialize for AnyIntegrator {
     }
 }
 
-/// From the name.
+/// Deserializes from the name.
 #[cfg(feature = "serde")]
 impl<'de> serde::Deserialize<'de> for AnyIntegrator {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

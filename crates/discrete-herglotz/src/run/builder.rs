@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// A [`Problem`] with an integrator, steps and observers; a builder.
 ///
-/// From these and the declared structure of the Lagrangian, [`Plan`] selects the least expensive route, and describes
+/// From these and the declared structure of the Lagrangian a [`Plan`] selects the least expensive route, and describes
 /// what will be computed and what is skipped. The declared structure is checked at sample points; a false claim is an
 /// error.
 ///

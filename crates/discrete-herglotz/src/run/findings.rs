@@ -1,9 +1,9 @@
-//! What a run has found out about its motion so far.
+//! Intermediate results of the checks of a run.
 
 use crate::UnresolvedStep;
 use crate::run::checks::energy_drift::EnergySums;
 
-/// What a run has found out about its motion so far.
+/// Intermediate results of the checks of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Findings {
     /// The logarithm of the product of the `sigma_d`.

@@ -1,4 +1,4 @@
-//! A motion as observers ask it for what its states do not hold.
+//! Quantities of a motion that are computed from its states.
 
 use crate::{DenseStep, StepError};
 use contact_geom::PhasePoint;
@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
 pub(crate) type Near<const N: usize> = Option<SVector<f64, N>>;
 
-/// A motion as observers ask it for what its states do not hold.
+/// Quantities of a motion that observers compute from its states.
 pub(crate) trait Motion<const N: usize> {
     /// The velocity at a state; if several velocities have its momentum, the one close to `near`.
     fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError>;

@@ -1,4 +1,4 @@
-//! What a run has led to.
+//! The result of a run.
 
 use crate::Start;
 use crate::{Status, UnresolvedStep};

@@ -1,4 +1,4 @@
-//! From a request to a plan: the checks, the steps and the route.
+//! Planning: the checks of a request, its steps and its route.
 
 use crate::integration::check_claims::check_claims_over;
 use crate::run::Plan;
@@ -22,7 +22,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         if span == 0.0 {
             return self.plan_of_the_start(length);
         }
-        // Beyond its rest no error relative to the motion can be told.
+        // After the motion has come to rest, errors relative to it are undefined.
         if let StepControl::For(..) = length
             && let Some(t_end) = self.time_of_rest()
         {
@@ -37,12 +37,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             if info.in_transformed_time {
                 self.dt_dtau()?;
             }
-            // A step for an accuracy is a root of that order.
+            // The step size for an accuracy is computed from a root of that order.
             if info.order == 0 {
                 return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
             }
         }
-        // trial runs look at the equations of motion along the whole span.
+        // Trial runs check the equations of motion along the whole span.
         let times = if let StepControl::For(..) = length { 4 } else { 16 };
         check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
         let choice = match length {
@@ -52,14 +52,14 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, &choice)?;
-        // trial runs have looked already.
+        // If an accuracy was requested, the trial runs have made these checks.
         if plan.error().is_none() {
             plan.check_first_steps()?;
         }
         Ok(plan)
     }
 
-    /// The plan of a run that ends where it starts: no step is taken.
+    /// The plan of a run that ends at its start time: no step is taken.
     fn plan_of_the_start(&self, length: StepControl<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
         let (integrator, error) = match (length, &self.integrator) {
             (StepControl::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
@@ -71,12 +71,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
         };
         integrator.check(self.problem.lagrangian)?;
-        // Its stepper has a step, though it takes none.
+        // The stepper needs a nonzero step size, although it takes no step.
         let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
         Plan::new(self, &StepSelection { integrator, count: 0, h, error, ended: None })
     }
 
-    /// Given steps of a named integrator.
+    /// The given steps of the given integrator.
     fn given(&self, steps: Steps) -> Result<StepSelection<'p, L, N>, InputError> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
         let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
@@ -93,7 +93,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),
             (Steps::Count(count), None) => Ok(of(count, integrator)),
             (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => Err(InputError::Step { h }),
-            // A step that fits the span up to rounding is not made shorter.
+            // The factor keeps a step size that divides the span up to round-off.
             (Steps::Size(h), _) => {
                 let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
                 check_count(count)?;
@@ -109,16 +109,16 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::TimeTransformation { rate }) }
     }
 
-    /// The same for the final (q, p) alone.
+    /// The same request without action and conformal factor.
     pub(crate) fn bare(&self) -> Self {
         Request { needs: OutputRequest::default(), integrator: self.integrator.clone(), ..*self }
     }
 }
 
-/// Runs have steps.
+/// The error of a run with 0 steps.
 pub(crate) const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
 
-/// What an integrator in transformed time needs.
+/// The hypothesis of integrators in transformed time on the steps.
 const SIZED: &str =
     "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
 

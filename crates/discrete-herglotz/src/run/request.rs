@@ -1,4 +1,4 @@
-//! What is requested of a run: its span, its steps, its integrator and its outputs.
+//! The request of a run: its span, its steps, its integrator and its outputs.
 
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
@@ -6,38 +6,39 @@ use crate::{InputError, Integrator, Problem};
 use contact_geom::nalgebra::SVector;
 use std::sync::Arc;
 
-/// The time steps of a run. They go back in time where the run does.
+/// The time steps of a run. If the run goes backward in time, so do its steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
-    /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator in transformed time, steps
-    /// of this length in the transformed time, the last one shorter.
+    /// Steps of this size, reduced so that a whole number of them fills the span. For an integrator in transformed
+    /// time, steps of this size in that time; the last step is shorter.
     Size(f64),
-    /// This many steps; not in transformed time, which counts them itself.
+    /// This number of steps. Not available in transformed time, where the number of steps results from the integration.
     Count(usize),
 }
 
-/// Where a run ends, if no observer ends it before.
+/// The end of a run, unless an observer ends it earlier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Until {
-    /// At this time, before or after that of the start, or there: then the start is all that is seen.
+    /// At this time, before or after the start time. If it is the start time, observers see the start only.
     Time(f64),
-    /// After this time, negative to go back.
+    /// After this duration; negative for a run backward in time.
     After(f64),
-    /// After so many steps of the [size](Steps::Size) that is given; a negative size goes back.
+    /// After this number of steps of the given [size](Steps::Size); a negative size gives a run backward in time.
     Steps(usize),
 }
 
-/// An integrator for as long as the Lagrangian lives.
+/// A shared integrator, for the lifetime of the Lagrangian.
 pub(crate) type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
 
-/// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
+/// The step-size selection for an accuracy, as a function pointer: it is not compiled into programs that request no
+/// accuracy.
 pub(crate) type ChooseSteps<'p, L, const N: usize> =
     for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<StepSelection<'p, L, N>, InputError>;
 
-/// How long the steps of a run are to be.
+/// How the steps of a run are determined.
 pub(crate) enum StepControl<'p, L, const N: usize> {
     Given(Steps),
-    /// So many steps of this length exactly.
+    /// This number of steps of exactly this size.
     Exactly(usize, f64),
     For(f64, ChooseSteps<'p, L, N>),
 }
@@ -50,26 +51,26 @@ impl<L, const N: usize> Clone for StepControl<'_, L, N> {
 
 impl<L, const N: usize> Copy for StepControl<'_, L, N> {}
 
-/// What is asked of a run, without its observers.
+/// The request of a run, without its observers.
 pub(crate) struct Request<'p, L, const N: usize> {
     pub problem: &'p Problem<'p, L, N>,
     pub t_end: f64,
     pub span: f64,
     pub integrator: Option<Shared<'p, L, N>>,
     pub needs: OutputRequest,
-    /// What the errors of the coordinates are measured by, where that is given.
+    /// The scales of the coordinates for errors, if they are given.
     pub scales: Option<SVector<f64, N>>,
 }
 
-/// What is chosen for a run.
+/// The integrator and the steps that are selected for a run.
 pub(crate) struct StepSelection<'p, L, const N: usize> {
     pub integrator: Shared<'p, L, N>,
     pub count: usize,
-    /// The length of a step; in transformed time, in its time.
+    /// The step size; in transformed time, the step of tau.
     pub h: f64,
-    /// The error that the trial runs found, or predict; `None` where the steps are given.
+    /// The error that the trial runs found or predict; `None` for given steps.
     pub error: Option<f64>,
-    /// The steps after which an observer is to end the run, where they go on beyond.
+    /// The number of steps after which an observer is expected to end the run, if the steps fill a longer span.
     pub ended: Option<usize>,
 }
 
@@ -79,5 +80,5 @@ impl<L, const N: usize> Clone for StepSelection<'_, L, N> {
     }
 }
 
-/// The largest number of steps: `t0 + k h` then still tells times a thousandth of a step apart.
+/// The largest number of steps: up to it `t0 + k h` resolves times to a thousandth of a step.
 pub(crate) const MOST_STEPS: f64 = (1u64 << 42) as f64;

@@ -1,4 +1,4 @@
-//! A run where it was interrupted, as data.
+//! The state of an interrupted run, and its file format.
 
 use crate::UnresolvedStep;
 use crate::numbers::state_words::{Saved, digest, load_option, save_option, word};
@@ -7,58 +7,58 @@ use std::io::Write;
 use std::path::Path;
 use thiserror::Error;
 
-/// What a file of a checkpoint begins with, and the version of what follows.
+/// The first word of a checkpoint file, and the version of its format.
 const MAGIC: u64 = u64::from_le_bytes(*b"herglotz");
 const VERSION: u64 = 3;
 
-/// Why a file is no checkpoint.
+/// The reason why a file cannot be used as a checkpoint.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("the checkpoint cannot be read: {0}")]
     Unreadable(#[from] std::io::Error),
-    /// It is another kind of file.
+    /// The file is of another kind.
     #[error("the file is no checkpoint of a run; give one that `Checkpoint` has written")]
     Foreign,
-    /// Another version of the library has written it.
+    /// The file has another version of the format.
     #[error(
         "the checkpoint has version {found}, where this library reads {VERSION}; go on with the library that wrote it"
     )]
     Version {
-        /// Its version.
+        /// The version of the file.
         found: u64,
     },
-    /// It is damaged, or was not written to its end.
+    /// The file is damaged or incomplete.
     #[error("the checkpoint is damaged; start the run anew, or from another checkpoint")]
     Damaged,
 }
 
-/// A run where it was interrupted, for [`Run::resume`](crate::run::Run::resume).
+/// The state of an interrupted run, for [`Run::resume`](crate::run::Run::resume).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResumeState {
-    /// What the run is; see [`Plan`](crate::run::Plan).
+    /// A digest that identifies the run; see [`Plan`](crate::run::Plan).
     pub(crate) fingerprint: u64,
     pub(crate) taken: usize,
     pub(crate) log_factor: f64,
     pub(crate) unresolved: Option<UnresolvedStep>,
     pub(crate) energy: EnergySums,
-    /// The stepper's own.
+    /// The saved words of the stepper.
     pub(crate) words: Vec<u64>,
 }
 
 impl ResumeState {
-    /// From the file of a [`Checkpoint`].
+    /// Reads the file of a [`Checkpoint`](crate::Checkpoint).
     ///
     /// # Errors
-    /// A [`CheckpointError`] where it is not one of a run.
+    /// A [`CheckpointError`] if the file is not a checkpoint of a run.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CheckpointError> {
         Self::from_bytes(&std::fs::read(path)?)
     }
 
-    /// From what [`to_bytes`](Self::to_bytes) has made.
+    /// Decodes the result of [`to_bytes`](Self::to_bytes).
     ///
     /// # Errors
-    /// A [`CheckpointError`] where the bytes are not those of a run.
+    /// A [`CheckpointError`] if the bytes do not encode an interrupted run.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let words: Vec<u64> =
             bytes.chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default())).collect();
@@ -83,7 +83,8 @@ impl ResumeState {
         Some(ResumeState { fingerprint, taken, log_factor, unresolved, energy, words: from.to_vec() })
     }
 
-    /// As bytes, with their digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint's file.
+    /// Encodes the state as bytes, with a digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint
+    /// file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut body = vec![self.fingerprint];
         self.taken.save(&mut body);
@@ -96,10 +97,11 @@ impl ResumeState {
         words.flat_map(u64::to_le_bytes).collect()
     }
 
-    /// To a file that is there whole or not at all, for [`read`](Self::read).
+    /// Writes a file atomically, for [`read`](Self::read): a temporary file is renamed after it has been written
+    /// completely.
     ///
     /// # Errors
-    /// Those of the file.
+    /// An I/O error.
     pub fn write(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
         let path = path.as_ref();
         let part = path.with_extension("part");

@@ -1,4 +1,4 @@
-//! LU factors of large matrices by faer.
+//! LU factorisation of large matrices by faer.
 
 use crate::StepError;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -6,7 +6,7 @@ use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::perm::PermRef;
 use faer::{Mat, Par};
 
-/// faer's LU factors of one matrix after another of one size, and the workspace for them.
+/// faer's LU factorisation for matrices of one size, with its workspace.
 pub(crate) struct DenseLu {
     factors: Mat<f64>,
     rhs: Mat<f64>,
@@ -18,7 +18,7 @@ pub(crate) struct DenseLu {
 }
 
 impl DenseLu {
-    /// For matrices of `n` rows.
+    /// The workspace for matrices of `n` rows.
     pub fn new(n: usize) -> Self {
         let scratch = factor::lu_in_place_scratch::<usize, f64>(n, n, Par::Seq, Default::default())
             .or(solve::solve_in_place_scratch::<usize, f64>(n, 1, Par::Seq));
@@ -32,10 +32,10 @@ impl DenseLu {
         }
     }
 
-    /// Factorises the matrix with these entries.
+    /// Factorises the matrix with the given entries.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where a pivot vanishes or is not finite: faer is silent on it.
+    /// [`StepError::Singular`] if a pivot vanishes or is not finite, which faer does not report.
     pub fn factorise(&mut self, entry: impl Fn(usize, usize) -> f64) -> Result<(), StepError> {
         let n = self.factors.nrows();
         for j in 0..n {
@@ -46,7 +46,7 @@ impl DenseLu {
         self.factorise_entries()
     }
 
-    /// Apart from what is generic, so that faer's code is compiled with this crate and not with each program.
+    /// Separate from the generic function, so that faer's code is compiled with this crate and not with each program.
     fn factorise_entries(&mut self) -> Result<(), StepError> {
         factor::lu_in_place(
             self.factors.as_mut(),
@@ -63,10 +63,10 @@ impl DenseLu {
         if self.least > 0.0 && self.least.is_finite() { Ok(()) } else { Err(StepError::Singular { pivot: self.least }) }
     }
 
-    /// Solves with the last matrix; `b` is used up, the solution is left in it.
+    /// Solves with the last factorised matrix; `b` is overwritten by the solution.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where the solution is not finite.
+    /// [`StepError::Singular`] if the solution is not finite.
     pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
         for (i, e) in b.iter().enumerate() {
             self.rhs[(i, 0)] = *e;

@@ -2,14 +2,15 @@
 
 use contact_geom::VelocityPoint;
 
-/// The cubic curve through two points with their velocities, at some time after the first; straight on beside them.
+/// The cubic Hermite interpolant of two points with their velocities, at the time `at` after the first point;
+/// extrapolated linearly outside the span. The action is interpolated linearly.
 pub(crate) fn hermite<const N: usize>(
     start: &VelocityPoint<N>,
     end: &VelocityPoint<N>,
     span: f64,
     at: f64,
 ) -> VelocityPoint<N> {
-    // In units of the span, which is negative where the run goes back.
+    // Time in units of the span, which is negative in a run backward in time.
     let u = at / span;
     if u <= 0.0 {
         return VelocityPoint { q: start.q + start.v * at, ..*start };

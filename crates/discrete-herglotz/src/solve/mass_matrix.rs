@@ -4,11 +4,12 @@ use contact_geom::nalgebra::SMatrix;
 use contact_geom::support::linear::{self, SingularMatrix};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
-/// The largest dimension whose directions are carried at once; larger ones go in blocks, so that the numbers stay small
-/// enough for the stack and for registers.
+/// The largest number of directional derivatives that are computed at once. More are computed in blocks, so that the
+/// dual numbers stay small enough for the stack and for registers.
 pub(crate) const BLOCK: usize = 8;
 
-/// W alone where there are many coordinates; else with the other second derivatives, which are compiled in any case.
+/// The mass matrix W. For many coordinates it is computed alone; for few it is taken from the full Hessian, which is
+/// compiled in any case.
 pub(crate) fn mass_matrix<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
@@ -17,12 +18,12 @@ pub(crate) fn mass_matrix<const N: usize>(
     if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
 }
 
-/// Whether a matrix is the identity; without one to compare with, for the sake of the stack.
+/// Whether a matrix is the identity; compared entry by entry, to save stack space.
 pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
     (0..N).all(|j| (0..N).all(|i| m[(i, j)] == f64::from(u8::from(i == j))))
 }
 
-/// W on the heap, for what is kept.
+/// The mass matrix W on the heap, to be kept.
 #[inline(never)]
 pub(crate) fn kept_mass_matrix<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
@@ -32,7 +33,7 @@ pub(crate) fn kept_mass_matrix<const N: usize>(
     Box::new(mass_matrix(lagrangian, t, x))
 }
 
-/// The inverse, column by column, on the heap.
+/// The inverse of a matrix, computed column by column, on the heap.
 #[inline(never)]
 pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<Box<SMatrix<f64, N, N>>, SingularMatrix> {
     let mut inverse = SMatrix::<f64, N, N>::identity();

@@ -1,4 +1,4 @@
-//! The solution of a step's equations: Newton's method, and the only place that knows faer.
+//! The solution of the equations of a step: Newton's method and linear solvers. Only this module uses faer.
 
 #[cfg(feature = "faer")]
 mod faer_lu;

@@ -1,9 +1,10 @@
-//! LU factors of large matrices by nalgebra, for builds without faer: slower, and each factorisation allocates.
+//! LU factorisation of large matrices by nalgebra, for builds without faer; it is slower, and each factorisation
+//! allocates.
 
 use crate::StepError;
 use contact_geom::nalgebra::{DMatrix, DVectorViewMut, Dyn, LU};
 
-/// The LU factors of one matrix after another of one size.
+/// LU factorisation for matrices of one size.
 pub(crate) struct DenseLu {
     n: usize,
     factors: Option<LU<f64, Dyn, Dyn>>,
@@ -12,15 +13,15 @@ pub(crate) struct DenseLu {
 }
 
 impl DenseLu {
-    /// For matrices of `n` rows.
+    /// A factorisation for matrices of `n` rows.
     pub fn new(n: usize) -> Self {
         DenseLu { n, factors: None, least: 0.0 }
     }
 
-    /// Factorises the matrix with these entries.
+    /// Factorises the matrix with the given entries.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where a pivot vanishes or is not finite.
+    /// [`StepError::Singular`] if a pivot vanishes or is not finite.
     pub fn factorise(&mut self, entry: impl Fn(usize, usize) -> f64) -> Result<(), StepError> {
         let factors = DMatrix::from_fn(self.n, self.n, entry).lu();
         let pivots = factors.lu_internal().diagonal();
@@ -31,10 +32,10 @@ impl DenseLu {
         if self.least > 0.0 && self.least.is_finite() { Ok(()) } else { Err(StepError::Singular { pivot: self.least }) }
     }
 
-    /// Solves with the last matrix; `b` is used up, the solution is left in it.
+    /// Solves with the last factorised matrix; `b` is overwritten by the solution.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where the solution is not finite.
+    /// [`StepError::Singular`] if the solution is not finite.
     pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
         let n = b.len();
         let solved = self.factors.as_ref().is_some_and(|lu| lu.solve_mut(&mut DVectorViewMut::from_slice(b, n)));

@@ -4,7 +4,7 @@ use crate::{StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::max_or_nan;
 
-/// The iterations that a step may take.
+/// The largest number of Newton iterations of a step.
 pub const ITERATION_LIMIT: u32 = 50;
 
 /// The step equations linearised at an iterate `(u, z)`, with the scalar unknown `z` already eliminated.
@@ -13,7 +13,7 @@ pub(crate) struct Linearised<const N: usize> {
     pub residual: SVector<f64, N>,
     /// Its derivative in `u`, `z` eliminated.
     pub jacobian: SMatrix<f64, N, N>,
-    /// The size that the terms of the residual have, for a bound on its round-off.
+    /// The size of the terms of the residual, for a bound on its round-off.
     pub size: f64,
     /// The correction of `z` is `z_change + z_slope . (correction of u)`.
     pub z_change: f64,
@@ -21,16 +21,16 @@ pub(crate) struct Linearised<const N: usize> {
     pub z_slope: SVector<f64, N>,
 }
 
-/// Where Newton's method starts, and the sizes that tell round-off.
+/// The initial guess of Newton's method, and the sizes for bounds on round-off.
 pub(crate) struct NewtonStart<const N: usize> {
-    /// The guess of the mean velocity.
+    /// The initial guess of the mean velocity.
     pub u: SVector<f64, N>,
-    /// The guess of the unknown action.
+    /// The initial guess of the unknown action.
     pub z: f64,
-    /// The size of the known position divided by the step: `eps` times this is the velocity below which a correction does
-    /// not move the position.
+    /// The size of the known position divided by the step: a correction below `eps` times this does not change the
+    /// position.
     pub resolution: f64,
-    /// The known momentum times the step, so that its product with the velocity is an action of the size of a step's.
+    /// The known momentum times the step, so that its product with the velocity has the size of the action of a step.
     pub impulse: f64,
 }
 
@@ -41,10 +41,10 @@ pub(crate) struct Root<const N: usize> {
     pub iterations: u32,
 }
 
-/// The largest absolute component. A plain loop: nalgebra's `amax` goes through lane-wise comparisons, and costs a tenth of
-/// a small step.
+/// The largest absolute component. A plain loop, since nalgebra's `amax` uses lane-wise comparisons and costs a tenth
+/// of a small step.
 #[inline(always)]
-pub(crate) fn max_abs_or_nan<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
+pub(crate) fn max_abs<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
     let mut largest = 0.0;
     for column in &m.data.0 {
         for &c in column {
@@ -54,21 +54,22 @@ pub(crate) fn max_abs_or_nan<const R: usize, const C: usize>(m: &SMatrix<f64, R,
     largest
 }
 
-/// Whether the correction of a Newton iteration after this one is within a tolerance: convergence is quadratic, so from two
-/// corrections `before > now` the next is about `now^3 / before^2`. The first correction, with an infinite one before, tells nothing
-/// of the next unless it vanishes.
+/// Whether the next Newton correction is predicted to be within a tolerance: convergence is quadratic, so from two
+/// corrections `before > now` the next is about `now^3 / before^2`. After the first correction (`before` infinite)
+/// there is no prediction, unless the correction vanishes.
 #[inline]
 pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
     now == 0.0 || before.is_finite() && now * (now / before) * (now / before) <= tolerance
 }
 
-/// Solves the step equations for `(u, z)` from a guess.
+/// Solves the step equations for `(u, z)` from an initial guess.
 ///
-/// Stopping rule, the first that holds: the next corrections of `u` and `z`, predicted from the last two, are below their
-/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate, that of
-/// `u` below what moves the position, or the residual and that of `z` below what `rounding` says
-/// that the terms within L may leave of the two. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
-/// as an iteration; after [`ITERATION_LIMIT`] the step fails.
+/// The iteration stops as soon as one of these holds: the next corrections of `u` and `z`, predicted from the last two,
+/// are below their round-off; the residual and the defect of `z` are below the round-off of their terms; the
+/// corrections stagnate, and either that of `u` does not move the position, or the residual and the correction of `z`
+/// are below `rounding`, the round-off of the two due to the terms of L. If an iterate is outside the domain (a value
+/// is not finite), half of the last correction is taken back, which counts as an iteration. After [`ITERATION_LIMIT`]
+/// iterations the step fails.
 #[inline(always)]
 pub(crate) fn newton<const N: usize>(
     start: NewtonStart<N>,
@@ -83,8 +84,8 @@ pub(crate) fn newton<const N: usize>(
     let mut residual_size = f64::INFINITY;
     for iterations in 1..=ITERATION_LIMIT {
         let mut at = linearise(&u, z)?;
-        residual_size = max_abs_or_nan(&at.residual);
-        // `amax` ignores a NaN; the sum does not.
+        residual_size = max_abs(&at.residual);
+        // The maximum ignores a NaN; the sum does not.
         if !(at.residual.sum() + at.jacobian.sum() + at.z_change).is_finite() {
             if last_size == f64::INFINITY {
                 return Err(StepError::NonFinite);
@@ -100,18 +101,19 @@ pub(crate) fn newton<const N: usize>(
         let z_change = at.z_change + at.z_slope.dot(&change);
         u += change;
         z += z_change;
-        let u_size = max_abs_or_nan(&u);
-        let (size, z_size) = (max_abs_or_nan(&change), z_change.abs());
+        let u_size = max_abs(&u);
+        let (size, z_size) = (max_abs(&change), z_change.abs());
         let predicted = last_size.is_finite()
             && last_correction(size, last_size, f64::EPSILON * u_size)
             && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
         let round_off = 8.0 * f64::EPSILON;
-        // The size of the terms that z is the sum of, with what rounding leaves of subnormal ones.
+        // The size of the terms of z, with a lower bound for the round-off of subnormal terms.
         let action = z.abs() + start.z.abs() + impulse * u_size + f64::MIN_POSITIVE / f64::EPSILON;
-        // A residual of subnormal numbers is their rounding.
+        // A subnormal residual is round-off.
         let exact = residual_size <= round_off * at.size + f64::MIN_POSITIVE && at.z_change.abs() <= round_off * action;
-        // Where no z solves its equation (beyond a pole of the motion) its corrections stagnate too, but are as large as z: half
-        // of the digits tell that from what a potential's own cancellation leaves.
+        // If no z solves its equation (beyond a pole of the motion) the corrections of z stagnate too, but are as large
+        // as z. A tolerance of half of the digits distinguishes this from stagnation due to cancellation within a
+        // potential.
         let unresolved_within =
             z_size <= round_off * action || (z_size >= 0.5 * last_z_size && z_size <= f64::EPSILON.sqrt() * action);
         let rounded = |u: &SVector<f64, N>| {
@@ -132,7 +134,7 @@ pub(crate) fn newton<const N: usize>(
 mod tests {
     use super::*;
 
-    /// `u = 1`, known from the start, and `z^2 = 2`: the iteration goes on until z is there as well.
+    /// `u = 1`, which is the initial guess, and `z^2 = 2`: the iteration continues until z has converged too.
     #[test]
     fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
         let start = NewtonStart { u: SVector::from([1.0]), z: 1.5, resolution: 1.0, impulse: 1.0 };

@@ -1,18 +1,18 @@
-//! Roots of functions of one number between two points.
+//! Bracketed roots of functions of one variable.
 
-/// A root of a function of `[0, 1]` between two points with values of opposite signs, to round-off, by the ITP method of
-/// Oliveira and Takahashi (ACM Transactions on Mathematical Software 47, 2021): the secant, truncated towards the middle and
-/// projected so that it never takes more evaluations than bisection by more than one.
+/// A root of a function on `[0, 1]` between two points with values of opposite signs, to round-off, by the ITP method
+/// of Oliveira and Takahashi (ACM Transactions on Mathematical Software 47, 2021): the regula falsi point is truncated
+/// towards the middle and projected, so that the number of evaluations exceeds that of bisection by at most one.
 pub(crate) fn bracketed_root<E>(
     ends: [f64; 2],
     values: [f64; 2],
     f: impl FnMut(f64) -> Result<f64, E>,
 ) -> Result<f64, E> {
-    // The spacing of the numbers below 1.
+    // The spacing of the numbers in [1/2, 1).
     bracketed_root_within(0.5 * f64::EPSILON, ends, values, f)
 }
 
-/// The same to within a width.
+/// A root as found by [`bracketed_root`], to within a half-width.
 pub(crate) fn bracketed_root_within<E>(
     half_width: f64,
     [mut a, mut b]: [f64; 2],
@@ -51,8 +51,8 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    /// A simple root, a triple one and a jump: each to the spacing of the numbers below 1, in no more evaluations than
-    /// bisection and one; the simple one in far fewer.
+    /// A simple root, a triple root and a jump are found to round-off in at most one evaluation more than bisection;
+    /// the simple root in far fewer.
     #[test]
     fn roots_are_found_to_round_off() {
         let root = |f: &dyn Fn(f64) -> f64| {
@@ -66,7 +66,7 @@ mod tests {
         let near = |x: f64, expected: f64| (x - expected).abs() <= f64::EPSILON;
         let (x, count) = root(&|x| x.exp() - 1.5);
         assert!(near(x, 1.5f64.ln()) && count <= 15, "{x}, {count}");
-        // `(x - r)^3` vanishes to round-off of x only.
+        // Values of `(x - r)^3` vanish only to the round-off of x.
         let (x, count) = root(&|x| (x - 0.3).powi(3));
         assert!(near(x, 0.3) && count <= 54, "{x}, {count}");
         let (x, count) = root(&|x| if x < 0.7 { -1e300 } else { 1e-300 });

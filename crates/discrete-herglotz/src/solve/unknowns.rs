@@ -1,19 +1,19 @@
-//! The directions of a step's unknowns, as modules that duals carry.
+//! Vector types for the derivatives of dual numbers in the directions of a step's unknowns.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{AugmentedVector, TangentVector};
 
-/// A module of `LEN` directions that can be reached by index: a block of the unknowns of a step.
+/// A vector with `LEN` indexed components, one for each direction in a block of the unknowns of a step.
 pub(crate) trait Unknowns: TangentVector<f64> {
     /// The number of directions.
     const LEN: usize;
-    /// The element with `value` in direction `i`.
+    /// The vector with `value` in direction `i` and 0 in all others.
     fn unit(i: usize, value: f64) -> Self;
     /// The component in direction `i`.
     fn get(&self, i: usize) -> f64;
 }
 
-/// The mean velocity alone: rules explicit in z.
+/// The mean velocity alone, for rules explicit in z.
 impl<const M: usize> Unknowns for SVector<f64, M> {
     const LEN: usize = M;
     #[inline(always)]
@@ -28,7 +28,7 @@ impl<const M: usize> Unknowns for SVector<f64, M> {
     }
 }
 
-/// The mean velocity and the end action: rules implicit in z.
+/// The mean velocity and the end action, for rules implicit in z.
 impl<const M: usize> Unknowns for AugmentedVector<M> {
     const LEN: usize = M + 1;
     #[inline(always)]

@@ -180,7 +180,7 @@ impl<const N: usize> Curve<N> {
 struct Between {
     /// The points, as fractions of the step.
     points: Stages,
-    /// The values of the polynomial, and its integral from 0.
+    /// The maps to the values of the polynomial, and to its integral from 0.
     value: StageMap,
     integral: StageMap,
 }
@@ -340,10 +340,10 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             };
         }
         let relative = |defect: f64, size: f64| if defect > 0.0 { defect / size } else { 0.0 };
-        let (size, size_z) = (size.max_abs_or_nan(), size_z.max_abs_or_nan());
-        let (of_momenta, of_action) = (defect.max_abs_or_nan(), of_z.max_abs_or_nan());
+        let (size, size_z) = (size.reduce_max(), size_z.reduce_max());
+        let (of_momenta, of_action) = (defect.reduce_max(), of_z.reduce_max());
         let defect = relative(of_momenta, size) + relative(of_action, size_z);
-        let of_value = beyond_rounding(of_value.max_abs_or_nan(), largest_l.max_abs_or_nan());
+        let of_value = beyond_rounding(of_value.reduce_max(), largest_l.reduce_max());
         // The coefficients do not depend on the sample points; set 0 alone returns the estimate from them.
         if set > 0 {
             return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
@@ -368,7 +368,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             size_z,
             expected,
             of_value,
-            kinetic: kinetic.max_abs_or_nan(),
+            kinetic: kinetic.reduce_max(),
             ends,
             follows_a_jump: false,
         }

@@ -74,6 +74,6 @@ impl Tail {
             }
             tail = max_or_nan(tail, last.sum().abs());
         }
-        if tail * time > MOVED * width.max_abs_or_nan() { tail / (TAIL * size.max_abs_or_nan()) } else { 0.0 }
+        if tail * time > MOVED * width.reduce_max() { tail / (TAIL * size.reduce_max()) } else { 0.0 }
     }
 }

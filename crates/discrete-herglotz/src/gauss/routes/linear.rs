@@ -16,7 +16,7 @@ use std::array::from_fn;
 /// position relative to a reference point. The reference point is the equilibrium if there is one; with another one the
 /// terms would cancel as a motion comes to rest, and leave their round-off.
 struct Action<const N: usize> {
-    stage_positions: SVector<f64, N>,
+    equilibrium_position: SVector<f64, N>,
     qq: SMatrix<f64, N, N>,
     qv: SMatrix<f64, N, N>,
     vv: SMatrix<f64, N, N>,
@@ -25,7 +25,7 @@ struct Action<const N: usize> {
     constant: f64,
 }
 
-/// The state of a linear motion and the affine map that advances it, as changes: `q1 - q0`, `v1 - v0`.
+/// The state of a linear motion, and the affine map to its changes in a step, `q1 - q0` and `v1 - v0`.
 pub(crate) struct Linear<const N: usize> {
     qq: [[Unevaluated; N]; N],
     qv: [[Unevaluated; N]; N],
@@ -45,13 +45,13 @@ pub(crate) struct Linear<const N: usize> {
 /// The zero of a force that is affine in the positions, from its derivative and its value at the origin; the origin if
 /// there is no zero, or more than one.
 fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f64, N>) -> SVector<f64, N> {
-    let mut stage_positions = -at_origin;
-    if stage_positions.iter().all(|x| *x == 0.0) {
+    let mut equilibrium_position = -at_origin;
+    if equilibrium_position.iter().all(|x| *x == 0.0) {
         return SVector::zeros();
     }
-    let solved = linear::solve(&mut slope.clone(), &mut stage_positions).is_ok()
-        && stage_positions.iter().all(|x| x.is_finite());
-    if solved { stage_positions } else { SVector::zeros() }
+    let solved = linear::solve(&mut slope.clone(), &mut equilibrium_position).is_ok()
+        && equilibrium_position.iter().all(|x| x.is_finite());
+    if solved { equilibrium_position } else { SVector::zeros() }
 }
 
 impl<const N: usize> Linear<N> {
@@ -71,8 +71,8 @@ impl<const N: usize> Linear<N> {
         let at_origin = lagrangian.gradient(t, &origin);
         let (slope, constant) = (inverse_mass * qq, inverse_mass * at_origin.x);
         let unit = |d: usize, e: usize, x: Quad| if d == e { x } else { zero };
-        let stage_positions = equilibrium(&qq, &at_origin.x);
-        let there = VelocityPoint { q: stage_positions, v: SVector::zeros(), z: 0.0 };
+        let equilibrium_position = equilibrium(&qq, &at_origin.x);
+        let there = VelocityPoint { q: equilibrium_position, v: SVector::zeros(), z: 0.0 };
         let at_place = lagrangian.gradient(t, &there);
         let constant_at_place = inverse_mass * at_place.x;
         // The equations of the stage accelerations, in rows (i, d): a_id - sum slope B a = slope (q0 + u v0) + f. The
@@ -110,7 +110,7 @@ impl<const N: usize> Linear<N> {
             };
             let velocity =
                 |i: usize, d: usize, side: usize| unit(side, N + d, exact.inverse_rho[i]) + sum(&exact.d[i], d, side);
-            let rest = lagrangian.value(t, &stage_positions, &origin.v, 0.0);
+            let rest = lagrangian.value(t, &equilibrium_position, &origin.v, 0.0);
             let form = |a: usize, b: usize| {
                 (0..s).fold(0.0, |total, i| {
                     let x = |side: usize| SVector::<f64, N>::from_fn(|d, _| position(i, d, side).0);
@@ -125,7 +125,7 @@ impl<const N: usize> Linear<N> {
                 })
             };
             Action {
-                stage_positions,
+                equilibrium_position,
                 qq: SMatrix::from_fn(&form),
                 qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
                 vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
@@ -191,7 +191,7 @@ impl<const N: usize> Linear<N> {
     fn step(&mut self) {
         let (q, v) = (self.q, self.v);
         if let Some(action) = &self.action {
-            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.stage_positions, v.map(|v| v.value));
+            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.equilibrium_position, v.map(|v| v.value));
             let mut change = action.constant;
             for i in 0..N {
                 let (mut of_q, mut of_v) = (action.q[i], action.v[i]);

@@ -296,7 +296,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             }
             let [change, size] = most;
             self.evaluations += s as u64;
-            let (mut change, size) = (change.max_abs_or_nan(), size.max_abs_or_nan());
+            let (mut change, size) = (change.reduce_max(), size.reduce_max());
             if solved {
                 break IterationOutcome::Done;
             }

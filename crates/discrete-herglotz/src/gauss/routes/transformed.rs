@@ -1,4 +1,4 @@
-//! Runs of contact Gauss collocation in transformed time.
+//! Stepper of contact Gauss collocation with equal steps in transformed time.
 
 use crate::gauss::consistent_start::ConsistentStart;
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
@@ -133,14 +133,8 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         let (&StageTable { s, h, .. }, transformation) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
         curve.of_transformed(&general.solved_in_transformed_time(), [transformation.0.rate(&start.q), general.rate()]);
-        let at = |set| {
-            self.arch.dispatch(Compare {
-                lagrangian: general.lagrangian,
-                transformation: transformation,
-                curve: &curve,
-                set,
-            })
-        };
+        let at =
+            |set| self.arch.dispatch(Compare { lagrangian: general.lagrangian, transformation, curve: &curve, set });
         (0..sets).map(at).reduce(DefectSample::and)
     }
 

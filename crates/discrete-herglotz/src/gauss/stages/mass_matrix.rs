@@ -10,7 +10,7 @@ use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Structure, support::linear};
 use pulp::Simd;
 
-/// How velocities are found from momenta.
+/// The inverse mass matrix, which maps momentum residuals to changes of velocity.
 pub(crate) enum Mass<const N: usize> {
     /// `W^-1` if it is constant.
     Constant(Box<SMatrix<f64, N, N>>),

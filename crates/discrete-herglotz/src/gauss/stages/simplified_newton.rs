@@ -109,7 +109,7 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
             }
             *a = *found;
         }
-        (largest.max_abs_or_nan(), far.max_abs_or_nan())
+        (largest.reduce_max(), far.reduce_max())
     }
 }
 
@@ -271,7 +271,7 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
         for r in 0..m {
             drho.set(r, -drho.block::<S>(r));
         }
-        // Factors are compared with 1.
+        // Changes of the factors are relative to 1.
         let mut largest = [[zero, zero], [zero, zero], [zero, one]];
         let velocities = v.iter_mut().zip(&dv).map(|(v, dv)| (v, dv, 0));
         for (to, change, kind) in velocities.chain([(z, &dz, 1), (one_minus_rho_stages, &drho, 2)]) {
@@ -299,10 +299,10 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
         }
         let mut change = 0.0;
         for [of_change, size] in &largest {
-            let (of_change, size) = (of_change.max_abs_or_nan(), size.max_abs_or_nan());
+            let (of_change, size) = (of_change.reduce_max(), size.reduce_max());
             change = max_or_nan(change, if of_change > 0.0 { of_change / size } else { of_change });
         }
-        (change, far.max_abs_or_nan() / position.max_abs_or_nan())
+        (change, far.reduce_max() / position.reduce_max())
     }
 }
 

@@ -116,7 +116,8 @@ impl WithSimd for Make {
             let (x, below) = (nodes.at(j), Quad::from(n) * at[s - 1].at(j));
             if j < s { (one - x * x) / (below * below) } else { Quad::zero() }
         });
-        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
+        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k is a multiple of
+        // P_(k+1) - P_(k-1).
         let a = from_fn(|i| {
             if i >= s {
                 return [Quad::zero(); MAX_STAGES];
@@ -128,7 +129,7 @@ impl WithSimd for Make {
             let row = b.times(&row);
             from_fn(|j| row.at(j))
         });
-        // The values of the Lagrange polynomials from those of the Legendre polynomials at a point.
+        // The values of the Lagrange polynomials at a point, from those of the Legendre polynomials there.
         let values = |p: &dyn Fn(usize) -> Quad| -> [f64; MAX_STAGES] {
             let mut row = Row::ZERO;
             for (k, at) in at.iter().enumerate().take(s) {
@@ -151,8 +152,8 @@ impl WithSimd for Make {
     }
 }
 
-/// The values at some points of `[0, 1]` of the polynomials of degree `s - 1` that are 1 at one node and 0 at the others, and
-/// their integrals from 0: `[i][j]` for point i and node j.
+/// The values of the Lagrange polynomials of the nodes at points of `[0, 1]`, and their integrals from 0: `[i][j]` for
+/// point i and node j.
 pub(crate) fn lagrange_rows(s: usize, points: &[f64; MAX_STAGES]) -> [[[f64; MAX_STAGES]; MAX_STAGES]; 2] {
     Instructions::new().dispatch(Lagrange { s, points })
 }

@@ -1,4 +1,4 @@
-//! Contact Gauss collocation condensed to the positions, for constant mass and constant rate of the conformal factor.
+//! Contact Gauss collocation for constant mass and constant rate of the conformal factor, condensed to the positions.
 
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
@@ -19,45 +19,46 @@ use std::array::from_fn;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// The step of `L = v.Mv/2 - V(t, q) + gamma z` in the accelerations `a_i = M^-1 L_q(t_i, Q_i)` alone: with the stages
-/// `rho_i` of the integrating factor, which depend on `gamma h` only,
+/// The coefficients of a step of `L = v.Mv/2 - V(t, q) + gamma z` in terms of the accelerations
+/// `a_i = M^-1 L_q(t_i, Q_i)` alone. With the stages `rho_i` of the integrating factor, which depend on `gamma h` only,
 /// `Q = q0 + u v0 + B a`, `V_i = v0 / rho_i + (D a)_i`, and at the end `q1 = q0 + end_u v0 + end_b.a`,
 /// `v1 = v0 + grow v0 + end_v.a`, `z1 = z0 + grow z0 + end_v.(L - gamma z)`, `sigma_d = 1 + grow`.
 pub(crate) struct Condensed {
     pub s: usize,
     pub h: f64,
     pub gamma: f64,
-    /// `B`: from the accelerations to the positions.
+    /// `B`, the map from the accelerations to the positions.
     pub b: [DoubleDoubleStages; MAX_STAGES],
     /// `u`.
     pub u: DoubleDoubleStages,
-    /// `D`: from the accelerations to the velocities.
+    /// `D`, the map from the accelerations to the velocities.
     pub d: StageMap,
     /// `1 / rho_i`.
     pub inverse_rho: Stages,
-    /// The times of the stages after the step's start.
+    /// The times of the stages relative to the start of the step.
     pub times: Stages,
     /// `end_u`.
     pub end_u: Unevaluated,
     pub end_b: Weights,
-    /// The same in double-double precision, and `D`, `1 / rho`, `end_u`, `grow` and `end_v` likewise.
+    /// `D`, `1 / rho`, `end_u`, `end_b`, `grow` and `end_v` in double-double precision.
     pub exact: Box<ExactEnd>,
     /// `sigma_d - 1`.
     pub grow: Unevaluated,
     pub end_v: Weights,
-    /// From the stages of one step to those of the next.
+    /// The extrapolation from the stages of one step to those of the next.
     pub extrapolation: StageMap,
     /// See [`actions`](Self::actions).
     actions: OnceLock<Box<Actions>>,
 }
 
-/// What `gamma Z` of the stages is, `from_start z0 + from_values (L - gamma z)`, by columns; not finite at the pole of the collocation polynomial of z.
+/// The coefficients, by columns, of `gamma Z = from_start z0 + from_values (L - gamma z)` at the stages; not finite at
+/// the pole of the collocation polynomial of z.
 pub(crate) struct Actions {
     pub from_start: [f64; MAX_STAGES],
     pub from_values: [[f64; MAX_STAGES]; MAX_STAGES],
 }
 
-/// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
+/// The coefficients of a [`Condensed`] step in double-double precision, for linear motions.
 pub(crate) struct ExactEnd {
     pub d: [DoubleDoubleStages; MAX_STAGES],
     pub inverse_rho: DoubleDoubleStages,
@@ -68,12 +69,13 @@ pub(crate) struct ExactEnd {
 }
 
 thread_local! {
-    /// The tables that were asked for last: a plan and its run, and a run after a run, have the same, and each run compares some steps with halves.
+    /// The two tables that were requested last: a plan and its run, and successive runs, use the same table, and each
+    /// run compares some steps with steps of half the size.
     static LAST: RefCell<[Option<Arc<Condensed>>; 2]> = const { RefCell::new([None, None]) };
 }
 
 impl Condensed {
-    /// The table for a number of stages, a step and a rate.
+    /// The table for a number of stages, a step size and a rate.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -92,8 +94,8 @@ impl Condensed {
     }
 
     /// # Errors
-    /// [`StepError::StageFactor`] and [`InputError::Sigma`] where a stage of the integrating factor, or its end, is not
-    /// positive: the step is too long for this rate.
+    /// [`StepError::StageFactor`] if a stage of the integrating factor is not positive, [`InputError::Sigma`] if its
+    /// value at the end is not positive: the step is then too long for this rate.
     pub fn new(s: usize, h: f64, gamma: f64) -> Result<Self, InputError> {
         let g = Coefficients::of(s);
         let (one, zero, step, rate) = (Quad::one(), Quad::zero(), Quad::from(h), Quad::from(gamma));
@@ -112,7 +114,7 @@ impl Condensed {
         let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
         let one_minus_rho = step * rate * sum(&|j| g.b[j] * rho[j]);
         let end_rho = one - one_minus_rho;
-        // Not `<= 0`: that would let a NaN pass.
+        // Written so that a NaN is an error.
         if let Some(rho) = rho[..s].iter().map(|rho| rho.0).find(|rho| !(*rho > 0.0 && rho.is_finite())) {
             return Err(InputError::FirstStep(StepError::StageFactor { rho }));
         }
@@ -149,7 +151,8 @@ impl Condensed {
         })
     }
 
-    /// The actions of the stages, `Z = z0 + hA (L - gamma z) + gamma hA Z`, solved for. Made when it is asked for.
+    /// The solution of `Z = z0 + hA (L - gamma z) + gamma hA Z` for the actions of the stages; computed at the first
+    /// request.
     pub fn actions(&self) -> &Actions {
         self.actions.get_or_init(|| {
             let (s, g) = (self.s, Coefficients::of(self.s));
@@ -158,7 +161,7 @@ impl Condensed {
                 SMatrix::<f64, MAX_STAGES, MAX_STAGES>::from_fn(|i, j| f64::from(u8::from(i == j)) - entry(i, j));
             let solved = |column: &dyn Fn(usize) -> f64| {
                 let mut column = SVector::<f64, MAX_STAGES>::from_fn(|i, _| if i < s { column(i) } else { 0.0 });
-                // Where there is no solution the step has an end, and nothing between.
+                // Without a solution the end of the step is still defined, but not its dense output.
                 match linear::solve(&mut left.clone_owned().view_mut((0, 0), (s, s)), &mut column.rows_mut(0, s)) {
                     Ok(_) => column.into(),
                     Err(_) => [f64::NAN; MAX_STAGES],
@@ -179,14 +182,15 @@ impl Condensed {
         a: &[[f64; MAX_STAGES]; N],
     ) -> [[f64; MAX_STAGES]; N] {
         let at = |d: usize, i: usize| (0..self.s).fold(q[d] + self.u[i].0 * v[d], |x, j| x + self.b[i][j].0 * a[d][j]);
-        // Beyond the last stage it is repeated.
+        // The last stage is repeated in the padding.
         from_fn(|d| from_fn(|i| at(d, i.min(self.s - 1))))
     }
 
-    /// The step's equations with the linear force `-kappa q` taken to the left: `Q = left q0 + left_u v0 + left_b (a + kappa Q)`.
+    /// The stage equations with the linear force `-kappa q` on the left-hand side, solved for the positions:
+    /// `Q = left q0 + left_u v0 + left_b (a + kappa Q)`.
     ///
-    /// The solution is the same for every kappa; the iteration contracts the faster the nearer kappa is to the true slope of
-    /// the force. `None` where the matrix `1 + kappa B` is near to singular.
+    /// The solution is the same for every kappa; the iteration converges the faster, the nearer kappa is to the
+    /// negative slope of the force. `None` if the matrix `1 + kappa B` is nearly singular.
     pub fn preconditioned(&self, kappa: f64) -> Option<Preconditioned> {
         let s = self.s;
         let mut rows: LeftRows = from_fn(|i| {
@@ -217,10 +221,12 @@ impl Condensed {
         Some(Preconditioned { kappa, head: Left::new(&rows, s), tail: None })
     }
 
-    /// What the rounded matrices of the left leave out, to first order: `(1 + kappa B)^-1 (B - (1 + kappa B) left_b)`, and likewise for
-    /// `left` and `left_u`, with `(1 + kappa B)^-1 = 1 - kappa left_b`.
+    /// The round-off of the matrices of [`preconditioned`](Self::preconditioned), to first order:
+    /// `(1 + kappa B)^-1 (B - (1 + kappa B) left_b)`, and likewise for `left` and `left_u`, with
+    /// `(1 + kappa B)^-1 = 1 - kappa left_b`.
     ///
-    /// It would act in the same direction in every step. For instruction sets with a fused product.
+    /// Uncorrected it would act in the same direction in every step. To be compiled for instruction sets with fused
+    /// multiply-add.
     #[inline(always)]
     fn left_out(&self, left: &Preconditioned) -> Left {
         let (s, kappa, head) = (self.s, left.kappa, &left.head);
@@ -234,7 +240,7 @@ impl Condensed {
         let rows: LeftRows = from_fn(row);
         let mut residual: LeftRows = [[0.0; MAX_STAGES + 2]; MAX_STAGES];
         for i in 0..s {
-            // What is to be had minus what there is, in two parts.
+            // The residual, in two parts.
             let (mut sum, mut lost) = (rows[i].map(|e| -e), [0.0; MAX_STAGES + 2]);
             for j in 0..MAX_STAGES + 2 {
                 let (head, tail) = match j {
@@ -270,18 +276,18 @@ impl Condensed {
     }
 }
 
-/// A matrix of stages, and beside it the column of what multiplies the velocity; padded to whole registers.
+/// A row of a matrix over the stages, followed by the coefficient of the velocity; padded to whole registers.
 type Wide = ExactRow<{ MAX_STAGES + 8 }>;
 
-/// What a [`Condensed`] step multiplies its accelerations with.
+/// The products of coefficients that multiply the accelerations and the velocity in a [`Condensed`] step.
 struct AccelerationProducts {
-    /// `D`, and beside it `1 / rho`.
+    /// `D` and `1 / rho`.
     velocity: [Wide; MAX_STAGES],
-    /// `B` and `u`, and in row `s` those of the step's end.
+    /// `B` and `u`; row `s` has `end_b` and `end_u`.
     positions: [Wide; MAX_STAGES + 1],
 }
 
-/// The [`AccelerationProducts`] from the stages of the integrating factor, in the instructions of the processor.
+/// The kernel that computes the [`AccelerationProducts`] from the stages of the integrating factor.
 struct Multiply<'a> {
     s: usize,
     h: f64,
@@ -315,11 +321,11 @@ impl WithSimd for Multiply<'_> {
     }
 }
 
-/// Rows of `left_b` with those of `left` and `left_u` at the end.
+/// The rows of `left_b`, followed by the entries of `left` and `left_u`.
 type LeftRows = [[f64; MAX_STAGES + 2]; MAX_STAGES];
 
-/// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
-#[repr(C)] // See `SeparableStages`: the matrix last.
+/// The matrices of [`Condensed::preconditioned`], or their round-off.
+#[repr(C)] // The matrix comes last, see `SeparableStages`.
 pub(crate) struct Left {
     pub q: Stages,
     pub u: Stages,
@@ -332,7 +338,7 @@ impl Left {
         Left { q: column(MAX_STAGES), u: column(MAX_STAGES + 1), b: StageMap(from_fn(column)) }
     }
 
-    /// What comes of the state, of the stages in the r-th register.
+    /// `left q0 + left_u v0` for the stages in the r-th register.
     #[inline(always)]
     pub fn of_state<S: Simd>(&self, q: Lanes<S>, v: Lanes<S>, r: usize) -> Lanes<S> {
         self.u.block::<S>(r).mul_add(v, self.q.block::<S>(r) * q)
@@ -340,16 +346,16 @@ impl Left {
 }
 
 /// See [`Condensed::preconditioned`].
-#[repr(C)] // See `SeparableStages`: the head last.
+#[repr(C)] // The head comes last, see `SeparableStages`.
 pub(crate) struct Preconditioned {
     pub kappa: f64,
-    /// What the rounding of the head leaves out, found by [`refine`](Self::refine).
+    /// The round-off of the head, if it was computed by [`refine`](Self::refine).
     pub tail: Option<Left>,
     pub head: Left,
 }
 
 impl Preconditioned {
-    /// Finds the tail, at a price of about three steps: worth it for matrices that last.
+    /// Computes the tail, at the cost of about three steps, for matrices that are kept for long.
     pub fn refine(&mut self, table: &Condensed) {
         if self.tail.is_none() {
             self.tail = Some(Instructions::new().dispatch(LeftOut { table, left: self }));
@@ -357,7 +363,7 @@ impl Preconditioned {
     }
 }
 
-/// [`Condensed::left_out`] in the instructions of the processor.
+/// The kernel of [`Condensed::left_out`].
 struct LeftOut<'a> {
     table: &'a Condensed,
     left: &'a Preconditioned,
@@ -377,7 +383,7 @@ mod tests {
     use super::*;
     use contact_geom::numbers::max_or_nan;
 
-    /// A table that is kept serves the same stages, step and rate alone.
+    /// A cached table is used only for the same number of stages, step size and rate.
     #[test]
     fn kept_tables_are_not_those_of_others() {
         let table = Condensed::of(4, 0.5, -0.1).unwrap();
@@ -386,13 +392,13 @@ mod tests {
             let _ = Condensed::of(4, 0.5, -0.1).unwrap();
             let other = Condensed::of(s, h, gamma).unwrap();
             assert_eq!((other.s, other.h, other.gamma), (s, h, gamma));
-            // Two are kept, whichever of them was asked for last.
+            // Two tables are kept, in either order of request.
             assert!(Arc::ptr_eq(&table, &Condensed::of(4, 0.5, -0.1).unwrap()));
             assert!(Arc::ptr_eq(&other, &Condensed::of(s, h, gamma).unwrap()));
         }
     }
 
-    /// The products are those of sums term by term, to double-double round-off: 1e-30 for up to sixteen terms below one.
+    /// The products agree with sums term by term to double-double round-off: 1e-30 for up to sixteen terms below one.
     #[test]
     fn products_are_exact_in_two_parts() {
         for (s, h, gamma) in [(16, 0.7, -0.3), (8, 1.3, 0.0), (5, 0.01, 2.0), (1, 0.1, -1.0)] {
@@ -415,8 +421,8 @@ mod tests {
         }
     }
 
-    /// The matrices of the left in two parts satisfy their equations in double-double precision: to 1e-28 times the sizes, the
-    /// square of the round-off with room for sums of sixteen terms.
+    /// Head and tail of the preconditioned matrices satisfy their equations to 1e-29, the square of the round-off with
+    /// a margin for sums of sixteen terms.
     #[test]
     fn left_matrices_are_exact_in_two_parts() {
         let one = Quad::one();

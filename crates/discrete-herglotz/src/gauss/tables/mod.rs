@@ -1,4 +1,4 @@
-//! Coefficients of contact Gauss collocation, and the linear maps that each route makes from them once.
+//! Coefficients of contact Gauss collocation, and the linear maps that each route derives from them once.
 
 pub(crate) mod coefficients;
 pub(crate) mod condensed;

@@ -1,4 +1,4 @@
-//! The modes of Gauss collocation: coordinates of the stages in which it integrates each by itself.
+//! The modes of Gauss collocation: the eigenvalues and eigenvectors of its Butcher matrix.
 
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, POLYNOMIALS};
 use crate::numbers::lanes::Lanes;
@@ -10,30 +10,31 @@ use pulp::Simd;
 use qd::Quad;
 use std::sync::OnceLock;
 
-/// The matrix A of the collocation by its eigenvalues, which are pairs of complex numbers, and a real one where s is odd.
+/// The diagonalisation of the Butcher matrix A. Its eigenvalues are pairs of complex conjugate numbers, and one real
+/// number if s is odd.
 ///
-/// So a function of A whose coefficients are matrices, such as `(1 - h A (x) J)^-1`, falls apart into one small complex system for
-/// each mode: Butcher, "On the implementation of implicit Runge-Kutta methods", BIT 16 (1976).
+/// A linear system such as `(1 - h A (x) J) x = r` therefore decouples into one small complex system for each mode:
+/// Butcher, "On the implementation of implicit Runge-Kutta methods", BIT 16 (1976).
 pub(crate) struct Modes {
     s: usize,
-    /// From stages to the coefficients of the eigenvectors, and back.
+    /// The maps from stages to the coefficients of the eigenvectors, and back.
     into: StageMap,
     back: StageMap,
     modes: Vec<Mode>,
 }
 
-/// One eigenvalue, or a pair of conjugate ones.
+/// One real eigenvalue, or a pair of complex conjugate ones.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mode {
     /// The eigenvalue, with a positive imaginary part in a pair.
     pub value: Complex<f64>,
-    /// The place of its coefficient's real part; in a pair the imaginary part follows.
+    /// The index of the real part of its coefficient; in a pair the imaginary part follows.
     place: usize,
     pair: bool,
 }
 
 impl Modes {
-    /// The modes for a number of stages from 1 to 16, made once.
+    /// The modes for a number of stages from 1 to 16, computed once.
     pub fn of(s: usize) -> &'static Modes {
         static MODES: [OnceLock<Box<Modes>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
         MODES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
@@ -51,7 +52,7 @@ impl Modes {
             if place >= s {
                 break;
             }
-            // The left eigenvector has the same components with alternate signs, in an orthonormal basis.
+            // In an orthonormal basis the left eigenvector has the same components with alternating signs.
             let sign = |k: usize| Quad::from(if k.is_multiple_of(2) { 1.0 } else { -1.0 });
             let sum = |f: &dyn Fn(usize) -> Complex<Quad>| (0..s).fold(Complex::<Quad>::zero(), |sum, k| sum + f(k));
             let norm = sum(&|k| x[k] * x[k] * (sign(k) / Quad::from((2 * k + 1) as f64)));
@@ -74,14 +75,14 @@ impl Modes {
         self.modes.iter()
     }
 
-    /// From stages to the coefficients of the modes.
+    /// Transforms stage values to the coefficients of the modes.
     #[inline(always)]
     pub fn enter<S: Simd>(&self, x: &mut Stages) {
         let stages = *x;
         self.into.apply(&stages, self.s, x, |_| Lanes::<S>::splat(0.0));
     }
 
-    /// Back to stages.
+    /// Transforms coefficients of the modes to stage values.
     #[inline(always)]
     pub fn leave<S: Simd>(&self, x: &mut Stages) {
         let modes = *x;
@@ -105,12 +106,12 @@ impl Mode {
     }
 }
 
-/// `1 / (2 (2k + 1))`: the integral of `P_k` is `(P_(k+1) - P_(k-1))` times it, on `[0, 1]` and for k > 0.
+/// `1 / (2 (2k + 1))`: for k > 0 the integral of `P_k` on `[0, 1]` is this number times `P_(k+1) - P_(k-1)`.
 fn share(k: usize) -> Quad {
     Quad::one() / Quad::from((4 * k + 2) as f64)
 }
 
-/// The eigenvalues of A to some digits: in the Legendre polynomials it is tridiagonal.
+/// Approximate eigenvalues of A, which is tridiagonal in the basis of Legendre polynomials.
 fn eigenvalues(s: usize) -> Vec<Complex<f64>> {
     let a = DMatrix::from_fn(s, s, |i, j| match (i, j) {
         (0, 0) => 0.5,
@@ -121,13 +122,13 @@ fn eigenvalues(s: usize) -> Vec<Complex<f64>> {
     a.complex_eigenvalues().iter().copied().collect()
 }
 
-/// An eigenvalue of A from a guess with its eigenvector, in the Legendre polynomials; in twice the working precision, since the
-/// eigenvectors are nearly dependent for many stages.
+/// An eigenvalue of A near a guess, and its eigenvector in the basis of Legendre polynomials; in twice the working
+/// precision, since for many stages the eigenvectors are nearly linearly dependent.
 fn eigenvector(s: usize, guess: Complex<f64>) -> (Complex<Quad>, [Complex<Quad>; MAX_STAGES + 1]) {
     let half = Complex::new(Quad::from(0.5), Quad::zero());
     let mut value = Complex::new(Quad::from(guess.re), Quad::from(guess.im));
     let mut x = [Complex::zero(); MAX_STAGES + 1];
-    // Newton's method on the last row: quadratic, from six digits.
+    // Newton's method for the last row; it converges quadratically from six digits.
     for _ in 0..6 {
         let mut slope = [Complex::<Quad>::zero(); MAX_STAGES + 1];
         x[0] = Complex::one();
@@ -152,8 +153,9 @@ mod tests {
     use super::*;
     use std::array::from_fn;
 
-    /// Multiplying each mode by its eigenvalue is A itself: to a thousand units of round-off for the entries of the two
-    /// maps, whose product is up to 1e8 and leaves to Newton's iteration seven digits in each sweep.
+    /// Multiplying each mode by its eigenvalue is multiplication by A, to a thousand units of round-off times the
+    /// product of the largest entries of the two maps. That product is up to 1e8, so that simplified Newton iteration
+    /// gains seven digits in each iteration.
     #[test]
     fn modes_are_those_of_the_collocation() {
         for s in 1..=MAX_STAGES {

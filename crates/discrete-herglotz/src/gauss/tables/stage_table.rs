@@ -7,27 +7,29 @@ use std::array::from_fn;
 use std::cmp::Ordering;
 use std::sync::OnceLock;
 
-/// The coefficients of a step: `h a_ij = m_ij h b_j`.
+/// The coefficients of a step, `h a_ij = m_ij h b_j`.
 ///
-/// What multiplies in every step acts in the same direction in every step, and so the rounding of `h a_ij` and `h b_j` would make
-/// the energy drift. But the method is symplectic with any weights where `m_ij + m_ji = 1`, and this numbers of 53 digits
-/// can satisfy exactly: stages take `M (h b f)`, the end the sum of the same `h b f`. See Antonana, Makazaga and Murua,
-/// "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes", Numer. Algorithms 76 (2017).
+/// The round-off of coefficients is the same in every step, and that of `h a_ij` and `h b_j` would make the energy
+/// drift. However, the method is symplectic for any weights if `m_ij + m_ji = 1`, which numbers of 53 binary digits can
+/// satisfy exactly: the stages use `M (h b f)`, and the end of the step the sum of the same `h b f`. See Antonana,
+/// Makazaga and Murua, "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta
+/// schemes", Numer. Algorithms 76 (2017).
 pub(crate) struct StageTable {
     pub s: usize,
     pub h: f64,
     /// `M`.
     pub m: &'static StageMap,
-    /// `h b`, 0 beyond the last stage.
+    /// `h b`, padded with 0.
     pub weights: Stages,
-    /// The times of the stages after the step's start.
+    /// The times of the stages relative to the start of the step.
     pub times: Stages,
-    /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
+    /// The extrapolation from the stages of one step to those of the next, and the same for values multiplied by the
+    /// weights.
     pub extrapolation: &'static StageMap,
     pub extrapolation_weighted: &'static StageMap,
 }
 
-/// What does not depend on the step.
+/// The coefficients that do not depend on the step size.
 struct Maps {
     m: StageMap,
     extrapolation: StageMap,
@@ -35,7 +37,7 @@ struct Maps {
 }
 
 impl Maps {
-    /// For a number of stages from 1 to 16, made once.
+    /// The coefficients for a number of stages from 1 to 16, computed once.
     fn of(s: usize) -> &'static Maps {
         static TABLES: [OnceLock<Box<Maps>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
         TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
@@ -43,7 +45,7 @@ impl Maps {
 
     fn new(s: usize) -> Self {
         let g = Coefficients::of(s);
-        // From the transposed where it is the larger, about 1: the difference is exact.
+        // Above the diagonal from the transposed entry, which is about 1, so that the difference is exact.
         let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
         let entry = |i: usize, j: usize| match i.cmp(&j) {
             _ if i.max(j) >= s => 0.0,
@@ -67,12 +69,12 @@ impl StageTable {
         let (g, step) = (Coefficients::of(s), Quad::from(h));
         let mut weights = from_fn(|j| if j < s { (step * g.b[j]).0 } else { 0.0 });
         if s > 2 {
-            // The sum is h to the last digit of the smallest.
+            // The outer weights are adjusted so that the sum is h to the last digit of the smallest weight.
             let inner = weights[1..s - 1].iter().fold(Quad::from(0.0), |sum, w| sum + Quad::from(*w));
             weights[0] = (Quad::from(0.5) * (step - inner)).0;
             weights[s - 1] = weights[0];
         }
-        // Beyond the last stage it is repeated.
+        // The last stage is repeated in the padding.
         let mut times = [(step * g.c[s - 1]).0; MAX_STAGES];
         times.iter_mut().zip(&g.c).take(s).for_each(|(time, c)| *time = (step * *c).0);
         let Maps { m, extrapolation, extrapolation_weighted } = Maps::of(s);

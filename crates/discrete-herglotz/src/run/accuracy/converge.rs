@@ -1,4 +1,4 @@
-//! The reference: runs with k and 2k steps of contact Gauss collocation that agree.
+//! The reference solution: runs with k and 2k steps of contact Gauss collocation that agree.
 
 use crate::run::accuracy::failure::obstacle;
 use crate::run::accuracy::first_guess::first_guess;
@@ -8,40 +8,43 @@ use crate::run::request::{MOST_STEPS, Shared, StepSelection};
 use crate::{InputError, SelectionFailure};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 
-/// The searches that may follow each other: each makes the steps shorter, or ends.
+/// The largest number of iterations of a search: each refines the steps or ends the search.
 pub(crate) const MAX_SEARCHES: usize = 64;
 
-/// The refinements, of so many steps, after which a step that still cannot be taken, or is not resolved, at the same time never will
-/// be, and those after which something narrow that is still between the nodes is left to the comparison of runs.
+/// The number of refinements, of runs with more than [`LONG_SEARCH_STEPS`] steps, after which a step that still fails
+/// or is unresolved at the same time ends the search; and the number of refinements after which a narrow feature
+/// between the nodes is left to the comparison of runs.
 const MAX_FAILURES_AT_ONE_TIME: usize = 8;
 const LONG_SEARCH_STEPS: usize = 512;
 const MAX_NARROW_RUNS: usize = 10;
 
-/// The times that equal steps are more than the motion asks for at its start, from which on steps that are divided are tried: each part costs
-/// some times as much as a step.
+/// The ratio of the number of equal steps to the number that the motion requires at its start, from which on divided
+/// steps are tried: each part costs several times as much as a step.
 const UNEVEN: usize = 32;
 
-/// A motion that runs with k and 2k steps agree on.
+/// A motion on which runs with k and 2k steps agree.
 pub(crate) struct Converged<const N: usize> {
     pub k: usize,
-    /// The error of the run with k steps, and what is predicted of that with 2k.
+    /// The error of the run with k steps, and the predicted error of the run with 2k steps.
     pub errors: [f64; 2],
-    /// The largest misfit between the nodes of the run with k steps, and the order with which it falls: half of that of the error.
+    /// The largest defect between the nodes of the run with k steps, and the order with which it decreases, half the
+    /// order of the error.
     pub defect: f64,
     pub order: f64,
-    /// Whether the run with 2k steps costs less: its iterations converge where longer steps need Newton's method.
+    /// Whether the run with 2k steps costs less: its fixed-point iterations converge, where longer steps need Newton's
+    /// method.
     pub finer_is_cheaper: bool,
     pub truth: Track<N>,
     pub marks: ComparisonGrid,
-    /// Whether something narrow was met on the way, or misfits that did not fall like those of a smooth motion: these steps tell nothing of
-    /// others.
+    /// Whether the search found a narrow feature, or defects that do not decrease like those of a smooth motion: the
+    /// errors of other numbers of steps cannot be predicted.
     pub rough: bool,
 }
 
-/// How a search ends that finds no runs that agree.
+/// The end of a search without two runs that agree.
 pub(crate) enum Ended {
     Refused(InputError),
-    /// Another integrator is cheaper; trial runs that watch for that end there.
+    /// Another integrator is less expensive; only searches that test this end here.
     SwitchReason(SwitchReason),
 }
 
@@ -53,23 +56,24 @@ impl From<InputError> for Ended {
 
 impl From<Ended> for InputError {
     fn from(ended: Ended) -> Self {
-        // Nothing else ends a search that does not watch for it.
+        // The other variant occurs only in searches that test for it.
         if let Ended::Refused(refused) = ended { refused } else { InputError::NoIntegrator }
     }
 }
 
-/// Where trial runs are compared.
+/// The times at which trial runs are compared.
 #[derive(Clone, Copy)]
 pub(crate) enum Compared {
     /// At the ends of steps next to tenths of the span.
     Steps,
     /// At tenths of the span, which divide the numbers of steps.
     Tenths,
-    /// At tenths of the span; the runs are in the motion's transformed time.
+    /// At tenths of the span; the runs are in the transformed time of the Lagrangian.
     Times,
 }
 
-/// The choice of steps of which so many fill the span; in transformed time they are counted anew, in its time.
+/// The selection of a number of steps that fill the span; in transformed time their number is computed from the span of
+/// tau.
 pub(crate) fn chosen<'p, L: Lagrangian<N>, const N: usize>(
     trials: &TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
@@ -79,7 +83,7 @@ pub(crate) fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 ) -> StepSelection<'p, L, N> {
     let (h, integrator, error) = (trials.step(count, &found.marks), integrator.clone(), Some(error));
     if let ComparisonGrid::Times = found.marks {
-        // The last step is about half of the others, so that no rounding adds one.
+        // The last step is about half as long as the others, so that round-off does not add a step.
         let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
         return StepSelection {
             integrator,
@@ -92,7 +96,7 @@ pub(crate) fn chosen<'p, L: Lagrangian<N>, const N: usize>(
     StepSelection { integrator, count, h, error, ended: None }
 }
 
-/// Finds the runs that agree.
+/// Refines the steps until two runs agree.
 pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, '_, L, N>,
     stages: usize,
@@ -111,7 +115,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
     let first = k.max(LONG_SEARCH_STEPS / UNEVEN);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
-    // The smallest distance of two runs, whatever a third one says; and what keeps them from agreeing.
+    // The smallest distance of two runs, regardless of a third one; and the reason why they do not agree.
     let (mut nearest, mut cause) = (f64::INFINITY, SelectionFailure::Budget);
     // The finer of the last two runs, and their distance.
     let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
@@ -134,7 +138,8 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
             let ending = trials.gauss(stages, multiple * k, &marks, closely, narrows < MAX_NARROW_RUNS)?;
             let stopped = match ending {
                 TrialEnd::Followed(track) => {
-                    // The error is about the square of the misfit: what is far too large need not be halved again and again.
+                    // The error is about the square of the defect: from a defect that is far too large the number of
+                    // steps is predicted, instead of doubled repeatedly.
                     let more = (track.defect.powi(2) / goal).powf(0.5 / s) / 1.4;
                     if multiple == 1 && !guessed && more > 1.2 {
                         guessed = true;
@@ -164,7 +169,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
                 }
             };
             let (part, obstacle) = stopped;
-            // What is narrow may need many halvings, what is singular has no end of them.
+            // A narrow feature may need many halvings of the step; at a singularity they never suffice.
             let same = (part - halts.1).abs() <= 0.01 && k > LONG_SEARCH_STEPS;
             (halts, cause) = ((if same { halts.0 + 1 } else { 1 }, part), obstacle);
             if trials.watches_uneven && k >= UNEVEN * first {
@@ -177,16 +182,17 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
             continue 'search;
         }
         let [coarse, fine] = tracks.as_slice() else { break };
-        // Runs that agree in all digits may still be off by half of the last one.
+        // Runs that agree in all digits may still have an error of half a unit in the last place.
         let error = max_or_nan(coarse.distance(fine), 0.5 * f64::EPSILON);
-        // A misfit of a smooth motion falls with the order s. What jumps has one that does not; what is rounded has none to speak of.
+        // The defect of a smooth motion decreases with order s; at a jump it does not decrease; if only round-off
+        // remains it is negligible.
         let falls = fine.defect <= max_or_nan(coarse.defect / 8.0, max_or_nan(0.01 * wanted, 1e-11));
         let fall = (coarse.defect / fine.defect).log2();
         let order = if fall.is_nan() { s } else { fall.clamp(0.0, s) };
-        // What is left of the error in the finer run: it is of the order 2s, where the misfit is of the order s.
+        // The error of the finer run: it has order 2s, whereas the defect has order s.
         let beyond = error / 2.0f64.powf(1.5 * order);
         let distances = coarse.distances(fine);
-        // Round-off does not fall; it grows like the distances of the runs.
+        // Round-off does not decrease with the step size; along the motion it grows like the distance of the runs.
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
         let rounded = 2e-15 * max_or_nan(growth, 1.0) * (k as f64).sqrt();
         let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
@@ -203,7 +209,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
                 finer_is_cheaper: fine.cost < coarse.cost,
                 truth: fine.clone(),
                 marks,
-                // More than twice the order is none: the finer steps end at a kink.
+                // A decrease of more than twice the order is not due to the order: the finer steps end at a kink.
                 rough: rough || narrows > 0 || fall > 2.0 * s,
             });
         }
@@ -218,7 +224,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
         } else if let Some(distance) = hidden {
             SelectionFailure::Hidden { distance }
         } else if before.is_nan() {
-            // The first two runs show no order, and are the last if others would cost too much.
+            // The first two runs do not determine an order, and are the last ones if others would cost too much.
             SelectionFailure::Budget
         } else if fine.has_underflown() {
             SelectionFailure::RoundOff
@@ -227,7 +233,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
         };
         (best, before) = (if error < best { error } else { best }, error);
         nearest = if apart < nearest { apart } else { nearest };
-        // Not begun, if it cannot end.
+        // No run is started that the budget would not complete.
         let affordable = trials.left.max(trials.reserve);
         if strikes == 3 || 2 * (left - trials.reserve) > affordable {
             break;
@@ -238,9 +244,9 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
     refuse(wanted, nearest, cause)
 }
 
-/// How far the end of a run with one step more is from that of two runs that agree, where that is too far: nodes of both lie on the ends of the k
-/// steps, and so on whatever kink or pulse begins at one of them. `None` where they agree too, or where nothing can hide: kinks of a formula that is
-/// proved end steps.
+/// The distance between the end of a run with k + 1 steps and that of two runs that agree, if it is too large. The
+/// nodes of both of these lie on the ends of the k steps, and so on any kink or pulse that begins at one of them.
+/// `None` if the third run agrees too, or if nothing can be hidden: kinks of a formula that is proved end steps.
 pub(crate) fn beside_nodes<L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, '_, L, N>,
     stages: usize,

@@ -1,4 +1,4 @@
-//! Steps of varying length for an accuracy, where equal steps would be too many.
+//! Steps of varying size for a requested accuracy, if equal steps would be too many.
 
 use crate::run::accuracy::failure::obstacle;
 use crate::run::accuracy::first_guess::first_guess;
@@ -10,21 +10,23 @@ use crate::{InputError, SelectionFailure};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
-/// The stages of the parts.
+/// The number of stages of the parts.
 const STAGES: usize = 8;
 
-/// The fewest and the most steps that are divided: 2000 nodes, between which nothing wide may hide, and as many places between them at which their misfit
-/// is taken; what is fast is left to the parts.
+/// The smallest and the largest number of steps before division: at least 2000 nodes, between which no wide feature is
+/// missed, and as many sample points between them for the defect. Fast parts of the motion are resolved by the
+/// division.
 const STEPS: [usize; 2] = [256, 1 << 14];
 
-/// The largest misfit that parts may have, and the smallest that is beyond rounding.
+/// The largest defect of the parts that is tried, and the smallest defect above round-off.
 const MISFITS: [f64; 2] = [0.02, 1e-11];
 
-/// The searches that may follow each other, each with a finer division.
+/// The largest number of iterations of the search, each with a finer division.
 const ATTEMPTS: usize = 8;
 
-/// Chooses steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most that wanted: a division and one
-/// of half the length must agree. The error of a part is about the square of its misfit, and the misfit of the half smaller by `2^s`.
+/// Selects steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most the
+/// requested error: a division and one with parts of half the size must agree. The error of a part is about the square
+/// of its defect, and halving a part divides its defect by `2^s`.
 pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
@@ -59,7 +61,7 @@ pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
             }
         };
         let error = max_or_nan(first.distance(&second), 0.5 * f64::EPSILON);
-        // The finer of the two is nearer to the motion than they are to each other.
+        // The error of the finer run is smaller than the distance of the two.
         if error <= 0.5 * wanted {
             let (h, error) = (span / count as f64, Some(error));
             return Ok(StepSelection { integrator: Arc::new(integrator), count, h, error, ended: None });

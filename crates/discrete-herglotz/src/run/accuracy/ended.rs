@@ -1,4 +1,4 @@
-//! Runs that an observer ends: where that is, for trial runs, and how it is reached in a step that cannot be taken as a whole.
+//! Runs that an observer ends: the time of the end, for trial runs.
 
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::integrate::integrate;
@@ -9,21 +9,23 @@ use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// The search for the end: by steps so long that they resolve the motion, with an error of about the square of this.
+/// The integrator of the search for the end: steps that resolve the motion, with an error of about the square of this
+/// defect.
 const SEARCH: DividedGauss = DividedGauss { stages: 8, most_misfit: 1e-5 };
 
-/// The steps of the search, at the least, and the error of the motion linearised at its start that says how many they are.
+/// The smallest number of steps of the search, and the error of the linearised motion at the start that determines
+/// their number.
 const FEWEST: usize = 64;
 const ERROR: f64 = 1e-6;
 
-/// What the search may cost, in evaluations of L: about a second.
+/// The budget of the search, in evaluations of L: about a second.
 const BUDGET: u64 = 1 << 24;
 
-/// Who ends a search that costs too much.
+/// The cause of the end of a search that exceeds its budget.
 const SPENT: &str = "the budget of the search";
 
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
-    /// About the time at which an observer ends the run; `None` where it ends elsewhere.
+    /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
     pub(crate) fn time_of_end(&self, terminal: Terminal<'_, N>) -> Option<f64> {
         let request = Request { integrator: None, needs: terminal.needs(), ..*self };
         let count = first_guess(self, SEARCH.stages, ERROR).max(FEWEST);
@@ -43,10 +45,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> StepSelection<'p, L, N> {
-    /// The same steps over so many times the span, as an observer ends the run where these end.
+    /// The same steps over a multiple of the span; an observer is expected to end the run after the original number of
+    /// steps.
     pub(crate) fn going_on(self, times: f64) -> Self {
         let count = (self.count as f64 * times * (1.0 - 4.0 * f64::EPSILON)).ceil();
-        // Steps in transformed time are counted on the way.
+        // In transformed time the step size is independent of the number of steps.
         let h = if self.integrator.info().in_transformed_time {
             self.h
         } else {

@@ -1,4 +1,4 @@
-//! The error of a run with given steps, estimated.
+//! The error estimate of a run with given steps.
 
 use crate::Interrupt;
 use crate::run::accuracy::track::Track;
@@ -7,13 +7,13 @@ use crate::run::discretization::Discretization;
 use crate::run::motion::Near;
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// The steps between two looks at whether it is to end.
+/// The number of steps between two checks for an interrupt.
 const CHUNK: usize = 1024;
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
-    /// The distance of (q, p) and v after some steps from those of a run with twice as many of half their length, as
-    /// [`Track::distance_at_end`] measures it: of the error of an order `p` this is the part `1 - 2^-p`. Infinite where the other run does not come as far,
-    /// or is interrupted.
+    /// The distance of (q, p) and v from those of a run with twice as many steps of half the size, as in
+    /// [`Track::distance_at_end`]: for a method of order p this is the error times `1 - 2^-p`. Infinite if the other
+    /// run fails or is interrupted.
     pub(crate) fn distance_from_halves(&self, taken: usize, t: f64, (end, near): (&PhasePoint<N>, Near<N>)) -> f64 {
         let Ok(mut fine) = self.stepper_of(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
         let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
@@ -23,7 +23,7 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
             if self.problem.interrupt.is_some_and(Interrupt::is_wanted) {
                 return f64::INFINITY;
             }
-            // Few steps at first, so that the velocity is seen at more than one phase of an oscillation.
+            // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
             match fine.advance_until((steps - done).min(CHUNK).min(done.max(1)), t) {
                 Ok(more) if more > 0 => done += more,
                 Ok(_) => break,

@@ -1,4 +1,4 @@
-//! Steps for a requested error, found by trial runs.
+//! Step-size selection for a requested error, by trial runs.
 
 mod converge;
 mod divided;

@@ -1,4 +1,4 @@
-//! What rounding keeps in motion at an equilibrium.
+//! The motion that round-off maintains at an equilibrium.
 
 use crate::run::request::Request;
 use crate::theory::legendre_inverse;
@@ -7,27 +7,29 @@ use contact_geom::{
     Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding,
 };
 
-/// The displacement of a motion at an equilibrium by the rounding of its forces alone. Forces that cancel there are rounded like the terms
-/// that cancel, as in `1 - exp(-x)` beside `x = 0`: however small the motion would become, this much is left of it.
+/// The displacement of a motion at an equilibrium by the round-off of its forces alone. Forces that cancel there have
+/// the round-off of the terms that cancel, as in `1 - exp(-x)` near `x = 0`: a decaying motion does not become smaller
+/// than this.
 pub(crate) struct Noise {
-    /// The displacement of (q, p), in the 2-norm: of each coordinate the rounding of its force over its stiffness, and of each
-    /// momentum the same over the frequency.
+    /// The displacement of (q, p), in the 2-norm: for each coordinate the round-off of its force divided by its
+    /// stiffness, and for each momentum the same divided by the frequency.
     pub displacement: f64,
-    /// The rounding of the forces themselves.
+    /// The round-off of the forces themselves.
     pub force: f64,
-    /// The energy of the displacement, a square of rounding that is not in the rounding of the energy to first order.
+    /// The energy of the displacement; it is quadratic in the round-off, and not part of the first-order round-off of
+    /// the energy.
     pub energy: f64,
 }
 
 impl Noise {
-    /// At a point.
+    /// The noise at a point.
     pub fn at<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Self {
         let (_, of_gradient) = gradient_rounding(lagrangian, t, x);
         let h = lagrangian.hessian(t, x);
         let (mut squares, mut energy) = (0.0, 0.0);
         for i in 0..N {
             let (force, stiffness, mass) = (of_gradient.x[i], h.qq[(i, i)].abs(), h.vv[(i, i)].abs());
-            // A force without stiffness, or a mass of nothing, says nothing.
+            // Without stiffness or mass the displacement is undefined.
             if stiffness > 0.0 && mass > 0.0 {
                 let squared = force * force / stiffness;
                 squares += squared / stiffness + squared * mass;
@@ -38,16 +40,17 @@ impl Noise {
     }
 }
 
-/// The part of its largest size so far below which a motion may be at the rounding of its forces.
+/// The size of a motion, relative to its largest size so far, below which it may consist of the round-off of its
+/// forces.
 pub(crate) const DECAYED: f64 = 1e-3;
 
-/// How many times the noise of one force those of all steps may be: they add up at random, and are damped.
+/// The noise of all steps in units of the noise of one force: the contributions add up at random, and are damped.
 pub(crate) fn all_together(steps: usize) -> f64 {
     (64.0 + steps as f64).sqrt() * 8.0
 }
 
 impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
-    /// At a state of the motion.
+    /// The noise at a state of the motion.
     #[cold]
     #[inline(never)]
     pub(crate) fn noise(&self, t: f64, state: &PhasePoint<N>) -> Noise {

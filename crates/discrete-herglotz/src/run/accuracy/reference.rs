@@ -1,4 +1,4 @@
-//! Steps of any integrator for a wanted error, by a reference.
+//! Step-size selection for any integrator, by comparison with a reference solution.
 
 use crate::run::accuracy::converge::{Converged, MAX_SEARCHES, chosen};
 use crate::run::accuracy::trial_runs::{TrialEnd, TrialRuns};
@@ -6,10 +6,10 @@ use crate::run::request::{MOST_STEPS, Shared, StepSelection};
 use crate::{InputError, SelectionFailure};
 use contact_geom::Lagrangian;
 
-/// The stages of the reference for other methods.
+/// The number of stages of the reference for other methods.
 pub(crate) const REFERENCE_STAGES: usize = 12;
 
-/// The steps of any integrator, whose runs are compared with the reference.
+/// The steps of any integrator for the requested error, from runs that are compared with the reference.
 pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
@@ -22,7 +22,7 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
     let mut count = whole((found.k * REFERENCE_STAGES) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);
     let (mut cause, mut before) = (SelectionFailure::Budget, None);
-    // The fewest steps that were seen to be enough, with their error.
+    // The smallest number of steps that was found to be sufficient, with its error.
     let mut enough: Option<(usize, f64)> = None;
     for _ in 0..MAX_SEARCHES {
         if count as f64 > MOST_STEPS {
@@ -33,7 +33,7 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                 let error = track.distance(&found.truth);
                 if error <= 0.7 * wanted {
                     enough = Some((count, error));
-                    // Down, where an order says that much fewer steps will do.
+                    // Fewer steps are tried if the order predicts that far fewer are sufficient.
                     let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
                     if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
                         break;
@@ -45,7 +45,7 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                     break;
                 }
                 strikes = if error < 0.7 * best { 0 } else { strikes + 1 };
-                // The reference is sure, so it is no chaos that keeps a run from it.
+                // The reference has converged, so the cause is not chaos.
                 if let Some((n, other)) = before.replace((count, error)) {
                     let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
                     let round_off = error < 1e-9 && shown < 0.5 * order;

@@ -6,21 +6,22 @@ use crate::run::request::Request;
 use crate::{GaussCollocation, Integrator, StepperOptions};
 use contact_geom::{Derivatives, Lagrangian};
 
-/// The logarithm by which the conformal factor of a motion falls, at the least, before it is at rest: its oscillations fall by half of it.
+/// The decrease of the logarithm of the conformal factor that is at least required before a motion is at rest: the
+/// logarithm of the amplitude of oscillations decreases by half of it.
 const FALLS: f64 = 1000.0;
 
-/// The steps of the search for the time of rest, and those between two looks.
+/// The number of steps of the search for the time of rest, and between two checks.
 const SEARCHED: usize = 1 << 20;
 const STRIDE: usize = 64;
 
 impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
-    /// The time at which the motion comes to rest, where that is within the span: by steps of eight stages, for a motion that has long
-    /// enough.
+    /// The time at which the motion comes to rest, if it lies within the span; found with steps of eight stages, if the
+    /// span is long enough for the decay.
     #[inline(never)]
     pub(crate) fn time_of_rest(&self) -> Option<f64> {
         let problem = self.problem;
         let fall = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
-        // A NaN is not below.
+        // Written so that a NaN counts as no decrease.
         let falls = fall < -FALLS;
         if !falls || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
             return None;

@@ -12,41 +12,42 @@ use crate::{GaussCollocation, InputError, SelectionFailure, TransformedGauss};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
-/// The stages from which a Gauss method is its own reference.
+/// The number of stages from which on a Gauss method is its own reference.
 const OWN_REFERENCE_STAGES: usize = 6;
 
-/// The stages where there are few steps, or dear ones.
+/// The number of stages for short runs, and for Lagrangians whose steps are expensive.
 const DEFAULT_STAGES: usize = 8;
 
-/// The steps of so many stages, as the motion at its start lets expect, from which on the most stages are the cheapest where
-/// the accelerations alone are iterated: half as many evaluations for an error, in the trial runs too, against tables of four times the size.
+/// The number of steps with [`DEFAULT_STAGES`] stages, estimated from the motion at its start, from which on the
+/// largest number of stages is the least expensive if only the accelerations are iterated: it halves the evaluations
+/// for an error, also in the trial runs, but its tables are four times as large.
 const MANY_STEPS: usize = 32;
 
-/// The stages in transformed time, for every error: what its time transformation makes smooth could be followed by longer steps of more stages, were it not for
-/// the iteration.
+/// The number of stages in transformed time, for every error: the motion is smooth in this time, and longer steps with
+/// more stages would follow it, but their fixed-point iteration would not converge.
 const TRANSFORMED_STAGES: usize = 8;
 
-/// The stages of Gauss collocation where no integrator is named: few steps of many stages cost their tables, many steps of few stages their
-/// number.
+/// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
+/// expensive, for many steps of few stages the number of steps.
 fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, wanted: f64) -> usize {
     let structure = &request.problem.structure;
     let condensed = structure.separable && structure.has_constant_rate();
-    // General steps as long as those of so many stages are not solved by sweeps.
+    // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
     if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MANY_STEPS { MAX_STAGES } else { DEFAULT_STAGES }
 }
 
-/// Chooses the steps, and the integrator where the run names none, so that the error of (q, p) relative to their size, and of v, is at most
-/// `wanted` at ten times along the motion.
+/// Selects the steps, and the integrator if the run gives none, so that the error of (q, p) relative to its size, and
+/// that of v, is at most `wanted` at ten times along the motion.
 ///
-/// By the time transformation that the motion states, where steps that are equal in its time are much fewer: the first run with equal steps sees
-/// that, and ends there.
+/// The time transformation of the Lagrangian is used if far fewer steps of equal size in transformed time are
+/// sufficient: the first run with equal steps tests this, and ends in this case.
 ///
-/// A reference is found first: contact Gauss collocation with k and 2k steps. They must agree; and between the nodes their curves must
-/// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
-/// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
-/// integrator's own runs is then their distance from the reference.
+/// First a reference solution is computed by contact Gauss collocation with k and 2k steps. The two runs must agree,
+/// and between the nodes their curves must satisfy Herglotz' equations up to a defect that decreases from the first run
+/// to the second as for a smooth motion. A run ends at its first unresolved step, so that runs that are far too coarse
+/// cost little. The error of a run of the integrator is then its distance from the reference.
 ///
-/// Where `terminal` ends the run, all these end there.
+/// If `terminal` ends the run, all these runs end there.
 pub(crate) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     request: &Request<'p, L, N>,
     wanted: f64,
@@ -61,13 +62,13 @@ pub(crate) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(terminal)) else {
         return choose(request);
     };
-    // What lies beyond the end is not followed.
+    // The motion after this end is not computed.
     let span = t_end - request.problem.t0;
     let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
     Ok(choose(&part)?.going_on(request.span / span))
 }
 
-/// The same with a budget.
+/// The selection with a given budget.
 pub(crate) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
@@ -87,7 +88,7 @@ pub(crate) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// The same where no integrator is named.
+/// The selection if no integrator is given.
 fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
@@ -96,7 +97,8 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     trials.watches_transformation =
         const { L::HINTS.time_transformation } && trials.request.problem.structure.autonomous;
     trials.watches_newton = stages > DEFAULT_STAGES;
-    // Parts that end where a kink is hidden would agree on a wrong motion: only where all kinks are known are steps divided.
+    // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
+    // known.
     let divides = const { L::HINTS.proved || L::HINTS.switching_functions };
     trials.watches_uneven = divides;
     let mut found = by_equal_steps(trials, &gauss(stages), stages);
@@ -113,7 +115,8 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
             Err(_) => found = by_equal_steps(trials, &gauss(stages), stages),
         }
     }
-    // Where a part of the motion asks for much shorter steps than the rest, those are divided; and they are refused for the first reason.
+    // If a part of the motion requires much shorter steps than the rest, the steps are divided; if this fails too, the
+    // first error is returned.
     if let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
         && divides
         && !matches!(cause, SelectionFailure::RoundOff | SelectionFailure::Chaos { .. })
@@ -125,7 +128,7 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
         });
     }
     let Err(Ended::SwitchReason(SwitchReason::TimeTransformation)) = found else { return Ok(found?) };
-    // Where the time transformation leads nowhere equal steps may.
+    // If the search in transformed time fails, equal steps are tried.
     let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss { stages: TRANSFORMED_STAGES });
     Ok(in_transformed_time(trials, &transformed, TRANSFORMED_STAGES).or_else(|ended| match ended {
         Ended::Refused(InputError::Interrupted) => Err(ended),
@@ -133,7 +136,7 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     })?)
 }
 
-/// Gauss collocation that is its own reference, with equal steps.
+/// The selection for Gauss collocation as its own reference, with equal steps.
 fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
@@ -141,14 +144,15 @@ fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
 ) -> Result<StepSelection<'p, L, N>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Steps)?;
-    // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
+    // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
+    // does not predict.
     let structure = &trials.request.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
     let (count, error) = fewest(stages, wanted, &found, longer);
     Ok(chosen(trials, integrator, count, error, &found))
 }
 
-/// The same with steps that are equal in the time of the motion's transformed time.
+/// The same selection with steps of equal size in the transformed time of the Lagrangian.
 fn in_transformed_time<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
@@ -160,13 +164,14 @@ fn in_transformed_time<'p, L: Lagrangian<N>, const N: usize>(
     Ok(chosen(trials, integrator, count, error, &found))
 }
 
-/// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
+/// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict.
 fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
     let Converged { k, errors: [error, beyond], defect, order, finer_is_cheaper, rough, .. } = *found;
-    // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
+    // Predictions between and beyond the runs aim at a tenth of the target, since the errors of neighbouring numbers of
+    // steps may differ by this factor.
     let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
     let steps = |order: f64| (k as f64 * (max_or_nan(error, 1e-14) / predicted).powf(1.0 / order)).ceil();
-    // Steps that end at a kink by chance agree, and others do not.
+    // Steps that end at a kink by chance agree, while other steps do not.
     if rough || order < stages as f64 / 3.0 {
         return if error <= target { (k, error) } else { (2 * k, beyond) };
     }
@@ -174,13 +179,13 @@ fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, long
         return (2 * k, beyond);
     }
     if error <= target {
-        // The error of longer steps grows faster than their order. They are taken only where the misfit says that they still resolve the
-        // motion.
+        // The error of longer steps grows faster than their order. They are taken only if the predicted defect shows
+        // that they still resolve the motion.
         let fewer = steps(2.5 * stages as f64).max((0.6 * k as f64).ceil());
         let coarser = defect * (k as f64 / fewer).powf(stages as f64);
         return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
     }
-    // That of shorter steps falls like the square of the misfit.
+    // The error of shorter steps decreases like the square of the defect.
     let more = steps(2.0 * order);
     if more < 2.0 * k as f64 { (more as usize, max_or_nan(predicted, beyond)) } else { (2 * k, beyond) }
 }

@@ -1,4 +1,4 @@
-//! What the choice of steps costs.
+//! The cost of the step-size selection.
 
 use crate::Problem;
 use crate::run::accuracy::select::choose_with;
@@ -12,7 +12,7 @@ use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// The integrator and the steps that are chosen for a run, with what the search for them has cost.
+/// The integrator and the number of steps that are selected for a run, and the cost of the selection.
 fn search<L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     span: f64,
@@ -26,8 +26,9 @@ fn search<L: Lagrangian<N>, const N: usize>(
     (choice.integrator.info().name, choice.count, BUDGET - trials.left)
 }
 
-/// trial runs cost a small multiple of the run: those with k, 2k and k + 1 steps, and where the first do not agree with 4k; before them one that
-/// ends where its misfit is seen to be too large. The run has more than k steps, or more than 1.2 k.
+/// Trial runs cost a small multiple of the run: there are those with k, 2k and k + 1 steps, one with 4k if the first
+/// two do not agree, and before them one that ends because its defect is too large. The run has more than k steps, or
+/// more than 1.2 k.
 #[test]
 fn pilot_runs_cost_little() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
@@ -36,16 +37,18 @@ fn pilot_runs_cost_little() {
         let (_, count, spent) = search(&problem, span, None, wanted);
         let run = problem.accuracy(wanted).run(Until::Time(span)).unwrap();
         assert_eq!(count, run.steps);
-        // Looks count twice their points, of which there are at least 2000 beside those of the steps.
+        // The cost of the defect samples is twice the number of their points, of which there are at least 2000 in
+        // addition to those of the steps.
         let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
-        // A run of 0.6 k steps is the shortest that those with k, k + 1 and 2k steps may end in, and a first one may have been in vain.
+        // The shortest run after trial runs with k, k + 1 and 2k steps has 0.6 k steps, and a first trial run may have
+        // failed.
         let most = 10.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
 }
 
-/// Many steps whose accelerations alone are iterated have sixteen stages, and are less than half as many; not where these need Newton's
-/// method, nor where there are few.
+/// Runs with many steps that iterate only the accelerations use sixteen stages, and less than half as many steps; short
+/// runs, and runs that would need Newton's method, do not.
 #[test]
 fn long_motions_take_more_stages() {
     let chosen = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
@@ -61,11 +64,12 @@ fn long_motions_take_more_stages() {
     assert_eq!(name, "gauss_16");
     assert!(2 * ours < of_eight, "{ours} steps, {of_eight} with eight stages");
     assert_eq!(chosen(&pendulum, None, 10.0).0, "gauss_8");
-    // Where the well of a forced double well is steepest no long sweep contracts.
+    // Where the forced double well is steepest, the iteration of a long step does not contract.
     assert_eq!(chosen(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
 }
 
-/// Where steps that are short enough for the error need Newton's method, and those of half the length hardly do, these are taken.
+/// If steps that are short enough for the error need Newton's method, and steps of half the size rarely do, the latter
+/// are taken.
 #[test]
 fn steps_that_cost_less_are_taken() {
     let system = QuadraticInZ { c: -0.05 };
@@ -81,7 +85,8 @@ fn steps_that_cost_less_are_taken() {
     assert!(3 * ours < longer, "{ours} of {count} steps, {longer} of {}", count / 2);
 }
 
-/// So they do in transformed time; and where it would gain nothing it costs nothing: the search is that for the integrator by name.
+/// Trial runs in transformed time cost a small multiple of the run too. If transformed time has no advantage, testing
+/// it costs nothing: the cost equals that for the integrator given by name.
 #[test]
 fn pilot_runs_by_a_clock_cost_little() {
     let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
@@ -105,7 +110,8 @@ fn pilot_runs_by_a_clock_cost_little() {
     }
 }
 
-/// What a Lagrangian does not say of its kinks: a spring that is stiffer where it is pressed, and a force that begins at a time.
+/// Lagrangians that do not declare their kinks: a spring that is stiffer under compression, and a force that starts at
+/// a given time.
 enum Unstated {
     Stiffer(f64),
     Begins(f64),
@@ -120,7 +126,7 @@ impl Lagrangian<1> for Unstated {
         }
     }
 
-    /// Its accelerations alone are iterated, with the stages that long motions take.
+    /// Only the accelerations are iterated, with the number of stages for long runs.
     fn structure(&self) -> Structure {
         let autonomous = matches!(self, Unstated::Stiffer(_));
         let (separable, constant_mass) = (true, true);
@@ -136,8 +142,8 @@ impl Lagrangian<1> for Unstated {
     }
 }
 
-/// Nodes of runs with k and 2k steps may all lie on the same kinks, and such runs agree on a wrong motion: whatever simple fraction of the span a kink
-/// is at, the motion is as exact as was asked for, or it is refused.
+/// The nodes of runs with k and 2k steps may all lie on the same kinks, and the runs then agree on a wrong motion: for
+/// kinks at various simple fractions of the span, the motion has the requested accuracy, or it is refused.
 #[test]
 fn kinks_at_nodes_do_not_hide() {
     let tau = std::f64::consts::TAU;

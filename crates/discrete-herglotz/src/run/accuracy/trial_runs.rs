@@ -1,4 +1,5 @@
-//! trial runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
+//! Trial runs: a motion that is computed with a given number of steps, recorded at a few common times, and sampled for
+//! defects between its nodes.
 
 use crate::gauss::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 use crate::integration::check_claims::violated_claim;
@@ -15,76 +16,83 @@ use crate::{
 use crate::{Interrupt, Problem, StepperOptions};
 use contact_geom::{Defect, Lagrangian, numbers::max_or_nan};
 
-/// What all trial runs of a plan may cost together, in evaluations of L at one stage: some seconds.
+/// The budget of all trial runs of a plan, in evaluations of L at one stage: some seconds.
 pub(crate) const BUDGET: u64 = 1 << 26;
 
-/// What those may cost together that come to their end, as those of long motions do: so that the budget grows with the run itself.
+/// The budget of runs that are expected to reach their end, as those of long motions: so the total budget grows with
+/// the cost of the run itself.
 pub(crate) const RESERVE: u64 = 1 << 29;
 
-/// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
+/// The defect between the nodes above which a step does not resolve the motion: its momenta would have an error of a
+/// twentieth.
 const RESOLVED: f64 = 0.05;
 
-/// The misfit in units of the largest momentum that is round-off: some hundred units for the sums that forces are made of.
+/// The defect, in units of the largest momentum, below which it is round-off: some hundred units, for the sums in the
+/// forces.
 const AT_REST: f64 = 1e-13;
 
-/// The roundings of a force that a misfit may hold.
+/// The round-off of a defect, in units of the round-off of a force.
 const ROUNDINGS: f64 = 64.0;
 
-/// The same of the values of L, whose polynomials follow twice the frequencies.
+/// The same bound for the values of L, whose polynomials have to approximate twice the frequencies.
 const RESOLVED_VALUE: f64 = 0.2;
 
-/// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
+/// The ratio of the defect to the expected defect above which a narrow feature lies between the nodes; smooth motions
+/// stay below it.
 const NARROW: f64 = 30.0;
 
-/// The points of a span at which a run is looked at, at least: what is wider than the distance of two is seen.
+/// The smallest number of sample points over the span: features wider than their distance are detected.
 const POINTS: usize = 2000;
 
-/// The steps between two looks at budget and progress.
+/// The number of steps between two checks of budget and progress.
 const CHUNK: usize = 1024;
 
-/// The looks between two at whether the plan is to end.
+/// The number of these checks between two checks for an interrupt, if steps are taken one by one.
 const LOOKS: usize = 16;
 
-/// The parts of a span at whose ends runs are compared.
+/// The number of parts of a span at whose ends runs are compared.
 const PARTS: usize = 10;
 
-/// How many times fewer steps a time transformation must take at the least, for its steps to be tried: each costs about so many of equal steps of the
-/// same error. Of Kepler's orbits those do of which the eccentricity is above one half.
+/// The smallest reduction of the number of steps for which a time transformation is tried: each of its steps costs
+/// about as much as this number of equal steps with the same error. For Kepler orbits this holds for eccentricities
+/// above one half.
 const PROFIT: f64 = 3.5;
 
-/// The steps that Newton's method may solve before other stages are tried, and the part of all. Where it solves fewer of a coarse run, one with
-/// twice as many steps needs it hardly at all.
+/// The number of steps that may need Newton's method before other stages are tried, and their fraction of all steps. If
+/// a coarse run stays below both, a run with twice as many steps rarely needs Newton's method.
 const FEW_NEWTON: f64 = 2.0;
 const PART_NEWTON: f64 = 0.25;
 
 /// The times of a span at which runs are compared.
 #[derive(Clone, Debug)]
 pub(crate) enum ComparisonGrid {
-    /// Ends of steps of a run with `base` steps, which divides the steps of all others.
+    /// Ends of steps of a run with `base` steps, which divides the numbers of steps of all others.
     Steps { base: usize, at: Vec<usize> },
-    /// The ends of the tenths of a span, on which steps in transformed time are made to end.
+    /// The ends of the tenths of a span, on which steps in transformed time are forced to end.
     Times,
 }
 
 impl ComparisonGrid {
-    /// The ends of the tenths of a span, each moved to the end of the step in which it lies; of all steps where they are fewer.
+    /// The ends of the tenths of a span, each moved to the end of the step that contains it; the ends of all steps if
+    /// there are fewer than ten.
     pub fn of(base: usize) -> Self {
         let parts = base.min(PARTS);
         ComparisonGrid::Steps { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
     }
 
-    /// Equal parts of a span, as many as tenths and as steps.
+    /// Equal parts of a span: ten, or the number of steps if that is smaller.
     pub fn equal(steps: usize) -> Self {
         ComparisonGrid::of(steps.min(PARTS))
     }
 
-    /// The fewest steps from a number on that they divide.
+    /// The smallest number of steps, not below `steps`, that the grid divides.
     pub fn whole(&self, steps: f64) -> usize {
         let base = if let ComparisonGrid::Steps { base, .. } = self { *base } else { 1 };
         (steps / base as f64).ceil().max(1.0) as usize * base
     }
 
-    /// The number of steps and the time, whichever a run with so many steps over a span reaches first, at the i-th mark.
+    /// The number of steps and the time at the i-th point of the grid, for a run with `count` steps over a span: the
+    /// run stops at whichever it reaches first.
     fn stop(&self, i: usize, count: usize, t0: f64, span: f64) -> Option<(usize, f64)> {
         match self {
             ComparisonGrid::Steps { base, at } => {
@@ -95,90 +103,92 @@ impl ComparisonGrid {
     }
 }
 
-/// How a trial run has ended.
+/// The end of a trial run.
 #[derive(Clone, Debug)]
 pub(crate) enum TrialEnd<const N: usize> {
-    /// At the end of the span.
+    /// The run reached the end of the span.
     Followed(Track<N>),
-    /// At a step that does not resolve the motion, after this part of the span.
+    /// A step does not resolve the motion, after this part of the span.
     Unresolved { part: f64 },
-    /// The same, where the misfit is that of something narrow.
+    /// The same, with the defect of a narrow feature.
     Narrow { part: f64 },
-    /// Where another integrator is seen to be cheaper.
+    /// Another integrator is less expensive.
     SwitchReason(SwitchReason),
-    /// At a step that could not be taken.
+    /// A step failed.
     Halted { part: f64, cause: StepError },
-    /// No evaluations are left.
+    /// The budget is exhausted.
     Exhausted,
-    /// From outside.
+    /// The run was interrupted.
     Interrupted,
 }
 
-/// What is cheaper than the steps of a run.
+/// The less expensive alternative to the steps of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SwitchReason {
-    /// Steps in the motion's own transformed time, since they are much fewer.
+    /// Steps in the transformed time of the Lagrangian, of which far fewer are needed.
     TimeTransformation,
-    /// Steps of fewer stages, since these need Newton's method.
+    /// Steps of fewer stages, since the present ones need Newton's method.
     FewerStages,
-    /// Steps that are divided where the motion is fast: equal ones are many times more than it asked for at its start.
+    /// Divided steps where the motion is fast, since the number of equal steps is a large multiple of that required at
+    /// the start.
     Divided,
 }
 
-/// A misfit in units of a size; as it is where that is 0.
+/// A defect relative to a size; unchanged if the size is 0.
 fn relative_to(defect: f64, size: f64) -> f64 {
     if defect == 0.0 || size == 0.0 { defect } else { defect / size }
 }
 
-/// What the looks at a run have seen.
+/// The defect samples of a run so far.
 #[derive(Default)]
 struct DefectHistory {
     before: Option<DefectSample>,
-    /// The largest momentum, and the largest of what misfits of values change, on the way.
+    /// The largest momentum, and the largest quantity to which defects of the values of L are relative.
     size: f64,
     kinetic: f64,
-    /// The largest misfits, in the units of these: of a motion that comes to rest only round-off is left, and one that begins at rest has all
-    /// of its size before it.
+    /// The largest absolute defects of the momenta and of the values of L. They are compared with the largest sizes
+    /// along the whole run: in a motion that comes to rest only round-off is left, and a motion that starts at rest
+    /// reaches its size later.
     of_momentum: f64,
     of_value: f64,
 }
 
 impl DefectHistory {
-    /// Takes in a look at the next step, and says whether the step resolves the motion.
+    /// Adds the defect sample of the next step; returns whether the step resolves the motion.
     fn resolves(&mut self, look: &DefectSample) -> bool {
         let before = self.before.replace(*look).filter(|_| !look.follows_a_jump);
         let jump = before.map_or(0.0, |before| before.jump_to(look));
         (self.size, self.kinetic) = (max_or_nan(self.size, look.size), max_or_nan(self.kinetic, look.kinetic));
         let of_value = max_or_nan(look.of_value, jump);
-        // What does not move crosses nothing, and values of L that have underflowed tell nothing.
+        // A motion at rest crosses no jump, and values of L that have underflowed carry no information.
         let told = of_value != 0.0 && (self.kinetic >= UNDERFLOWN || self.kinetic.is_nan());
         let of_value = if told { of_value } else { 0.0 };
         let of_momentum = look.defect * if look.size > 0.0 { look.size } else { 1.0 };
         self.of_momentum = max_or_nan(self.of_momentum, of_momentum);
         self.of_value = max_or_nan(self.of_value, of_value);
-        // A NaN resolves nothing.
+        // Written so that a NaN counts as unresolved.
         (look.defect <= RESOLVED || of_momentum <= AT_REST * self.size || look.is_underflown())
             && relative_to(of_value, self.kinetic) <= RESOLVED_VALUE
     }
 
-    /// The largest misfit, relative to the largest momentum and to what misfits of values change.
+    /// The largest defect, relative to the largest momentum and to the size for defects of values.
     fn defect(&self) -> f64 {
         max_or_nan(relative_to(self.of_momentum, self.size), relative_to(self.of_value, self.kinetic))
     }
 }
 
-/// What a time transformation would make of the equal steps of a run so far.
+/// The estimate of the steps that a time transformation would save, compared with equal steps.
 #[derive(Default)]
 struct Uneven {
     steps: f64,
-    /// The sum of the reciprocal rates, which is the span of the transformed time in units of the step, and the largest of them.
+    /// The sum of the reciprocal rates, which is the span of tau in units of the step, and the largest of them.
     sum: f64,
     largest: f64,
 }
 
 impl Uneven {
-    /// Takes in the rate at the end of the next step, and says how many times fewer steps of the time transformation, all as short as the shortest of
-    /// these in its own time, lead as far.
+    /// Adds the rate at the end of the next step; returns by which factor fewer steps of the time transformation cover
+    /// the same span, if they are all as short in tau as the shortest of the equal steps.
     fn profit(&mut self, rate: f64) -> f64 {
         let speed = 1.0 / rate;
         (self.steps, self.sum) = (self.steps + 1.0, self.sum + speed);
@@ -187,24 +197,24 @@ impl Uneven {
     }
 }
 
-/// trial runs of a request, with what is left of their budget.
+/// The trial runs of a request, with the rest of their budget.
 pub(crate) struct TrialRuns<'t, 'p, L, const N: usize> {
     pub request: &'t Request<'p, L, N>,
     pub left: u64,
-    /// What is left of the reserve for runs that come to their end.
+    /// The rest of the reserve for runs that are expected to reach their end.
     pub reserve: u64,
-    /// The error that is wanted.
+    /// The requested error.
     pub wanted: f64,
-    /// Whether runs with equal steps end where a time transformation would take much fewer.
+    /// Whether runs with equal steps end if a time transformation would take far fewer.
     pub watches_transformation: bool,
-    /// Whether they end where Newton's method is needed for many of the steps.
+    /// Whether runs end if many of their steps need Newton's method.
     pub watches_newton: bool,
-    /// Whether a search ends where it meets something that asks for many times more steps than the start.
+    /// Whether a search ends if it requires many times more steps than the start of the motion.
     pub watches_uneven: bool,
 }
 
 impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
-    /// For a request, with the whole budget.
+    /// The trial runs of a request, with the whole budget.
     pub fn new(request: &'t Request<'p, L, N>, wanted: f64) -> Self {
         let (watches_transformation, watches_newton, watches_uneven) = (false, false, false);
         TrialRuns {
@@ -218,8 +228,9 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         }
     }
 
-    /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
-    /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
+    /// Computes the motion by contact Gauss collocation, with a defect sample between the nodes of each step: with
+    /// `closely` at so many points that they cover the span densely, otherwise at one set of points per step. With
+    /// `narrow` the run also ends at features that are narrower than the steps.
     pub fn gauss(
         &mut self,
         stages: usize,
@@ -259,14 +270,15 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
-        // Of a linear motion nothing is to be seen between the nodes that the order does not show.
+        // For a linear motion the defect between the nodes contains no more than the order does.
         let linear = stepper.route() == GaussRoute::Linear;
         let (stride, points) = if linear { (CHUNK, 0) } else { (1, course.points) };
         let course = TrialSettings { points, ..course };
         self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
     }
 
-    /// Follows the motion by Gauss collocation with steps that are divided where their misfit is larger than this.
+    /// Computes the motion by Gauss collocation with steps that are divided where their defect exceeds that of the
+    /// integrator.
     pub fn divided(
         &mut self,
         integrator: DividedGauss,
@@ -278,19 +290,21 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
-        // Each step is looked at, which costs twice its stages.
+        // The integrator samples the defect of each step, which costs twice its stages.
         let look = |run: &_, _: f64| (None, 2 * Stepper::evaluations(run));
         self.follow(&mut stepper, count, marks, 1, look).unless_interrupted()
     }
 
-    /// The length of steps of which so many fill the span; in transformed time, if its rate stayed what it is at the start.
+    /// The step size with which `count` steps fill the span; in transformed time, if the rate kept its value at the
+    /// start.
     pub fn step(&self, count: usize, marks: &ComparisonGrid) -> f64 {
         let Problem { lagrangian, start, .. } = self.request.problem;
         let h = self.request.span / count as f64;
         if let ComparisonGrid::Times = marks { h / lagrangian.dt_dtau(&start.q) } else { h }
     }
 
-    /// Follows the motion with looks, by `look` at so many sets of points, which also counts the steps of Newton's method.
+    /// Computes the motion with defect samples: `look` samples the last step at a number of sets of points, and also
+    /// counts the steps that needed Newton's method.
     fn watch<R: Stepper<N>>(
         &mut self,
         run: &mut R,
@@ -329,7 +343,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             });
             (ending, spent(looks))
         });
-        // What is met nowhere else may be what a claim denies.
+        // A large defect may be due to a false claim of structure.
         if let TrialEnd::Narrow { .. } | TrialEnd::Unresolved { .. } = ending
             && let Some(Defect { claim, size }) = violated_claim(lagrangian, run.time(), &run.state(), &start.v)
         {
@@ -341,7 +355,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         })
     }
 
-    /// Follows the motion by the integrator of the request.
+    /// Computes the motion with the given integrator.
     pub fn own(
         &mut self,
         integrator: &Shared<'p, L, N>,
@@ -365,8 +379,8 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         self.follow(&mut *stepper, count, marks, CHUNK, look).unless_interrupted()
     }
 
-    /// Takes `count` steps, at most `stride` at a time; `look` sees the run in between with the part that is done, may end it, and says
-    /// what it has cost. The cost is taken off the budget.
+    /// Takes `count` steps, at most `stride` at a time. After each of these chunks `look` is called with the completed
+    /// fraction of the span; it may end the run, and returns the cost so far, which is deducted from the budget.
     fn follow<R: Stepper<N> + ?Sized>(
         &mut self,
         run: &mut R,
@@ -385,14 +399,14 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         while ending.is_none()
             && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
         {
-            // Single steps are short.
+            // Single steps take little time, so that not every one is followed by this check.
             let asks = stride > 1 || looks.is_multiple_of(LOOKS);
             if asks && self.request.problem.interrupt.is_some_and(Interrupt::is_wanted) {
                 ending = Some(TrialEnd::Interrupted);
                 break;
             }
             looks += 1;
-            // Few steps at first, so that the velocity is seen at more than one phase of an oscillation.
+            // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
             let chunk = stride.min(taken.max(1)).min(steps - taken);
             let (done, cause) = match run.advance_until(chunk, time) {
                 Ok(done) => (done, None),
@@ -420,7 +434,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
                 noise.push(if decayed { of_all() } else { 0.0 });
                 states.push(state);
             }
-            // A run whose end is in sight may go on.
+            // A run continues on the reserve if it is expected to end within it.
             if spent > self.left && spent as f64 > part * self.reserve as f64 {
                 ending = Some(TrialEnd::Exhausted);
             }
@@ -433,46 +447,47 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
     }
 }
 
-/// What a run that is watched is asked for.
+/// The settings of a run with defect samples.
 struct TrialSettings<'m> {
     count: usize,
     marks: &'m ComparisonGrid,
-    /// The sets of points of a look.
+    /// The number of sets of points of a defect sample.
     points: usize,
-    /// Whether it ends at what is narrow beside the steps.
+    /// Whether the run ends at features that are narrower than the steps.
     narrow: bool,
     price: EvaluationCost,
 }
 
 impl<const N: usize> TrialEnd<N> {
-    /// Itself; an interruption ends the whole search.
+    /// Returns the end itself, or the error by which an interrupt ends the whole search.
     fn unless_interrupted(self) -> Result<Self, InputError> {
         if let TrialEnd::Interrupted = self { Err(InputError::Interrupted) } else { Ok(self) }
     }
 
-    /// With the span in transformed time.
+    /// Sets the span in transformed time.
     fn with_tau(self, tau: f64) -> Self {
         if let TrialEnd::Followed(track) = self { TrialEnd::Followed(Track { tau, ..track }) } else { self }
     }
 }
 
-/// What parts of a run cost, in evaluations of L at one stage.
+/// The cost of parts of a run, in evaluations of L at one stage.
 struct EvaluationCost {
-    /// A step that Newton's method solves: a few solutions of the dense equations of all stages, with second derivatives at each.
+    /// A step that needs Newton's method: a few solutions of the dense equations of all stages, with second derivatives
+    /// at each.
     newton: u64,
-    /// A look at as many points as there are stages, maps included.
+    /// A defect sample at as many points as there are stages, including the maps to the points.
     look: u64,
 }
 
 impl EvaluationCost {
     fn of<const N: usize>(stages: usize) -> Self {
         let (unknowns, stages) = ((stages * (N + 2)) as u64, stages as u64);
-        // An evaluation takes as long as about 32 products; second derivatives are not in lanes.
+        // An evaluation takes as long as about 32 products; second derivatives are not computed in SIMD lanes.
         EvaluationCost { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * N as u64 + 1)), look: 2 * stages }
     }
 }
 
-/// A first step that cannot be taken calls for shorter steps; bad input ends the search.
+/// A failure of the first step leads to a refinement; invalid input ends the search.
 fn halted_at_the_start<const N: usize>(error: InputError) -> Result<TrialEnd<N>, InputError> {
     match error {
         InputError::Sigma { sigma } => Ok(TrialEnd::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),

@@ -1,4 +1,4 @@
-//! The velocities of a motion at some times, and the largest speed between them.
+//! The velocities of a motion at some times, and its largest speed.
 
 use crate::Problem;
 use crate::run::accuracy::noise::all_together;
@@ -10,7 +10,7 @@ use crate::{InputError, SelectionFailure, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, numbers::max_or_nan};
 
-/// The velocities of one run, and what their errors are relative to.
+/// The velocities of one run, and the speed to which their errors are relative.
 pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
     problem: &'r Problem<'p, L, N>,
     scales: Option<SVector<f64, N>>,
@@ -22,14 +22,14 @@ pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
 }
 
 impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
-    /// Those of a run of a problem, at its start, with scales of the coordinates where they are given.
+    /// The velocities of a run at its start, with the scales of the coordinates, if they are given.
     pub fn new(problem: &'r Problem<'p, L, N>, scales: Option<SVector<f64, N>>) -> Self {
         let size = |x: &SVector<f64, N>| norm(&[in_units(x, scales.as_ref())]);
         let (speed, reach) = (size(&problem.start.v), size(&problem.start.q));
         Velocities { problem, scales, speed, reach, before: (problem.t0, problem.start.q) }
     }
 
-    /// Takes in the end of a step: the mean velocity of the step is one of the motion's.
+    /// Updates the largest speed at the end of a step, by the mean velocity of the step.
     pub fn pass(&mut self, t: f64, q: &SVector<f64, N>) {
         let (t_before, q_before) = std::mem::replace(&mut self.before, (t, *q));
         self.reach = max_or_nan(self.reach, norm(&[in_units(q, self.scales.as_ref())]));
@@ -38,7 +38,8 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
         }
     }
 
-    /// The velocity of a state, of several the one next to another. 0 where none is found: the run itself ends where it needs one.
+    /// The velocity at a state; if there are several, the one close to `near`. 0 if none is found: a run that needs the
+    /// velocity fails by itself.
     pub fn at(&mut self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> SVector<f64, N> {
         self.pass(t, &state.q);
         let near = near.unwrap_or(self.problem.start.v);
@@ -51,8 +52,8 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
         self.speed = max_or_nan(self.speed, norm(&[in_units(v, self.scales.as_ref())]));
     }
 
-    /// The largest speed of a run of so many steps; infinite where the motion moves by no more than the rounding of its positions, so that its
-    /// velocity tells nothing.
+    /// The largest speed of a run with this number of steps; infinite if the motion moves by no more than the round-off
+    /// of its positions, so that its velocity is undetermined.
     pub fn speed(&self, steps: usize) -> f64 {
         let moved = self.speed * (self.before.0 - self.problem.t0).abs();
         if moved <= all_together(steps) * f64::EPSILON * self.reach { f64::INFINITY } else { self.speed }
@@ -60,8 +61,8 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
-    /// An accuracy that is refused, for the rounding of the velocity where that alone is larger: a momentum `p = v + A(q)` determines v up to the
-    /// rounding of A.
+    /// Changes the cause of a refused accuracy to the round-off of the velocity, if that alone exceeds the requested
+    /// error: a momentum `p = v + A(q)` determines v up to the round-off of A.
     pub(crate) fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
         let Problem { lagrangian, start, state, t0, .. } = self.problem;
         let InputError::Accuracy { wanted, .. } = refused else { return refused };

@@ -1,4 +1,5 @@
-//! Claims of structure along a run: what is constant at its start must be so wherever it goes.
+//! Claims of structure along a run: quantities that are claimed to be constant are compared with their values at the
+//! start.
 
 use crate::resolution::monitor::size;
 use crate::run::discretization::Discretization;
@@ -11,34 +12,37 @@ use contact_geom::{
     support::gradient_rounding,
 };
 
-/// The part of what a motion has covered, in any coordinate or momentum, that it moves at least between two looks.
+/// The displacement since the last check, relative to the extent of the motion in the same coordinate or momentum, from
+/// which on the claims are checked again.
 const MOVED: f64 = 0.125;
 
-/// The points within a step that has covered more than that by itself.
+/// The number of parts into which a step is divided for checks within it, if its own displacement exceeds [`MOVED`].
 const WITHIN: usize = 8;
 
-/// The difference of what is claimed to be constant, relative to its size, from which on it is not: whatever is rounded by less than ten
-/// digits, and then some thousand units of that.
+/// The relative difference above which a quantity does not count as constant: round-off reaches it only if ten digits
+/// are lost. In addition the difference must exceed this number of units of the estimated round-off.
 const DIFFERENT: f64 = 1e-6;
 const ROUNDINGS: f64 = 1e4;
 
-/// Compares what the claims say is constant, the mass matrix, `L_z` and second derivatives, with what it is at the start of a run. It
-/// looks after eight steps in each doubling of their number, where the motion has moved by a part of all that it has covered, so that
-/// what lies between the places of two looks is narrower than that; and within a step that does so by itself.
+/// Compares the quantities that are claimed to be constant (the mass matrix, `L_z` and second derivatives) with their
+/// values at the start of a run. Checks are due after eight steps in each doubling of the number of steps; they are
+/// made if the motion has moved by a given part of its extent since the last one, so that the distance between two
+/// checks is about that part. A step whose own displacement exceeds it is checked at points within the step.
 ///
-/// This costs about as much as a step; [`Structure::defects`] sees more, and is taken less often.
+/// A check costs about as much as a step. [`Structure::defects`] checks more, and is evaluated less often.
 pub(crate) struct ClaimMonitor<const N: usize> {
     structure: Structure,
-    /// At the start; at other times of a system that depends on time it is taken anew.
+    /// The values at the start. `None` for a system that depends on time: its values are evaluated at the initial state
+    /// and the current time.
     reference: Option<Constants<N>>,
-    /// The box that the motion has covered, and where the last look was.
+    /// The bounding box of the motion so far, and the state at the last check.
     low: [SVector<f64, N>; 2],
     high: [SVector<f64, N>; 2],
     last: [SVector<f64, N>; 2],
     guess: SVector<f64, N>,
 }
 
-/// What claims say is constant.
+/// The quantities that are claimed to be constant.
 struct Constants<const N: usize> {
     rate: f64,
     mass: SMatrix<f64, N, N>,
@@ -60,7 +64,7 @@ impl<const N: usize> Constants<N> {
 }
 
 impl<const N: usize> ClaimMonitor<N> {
-    /// That of a run whose Lagrangian claims something that is constant, and has not proved it.
+    /// The monitor of a run whose Lagrangian claims that something is constant. `None` if the claims are proved.
     pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>) -> Option<Self> {
         if const { L::HINTS.proved } {
             return None;
@@ -71,7 +75,7 @@ impl<const N: usize> ClaimMonitor<N> {
             return None;
         }
         let here = [problem.state.q, problem.state.p];
-        // What is quadratic may have coefficients that depend on time.
+        // The coefficients of a quadratic Lagrangian may depend on time.
         let reference = structure.autonomous || structure.z_free && structure.constant_mass && !structure.quadratic;
         let reference = if reference {
             Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?)
@@ -81,12 +85,12 @@ impl<const N: usize> ClaimMonitor<N> {
         Some(ClaimMonitor { structure, reference, low: here, high: here, last: here, guess: problem.start.v })
     }
 
-    /// The number of steps after which it looks next.
+    /// The number of steps after which the next check is due.
     pub fn next(&self, taken: usize) -> usize {
         taken.saturating_add((taken / 8).max(1))
     }
 
-    /// Looks at the end of a step, and within it.
+    /// Checks the claims at the end of a step, and within a long step; returns a violated claim.
     pub fn violated<L: Lagrangian<N>>(
         &mut self,
         steps: &Discretization<'_, L, N>,
@@ -129,17 +133,17 @@ impl<const N: usize> ClaimMonitor<N> {
         self.compare(steps, t, &x)
     }
 
-    /// Takes a state into the box, and says how far it is from the last look.
+    /// Extends the bounding box by a state; returns its distance from the last check, relative to the box.
     fn cover(&mut self, state: &PhasePoint<N>) -> f64 {
         for (x, (low, high)) in [&state.q, &state.p].into_iter().zip(self.low.iter_mut().zip(&mut self.high)) {
-            // A run has ended before it is not finite.
+            // States are finite here: a run ends at the first state that is not.
             *low = low.zip_map(x, |low, x| if x < low { x } else { low });
             *high = high.zip_map(x, |high, x| if x > high { x } else { high });
         }
         self.part([state.q - self.last[0], state.p - self.last[1]])
     }
 
-    /// A distance as a part of the box, in the direction in which it is the largest part.
+    /// A distance relative to the box: the largest ratio over all coordinates and momenta.
     fn part(&self, distance: [SVector<f64, N>; 2]) -> f64 {
         let mut part = 0.0;
         for (distance, (low, high)) in distance.iter().zip(self.low.iter().zip(&self.high)) {
@@ -197,7 +201,8 @@ impl<const N: usize> ClaimMonitor<N> {
     }
 }
 
-/// The largest difference of two sets of numbers, and that relative to the largest of them; `None` where they are the same.
+/// The largest difference of two sets of numbers, absolute and relative to the largest number; `None` if the sets
+/// agree.
 fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     let apart = max_abs_or_nan(a.iter().zip(b).map(|(a, b)| a - b));
     let size = max_abs_or_nan(a.iter().chain(b).copied());

@@ -1,4 +1,4 @@
-//! What is provably dissipated along a motion: the energy of an autonomous system.
+//! The energy of an autonomous system, which decays with the conformal factor along the exact motion.
 
 use crate::run::accuracy::noise::Noise;
 use crate::run::checks::energy_drift::{EnergyDrift, EnergyLook, allowed};
@@ -9,31 +9,33 @@ use contact_geom::{
     Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
 };
 
-/// The shortest distance of two looks in long runs, in steps: a look costs about three of the cheapest.
+/// The shortest distance of two energy checks in long runs, in steps: a check costs about three of the least expensive
+/// steps.
 const APART: usize = 256;
 
-/// The looks of a run beside those at powers of two.
+/// The number of energy checks of a run in addition to those at powers of two.
 const LOOKS: usize = 32;
 
-/// Watches the [drift](EnergyDrift) of the energy `H = p.v - L` along a run.
+/// Monitors the [drift](EnergyDrift) of the energy `H = p.v - L` along a run.
 pub(crate) struct EnergyMonitor<const N: usize> {
-    /// `L_z`, where the logarithm of sigma is this times the time, and the run does not count it.
+    /// `L_z`, if it is constant and the run does not accumulate the conformal factor: `ln sigma` is then `L_z` times
+    /// the time.
     rate: Option<f64>,
     every: usize,
     guess: SVector<f64, N>,
     pub drift: EnergyDrift,
 }
 
-/// An energy with what a drift of it is compared with.
+/// An energy, and the quantities with which its drift is compared.
 struct Energies {
     total: f64,
     kinetic: f64,
-    /// The size of its terms.
+    /// The sum of the magnitudes of the terms `L` and `L_z z`.
     terms: f64,
 }
 
 impl<const N: usize> EnergyMonitor<N> {
-    /// That of a run, where its energy and its conformal factor are known.
+    /// The monitor of a run, if its energy and its conformal factor are available.
     pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>, constant_rate: bool) -> Option<Self> {
         let problem = steps.problem;
         let structure = &problem.structure;
@@ -54,13 +56,14 @@ impl<const N: usize> EnergyMonitor<N> {
         })
     }
 
-    /// The number of steps after which it looks next.
+    /// The number of steps after which the next check is due.
     pub fn next(&self, taken: usize) -> usize {
         let doubled = (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX);
         doubled.min((taken / self.every + 1) * self.every).max(self.drift.first())
     }
 
-    /// Looks at a state: its drift, in units of the largest that steps have which resolve their motion, where that is above one.
+    /// The drift at a state, relative to the largest drift of steps that resolve their motion, if this ratio exceeds
+    /// one.
     pub fn drift<L: Lagrangian<N>>(
         &mut self,
         steps: &Discretization<'_, L, N>,
@@ -86,12 +89,12 @@ impl<const N: usize> EnergyMonitor<N> {
     }
 }
 
-/// The part of a drift that is flagged in a run, from which on a look at its ends alone sees that it may be one: a drift that comes and goes
-/// is that small at an end by chance in one of some twenty members.
+/// The part of the allowed drift above which the two ends of a run indicate a drift. By chance, an oscillating drift
+/// that a run would flag is smaller than this at the end in about one of twenty members.
 const MAY: f64 = 0.05;
 
-/// Whether the energy of a run of a system that does not depend on time, with a constant `L_z`, may have drifted, by its two ends: an
-/// [`EnergyMonitor`] decides.
+/// Whether the energy of a run may have drifted, judged from its two ends, for an autonomous system with constant
+/// `L_z`. The decision is left to an [`EnergyMonitor`].
 pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     order: u32,
@@ -109,7 +112,7 @@ pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
     (b.total - a.total * sigma).abs() > MAY * allowed
 }
 
-/// The energy at a state, with the kinetic one, `v.Wv/2`.
+/// The energy at a state, with the kinetic energy `v.Wv/2` as the sum of the magnitudes of its terms.
 fn energies<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
@@ -129,7 +132,7 @@ fn energies<L: Lagrangian<N>, const N: usize>(
     (total.is_finite() && kinetic.is_finite() && terms.is_finite()).then_some(Energies { total, kinetic, terms })
 }
 
-/// What rounding may have changed of the energy at a state.
+/// A bound on the round-off of the energy at a state.
 #[cold]
 #[inline(never)]
 fn rounding_of<L: Lagrangian<N>, const N: usize>(

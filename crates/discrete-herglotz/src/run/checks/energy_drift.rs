@@ -3,21 +3,25 @@
 use crate::numbers::state_words::saved;
 use contact_geom::numbers::max_or_nan;
 
-/// The part of the kinetic energy by which the energy may be off: that of an oscillation by steps of half a radian, with the power of
-/// the order; and at the least this, by which a frequency is off too, so that the phase is lost in some ten periods.
+/// The allowed drift relative to the kinetic energy, for a method of order p: the p-th power of the first number, which
+/// is the energy error of an oscillation with steps of half a radian, but at least the second number. With such an
+/// error a frequency has a relative error of the same size, and the phase is lost in about ten periods.
 const STEP: f64 = 0.5;
 const LEAST: f64 = 0.01;
 
-/// In so many steps from rest the energy of a step's error, with the order one, is as large as the kinetic energy over their number.
+/// After n steps from rest, the energy error of a method of order one is the kinetic energy divided by n; the energy is
+/// checked from this n on.
 const FIRST: f64 = 16.0;
 
-/// The drift of the energy of an autonomous system along a run. The motion has `dH/dt = L_z H`, so that `H / sigma` is constant,
-/// with the conformal factor sigma; what it drifts by is compared with the kinetic energy, the mean of the looks so far and that of
-/// the last one, in the same units.
+/// The drift of the energy of an autonomous system along a run. The motion satisfies `dH/dt = L_z H`, so that `H /
+/// sigma` is constant, with the conformal factor sigma. The drift is compared with the kinetic energy: the larger of
+/// its mean over the checks so far, scaled by the conformal factor, and its value at the last check.
 ///
-/// Where the drag is strong in a step H is a small difference of L and `L_z z`, whose errors are of their own size times the drag.
+/// If the drag is strong within a step, H is a small difference of L and `L_z z`, whose errors are of their own size
+/// times the drag of a step; these are added to the kinetic energy.
 ///
-/// A [`Run`](crate::Run) looks at it by itself. This is for programs that take the steps of systems of their own:
+/// A [`Run`](crate::Run) checks the drift automatically. This type is for programs that take the steps of their own
+/// systems:
 ///
 /// ```
 /// use discrete_herglotz::checks::{EnergyDrift, EnergyLook};
@@ -33,35 +37,36 @@ pub struct EnergyDrift {
     pub(crate) sums: EnergySums,
 }
 
-/// An energy after some steps of a run.
+/// The energy after a number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyLook {
     /// The energy `H`.
     pub total: f64,
-    /// The kinetic energy, which a drift is compared with.
+    /// The kinetic energy, with which the drift is compared.
     pub kinetic: f64,
     /// The size of the terms `L` and `L_z z`.
     pub terms: f64,
     /// The logarithm of the conformal factor since the start.
     pub log_factor: f64,
-    /// The steps taken.
+    /// The number of steps taken.
     pub taken: usize,
 }
 
 impl EnergyDrift {
-    /// Of a run by a method of an order, from its start.
+    /// The drift of a run with a method of the given order, from the energy at its start.
     pub fn new(order: u32, start: &EnergyLook) -> Self {
         let sums = EnergySums { scale: start.kinetic, looks: 1.0, ..EnergySums::default() };
         EnergyDrift { start: start.total, order: f64::from(order.max(1)), sums }
     }
 
-    /// The number of steps before which a look tells nothing.
+    /// The number of steps before which a check is inconclusive.
     pub fn first(&self) -> usize {
         FIRST.powf(1.0 / self.order).ceil() as usize
     }
 
-    /// Looks: the drift, in units of the largest that steps have which resolve their motion, where that is above one. What
-    /// rounding may have changed of the energies is asked for by the conformal factor since the start, and only where it matters.
+    /// Makes a check; returns the drift relative to the largest drift of steps that resolve their motion, if this ratio
+    /// exceeds one. `rounding` gives the round-off of the energies for a conformal factor since the start; it is called
+    /// only if the result depends on it.
     pub fn defect(&mut self, at: &EnergyLook, rounding: impl FnOnce(f64) -> f64) -> Option<f64> {
         let EnergyLook { total, kinetic, terms, log_factor, taken } = *at;
         if taken < self.first() {
@@ -78,26 +83,26 @@ impl EnergyDrift {
         if drift <= allowed || !drift.is_finite() || !allowed.is_finite() {
             return None;
         }
-        // The roundings of all steps may add up.
+        // The round-off of all steps may accumulate.
         let rounding = (64.0 + taken as f64) * rounding(log_factor.exp());
         (drift > rounding).then(|| drift / max_or_nan(allowed, f64::MIN_POSITIVE))
     }
 }
 
-/// What the looks so far add up to.
+/// Sums over the checks so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct EnergySums {
-    /// The energies that a drift is compared with, damped as the energy is, and their number.
+    /// The sum of the energies with which a drift is compared, scaled by the conformal factor, and their number.
     pub scale: f64,
     pub looks: f64,
-    /// The logarithm of the conformal factor, and the steps, at the last look.
+    /// The logarithm of the conformal factor, and the number of steps, at the last check.
     pub log_factor: f64,
     pub taken: f64,
 }
 
 saved!([] EnergySums { scale, looks, log_factor, taken });
 
-/// The drift, relative to the kinetic energy, that a method of an order may have.
+/// The allowed drift of a method of the given order, relative to the kinetic energy.
 pub(crate) fn allowed(order: f64) -> f64 {
     max_or_nan(LEAST, STEP.powf(order))
 }

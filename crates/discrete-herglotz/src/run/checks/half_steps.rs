@@ -1,4 +1,4 @@
-//! Steps against twice as many of half their length: whether given steps resolve the motion at all.
+//! Comparison of steps with twice as many steps of half their size: whether given steps resolve the motion.
 
 use crate::resolution::monitor::{LEAST, rounding};
 use crate::run::discretization::Discretization;
@@ -9,22 +9,23 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
-/// a step then has an error of its own of a twentieth, or a fifteenth with order one.
+/// The difference between a step and two half steps, relative to the motion, above which the step does not resolve the
+/// motion. The error of a step of order p is then this number divided by `1 - 2^-p`.
 const APART: f64 = 0.05;
 
-/// The steps from rest in which a method of order one is off by as much as it moves.
+/// The number of steps from rest whose displacement is the smallest length with which the error of a method of order
+/// one is compared.
 const FIRST_STEPS: f64 = 16.0;
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
-    /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
+    /// The defect of some steps, above one if they do not resolve the motion. `None` if no comparison is possible.
     pub(crate) fn against_halves(
         &self,
         SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
     ) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
         let end = t + *steps as f64 * self.h;
-        // Of several velocities that of the motion.
+        // If several velocities have the same momentum, the mean velocity selects that of the motion.
         let mean = (to.q - from.q) / (end - t);
         let guess = if self.problem.structure.constant_mass { start.v } else { mean };
         let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
@@ -33,7 +34,7 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
             return None;
         }
         let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end), |_| ()) else {
-            // What shorter steps do not get over a longer one should not.
+            // Where shorter steps fail, a longer step should not succeed.
             return Some(f64::INFINITY);
         };
         let fine = fine.state();
@@ -41,7 +42,7 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         let size = |x: [&SVector<f64, N>; 3]| max_abs_or_nan(x.into_iter().flat_map(|x| x.iter().copied()));
         let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| max_abs_or_nan((a - b).iter().copied());
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
-        // From rest, steps of order one are off by what they move over their number.
+        // After n steps from rest, the error of a method of order one is the displacement divided by n.
         let moved =
             if self.info.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
         let width =
@@ -81,7 +82,7 @@ mod tests {
 
     const H: f64 = 0.0625;
 
-    /// The plan of so many steps from `q = 1, v = 0`.
+    /// The plan of a number of steps from `q = 1, v = 0`.
     fn plan<'a, const N: usize>(
         problem: &'a Problem<'a, Oscillators, N>,
         stages: usize,
@@ -95,14 +96,14 @@ mod tests {
         Problem::new(&Oscillators, 0.0, VelocityPoint::new([1.0; N], [0.0; N], 0.0)).unwrap()
     }
 
-    /// Whether a stepper multiplies with a matrix: then it evaluates nothing.
+    /// Whether a stepper multiplies by one matrix: it then makes no evaluations.
     fn by_one_matrix<const N: usize>(mut stepper: Box<dyn Stepper<N> + '_>) -> bool {
         stepper.advance(1).unwrap();
         stepper.evaluations() == 0
     }
 
-    /// The matrix of a linear motion is made for many steps of one length, and not for one of another: not at any time at which a row or an event
-    /// is asked for.
+    /// The matrix of a linear motion is computed for many steps of one size, but not for a single step of another size,
+    /// as at the time of a row or of an event.
     #[test]
     fn a_step_of_another_length_makes_no_matrix() {
         let problem = problem::<2>();
@@ -121,7 +122,8 @@ mod tests {
         }
     }
 
-    /// Nor for so few steps that it costs more than it spares: of 96 unknowns it is solved for as long as a thousand steps take, of half as many an eighth of that.
+    /// The matrix is not computed for so few steps that it costs more than it saves: with 96 unknowns it takes as long
+    /// as about a thousand steps, with half as many unknowns an eighth of that.
     #[test]
     fn a_few_steps_of_many_coordinates_make_no_matrix() {
         let problem = problem::<6>();
@@ -131,7 +133,8 @@ mod tests {
         }
     }
 
-    /// An oscillator in two coordinates that are nearly one: the mass matrix, and that of the spring, have the condition 1e10.
+    /// An oscillator in two nearly dependent coordinates: the mass matrix and the stiffness matrix have condition
+    /// number 1e10.
     struct NearlyOne;
 
     impl Lagrangian<2> for NearlyOne {
@@ -147,7 +150,8 @@ mod tests {
         }
     }
 
-    /// Without the matrix the stages of such a motion are not solved for: its steps are compared, and looked into, by one.
+    /// The stage equations of such a motion cannot be solved without the matrix: the comparison with half steps, and
+    /// the states within a step, use it too.
     #[test]
     fn an_ill_conditioned_mass_matrix_is_no_flaw_of_the_steps() {
         let start = VelocityPoint::new([1.0, -0.4], [0.3, 0.8], 0.0);
@@ -157,7 +161,7 @@ mod tests {
             assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");
             let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
             let part = plan.steps.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
-            // By the whole step's matrix: to rounding through the inverse of the mass matrix.
+            // A whole step of the same size, to the round-off amplified by the inverse of the mass matrix.
             let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
             whole = whole.without_action();
             let whole = whole.run(Until::Time(0.03)).unwrap();

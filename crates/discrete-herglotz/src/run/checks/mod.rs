@@ -1,6 +1,6 @@
-//! What a run checks along its way: whether its steps resolve the motion, and whether the claims of structure hold where the motion goes.
+//! Checks along a run: whether its steps resolve the motion, and whether the claims of structure hold.
 //!
-//! [`crate::resolution`] lists the measures and their thresholds.
+//! [`crate::resolution`] contains the monitor of the steps.
 
 pub(crate) mod acceleration_jump;
 pub(crate) mod claims;
@@ -21,7 +21,8 @@ use energy::EnergyMonitor;
 /// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the run.
 const PROBES: usize = 1 << 14;
 
-/// The number of steps by which a run may pass the end that its trial runs have met, which is known up to the error of both.
+/// The number of steps by which a run may pass the end found by its trial runs, which is known up to the errors of
+/// both.
 const PASSED: usize = 2;
 
 /// The number of steps after which all claims are checked next: every power of two, and the multiples of [`PROBES`].
@@ -42,7 +43,7 @@ pub(crate) struct TakenSteps<'s, const N: usize> {
 }
 
 impl<const N: usize> TakenSteps<'_, N> {
-    /// The start of the step, where it is one.
+    /// The time and the state at the start, if it is a single step.
     pub fn single(&self) -> Option<&(f64, PhasePoint<N>)> {
         self.before.as_ref().filter(|_| self.taken == self.first + 1)
     }
@@ -104,7 +105,8 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         }
     }
 
-    /// The number of steps that are compared with two halves next, counted with the step: those that end at a power of two, and the last.
+    /// The number of steps at the end of the next step that is compared with two halves: a power of two, or the last
+    /// step.
     fn next_halves(&self, taken: usize) -> usize {
         if self.halves && self.findings.unresolved.is_none() {
             (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min(self.steps.most())
@@ -129,7 +131,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
             || self.claims.as_ref().is_some_and(|claims| claims.next(taken) == taken + 1)
     }
 
-    /// Takes the factors of some steps into the conformal factor of the run.
+    /// Multiplies the conformal factor of the run by the factors of some steps.
     pub fn multiply(&mut self, taken: usize, done: usize, sigma: f64) {
         if self.power {
             self.findings.log_factor = taken as f64 * sigma.ln();
@@ -138,7 +140,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         }
     }
 
-    /// Checks some steps; returns the status of a run that ends with a claim that is violated.
+    /// Checks some steps; returns the status of the run if a claim is violated, which ends it.
     pub fn check(&mut self, step: &mut TakenSteps<'_, N>) -> Option<Status> {
         self.compare_with_halves(step);
         let next_claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(step.first));
@@ -165,7 +167,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
             self.findings.energy = energy.drift.sums;
             self.note(drift.map(|defect| UnresolvedStep { step: step.taken - 1, defect }));
         }
-        // The trial runs have ended before.
+        // The trial runs ended at an earlier step.
         if self.ends_after.is_some_and(|steps| step.taken > steps + PASSED) {
             self.note(Some(UnresolvedStep { step: step.taken - 1, defect: f64::INFINITY }));
         }
@@ -182,7 +184,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         }
     }
 
-    /// Takes over what the stepper has found in its steps.
+    /// Checks the suspect interval of the stepper, and takes over its unresolved step.
     fn ask_stepper(&mut self, stepper: &mut dyn Stepper<N>) {
         let suspect = stepper.suspect_interval().filter(|_| self.suspects && self.findings.unresolved.is_none());
         self.note(suspect.and_then(|suspect| self.steps.unresolved_within(&suspect)));

@@ -8,19 +8,19 @@ use contact_geom::{
     Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
 };
 
-/// What ends a run that has come to rest, in its [`Status`](crate::Status).
+/// The cause in the [`Status`](crate::Status) of a run that ends because the motion has come to rest.
 pub(crate) const REST: &str = "rest";
 
 /// Positions and momenta below this are at rest. Numbers smaller than it by some ten powers of ten lose digits in products, so that an error
 /// relative to the motion is no longer defined.
 const SMALLEST: f64 = 1e-280;
 
-/// The rate of the action at rest, in units of its rounding.
+/// The largest rate of the action at rest, in units of its round-off.
 const ROUNDINGS: f64 = 256.0;
 
-/// Whether `q = v = 0` is an equilibrium at which a motion stays that falls to it with this action: L does not depend on time, has no
-/// slope there, a positive definite mass, a potential with a minimum, and a drag that dissipates. So it is no maximum of the potential, which
-/// rounding would make the motion leave.
+/// Whether `q = v = 0` is a stable equilibrium, for the action z, at which a decaying motion stays: L does not depend
+/// on time, its gradient in q and v vanishes there, the mass matrix is positive definite, the potential has a minimum,
+/// and the drag is dissipative. From a maximum of the potential, round-off would drive the motion away.
 pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Problem<'_, L, N>, z: f64) -> bool {
     if !problem.structure.autonomous {
         return false;
@@ -29,7 +29,7 @@ pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Pr
     let (slope, h) =
         (problem.lagrangian.gradient(problem.t0, &origin), problem.lagrangian.hessian(problem.t0, &origin));
     let still = slope.x.iter().chain(&slope.y).all(|e| *e == 0.0);
-    // A momentum is constant where it does not depend on the action.
+    // At rest the action may still change: neither force nor momentum may depend on it.
     let free = h.qz.iter().chain(&h.vz).all(|e| *e == 0.0);
     still && free && slope.z < 0.0 && h.vv.cholesky().is_some() && (-h.qq).cholesky().is_some()
 }

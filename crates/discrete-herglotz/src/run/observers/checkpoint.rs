@@ -1,22 +1,23 @@
-//! Checkpoints: a run that is interrupted goes on as if it had not been.
+//! Checkpoints, from which an interrupted run is resumed bitwise.
 
 use crate::InputError;
 use crate::run::{Observer, OutputRequest, StepView, Stop};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Writes a file every so many steps from which the run can go on to the last bit, compensations and extrapolated starts included, after
-/// it was stopped or killed; see [`Run::resume`](crate::run::Run::resume).
+/// Writes a checkpoint file at a fixed interval of steps. A run that was stopped or killed can be resumed from it with
+/// bitwise the same result; compensated sums and predictors are part of the file. See
+/// [`Run::resume`](crate::run::Run::resume).
 #[derive(Debug)]
 pub struct Checkpoint {
     path: PathBuf,
     every: usize,
-    /// Why the last file could not be written; the run then ends.
+    /// The error with which writing the last file failed; it ends the run.
     pub error: Option<std::io::Error>,
 }
 
 impl Checkpoint {
-    /// To a file, every so many steps and at the end.
+    /// Writes to a file every `steps` steps, and at the end of the run.
     ///
     /// # Errors
     /// [`InputError::Count`] for 0 steps.
@@ -41,7 +42,7 @@ impl<const N: usize> Observer<N> for Checkpoint {
         if !at.k.is_multiple_of(self.every) && !at.last {
             return ControlFlow::Continue(());
         }
-        // Its stepper can be saved, or the run would not have begun.
+        // The stepper can be saved; otherwise the run is refused at its start.
         match at.resume_state().map_or(Ok(()), |interrupted| interrupted.write(&self.path)) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {

@@ -1,4 +1,4 @@
-//! The changes of sign of the function of an event, step by step.
+//! The sign changes of an event function within a step.
 
 use crate::StepError;
 use crate::run::motion::{Motion, Near};
@@ -9,66 +9,69 @@ use crate::run::observers::output_request::RunInfo;
 use crate::solve::roots::{bracketed_root, bracketed_root_within};
 use contact_geom::PhasePoint;
 
-/// A time is told to so many of its roundings, and a state to so many of its own: those of the sums of a step, of the iteration that
-/// finds it, and of the search for a root.
+/// The relative round-off of a time and of a state, from the sums of a step, the iteration that solves it, and the root
+/// search.
 const ROUNDINGS: f64 = 16.0 * f64::EPSILON;
 
-/// The part of its size in a step below which a function may be on its surface, or has another sign on the motion than on a sketch.
+/// The value of an event function, relative to its size in the step, below which the function may be on its surface g =
+/// 0, or may have different signs on the motion and on the interpolant.
 const NEAR: f64 = 0.01;
 
-/// Parts of the distance of two points: to which the root of a sketch between them is found, and over which the slope there is taken.
+/// Fractions of the distance of two points: the tolerance of the root of the interpolant between them, and the distance
+/// over which its slope is computed.
 const SKETCHED: f64 = 1e-9;
 const ASIDE: f64 = 1e-3;
 
-/// The corrections after which a root is looked for between two points of the motion.
+/// The largest number of corrections of a root; after these the root is bracketed on the motion itself.
 const CORRECTIONS: usize = 6;
 
-/// The function of an event at the last point seen.
+/// The function of an event at the last point of evaluation.
 #[derive(Clone, Copy)]
 pub(crate) struct LastSign<const N: usize> {
     pub value: f64,
-    /// The last sign that was not 0; 0 before there was one.
+    /// The last nonzero sign; 0 before the first one.
     pub sign: f64,
-    /// Where the function has vanished since then.
+    /// The first zero since then.
     pub zero: Option<(f64, PhasePoint<N>)>,
-    /// Where it has the sign, if that is not at the point itself, which is on the surface.
+    /// The later point at which the function has this sign, if the last point itself is on the surface.
     pub left: Option<Left>,
 }
 
-/// Where a function that begins on its surface has left it: the time, and its value there.
+/// A point at which a function that starts on its surface has left it: the time, and the value there.
 #[derive(Clone, Copy)]
 pub(crate) struct Left {
     pub t: f64,
     pub value: f64,
 }
 
-/// A change of sign from one point to the next.
+/// A sign change from one point to the next.
 enum Change<const N: usize> {
-    /// None that counts.
+    /// No sign change that counts.
     None,
-    /// At a point that is known.
+    /// A sign change at a known point.
     There(f64, PhasePoint<N>),
-    /// Between the two, with these values.
+    /// A sign change between the two points, with these values.
     Between([f64; 2]),
 }
 
-/// How the parts of a step are looked at.
+/// The settings of the search over the parts of a step.
 #[derive(Clone, Copy)]
 struct Scan<'s, const N: usize> {
-    /// About the states between them; those of the motion where there is none, or where the function is smaller than `near`.
+    /// Interpolated states between the parts. States of the motion are used if there are none, or where the function is
+    /// smaller than `near`.
     sketch: Option<&'s [PhasePoint<N>]>,
     parts: usize,
     near: f64,
-    /// Where the function leaves its surface after the end, which is on it.
+    /// Where the function leaves its surface after the end of the step, if the end is on it.
     left: Option<Left>,
 }
 
-/// The times of a run, as far as the nearness of a surface depends on them.
+/// The time scales of a run, which decide whether a point is on a surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Pace {
-    /// About the length of a step, in the sense of the run.
+    /// The approximate step size, with the sign of the direction of the run.
     h: f64,
-    /// What the rounding of times is measured by, beside the time itself.
+    /// The time scale of the round-off of times, in addition to the time itself.
     span: f64,
 }
 
@@ -76,17 +79,17 @@ impl Pace {
     pub(crate) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
         let span = t_end - t0;
         let h = h.unwrap_or(span / count.map_or(64.0, |count| count.max(1) as f64));
-        // Of a long run a part, so that what counts as rounding stays far below a step.
+        // For long runs a part of the span, so that the round-off of times stays far below a step.
         Pace { h, span: span.abs().min(4096.0 * h.abs()) }
     }
 
-    /// The difference of times that is rounding.
+    /// The round-off of a time.
     pub(crate) fn rounding(self, t: f64) -> f64 {
         ROUNDINGS * (t.abs() + self.span)
     }
 }
 
-/// The motion of a run with its times.
+/// The motion of a run, with its time scales.
 #[derive(Clone, Copy)]
 pub(crate) struct Way<'r, const N: usize> {
     pub motion: &'r dyn Motion<N>,
@@ -95,7 +98,7 @@ pub(crate) struct Way<'r, const N: usize> {
 }
 
 impl<const N: usize> Event<'_, N> {
-    /// Its changes of sign in a step of which there is a sketch.
+    /// Finds the sign changes in a step, given interpolated states in it.
     pub(crate) fn in_step(
         &mut self,
         index: usize,
@@ -108,12 +111,12 @@ impl<const N: usize> Event<'_, N> {
         let value = self.value(end.0, &end.1);
         let (mut quiet, mut size) = (value * seen.sign > 0.0, seen.value.abs());
         for (k, x) in (1..parts).zip(sketch) {
-            // A sketch may leave the domain of the function where the motion does not.
+            // Interpolated states may leave the domain of the function although the motion does not.
             let there = self.value(step.time(k as f64 / parts as f64), x);
             quiet &= there * seen.sign > 0.0;
             size = size.max(there.abs());
         }
-        // What is nearer to its surface than a hundredth of its size in the step may be on it.
+        // The end may be on the surface if the value is below a hundredth of its size in the step.
         let left = if value.abs() < NEAR * size { self.leaves(way, (end.0, &end.1), value) } else { None };
         if quiet && seen.zero.is_none() && left.is_none() {
             (seen.value, seen.left) = (value, None);
@@ -129,7 +132,8 @@ impl<const N: usize> Event<'_, N> {
         Ok(())
     }
 
-    /// The changes of sign between parts of a step; `false` where the sketch has told of one that the motion does not have.
+    /// Finds the sign changes between the parts of a step; `false` if the interpolated states show one that the motion
+    /// does not have.
     fn scan(
         &mut self,
         index: usize,
@@ -153,7 +157,7 @@ impl<const N: usize> Event<'_, N> {
             if let Some(Left { t, value: there }) = seen.left {
                 let fraction = (t - start.0) / (end.0 - start.0);
                 if fraction >= tau {
-                    // It is still on the surface.
+                    // The function is still on its surface.
                     continue;
                 }
                 (from, seen.value, seen.left) = (fraction, there, None);
@@ -183,7 +187,7 @@ impl<const N: usize> Event<'_, N> {
         Ok(true)
     }
 
-    /// The root between two points of a step at which the function has different signs, to round-off.
+    /// The root between two points of a step at which the function has opposite signs, to round-off.
     fn root(
         &mut self,
         step: &LastStep<'_, N>,
@@ -194,8 +198,9 @@ impl<const N: usize> Event<'_, N> {
         Ok((step.time(tau), step.at(step.time(tau))?))
     }
 
-    /// The same from the root of the sketch, which is near, by Newton's method with the slope of the sketch: two states of the motion
-    /// are enough where the step resolves it. `None` where that does not converge, as where the function jumps.
+    /// The same root by Newton's method, which starts from the root of the interpolant and uses its slope: two states
+    /// of the motion are enough if the step resolves the motion. `None` if the iteration does not converge, as when the
+    /// function jumps.
     fn root_by_sketch(
         &mut self,
         step: &mut LastStep<'_, N>,
@@ -203,7 +208,7 @@ impl<const N: usize> Event<'_, N> {
     ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
         let mut about = |tau: f64| step.interpolate(tau).map(|x| self.value(step.time(tau), &x));
         let ends = [about(a)?, about(b)?];
-        // A NaN has no sign.
+        // Written so that a NaN is not a sign change.
         let brackets = ends[0] * ends[1] < 0.0;
         if !brackets {
             return Ok(None);
@@ -222,7 +227,7 @@ impl<const N: usize> Event<'_, N> {
                 slope = (g - g_before) / (tau - before);
             }
             let change = g / slope;
-            // A slope that overflows would make any place a root.
+            // With a slope that overflows any point would pass as a root.
             if !(slope.is_finite() && change.is_finite()) {
                 return Ok(None);
             }
@@ -234,7 +239,8 @@ impl<const N: usize> Event<'_, N> {
             {
                 return Ok(Some(found));
             }
-            // So near to two states the motion is a line to round-off, and another correction would change nothing.
+            // This close to two states the motion is linear to round-off, and the line through them replaces another
+            // correction.
             if let Some((before, _, (_, from))) = last
                 && let gap = tau - before
                 && (change * gap).abs() <= f64::EPSILON / 16.0
@@ -245,7 +251,7 @@ impl<const N: usize> Event<'_, N> {
                 let state = PhasePoint { q, p, z: at.1.z + (at.1.z - from.z) * part };
                 return Ok(Some((step.time(tau - change), state)));
             }
-            // Of two that only rounding tells from each other that which is nearer.
+            // If two iterates differ by round-off only, the one with the smaller value is taken.
             if let Some((_, g_before, before)) = last
                 && g.abs() > 0.25 * g_before.abs()
                 && change.abs() <= 0.01 * aside
@@ -261,7 +267,8 @@ impl<const N: usize> Event<'_, N> {
         Ok(None)
     }
 
-    /// The root beside a state of the motion, where that of the sketch leads so near to it that a second state is not needed.
+    /// The root near a state of the motion, by the Taylor polynomial about that state, if the correction is so small
+    /// that no second state is needed.
     fn root_beside(
         &mut self,
         step: &mut LastStep<'_, N>,
@@ -278,7 +285,7 @@ impl<const N: usize> Event<'_, N> {
                 return Ok(Some((t, there)));
             }
             ahead -= change;
-            // A NaN is within nothing.
+            // Written so that a NaN is out of range.
             let within = ahead.abs() <= 2.0 * Beside::<N>::REACH && (0.0..=1.0).contains(&(tau + ahead));
             if !within {
                 return Ok(None);
@@ -287,7 +294,8 @@ impl<const N: usize> Event<'_, N> {
         Ok(None)
     }
 
-    /// The change of sign that counts between the point last seen and one where the function is not defined, if there is one.
+    /// The sign change that counts between the last point and a point at which the function is not defined, if there is
+    /// one.
     fn before_its_domain_ends(
         &mut self,
         step: &LastStep<'_, N>,
@@ -315,8 +323,8 @@ impl<const N: usize> Event<'_, N> {
         }
     }
 
-    /// The change of sign between the point last seen and the next one, where the function has a value and a side, if there is one that
-    /// counts.
+    /// The sign change that counts between the last point and the next one, if there is one. `value` is the value of
+    /// the function at the next point, and `side` has the sign that the function takes there.
     fn between(
         &mut self,
         seen: &mut LastSign<N>,
@@ -334,17 +342,18 @@ impl<const N: usize> Event<'_, N> {
         }
         match zero {
             Some((t, state)) => Change::There(t, state),
-            // It is on the surface, and about to leave it.
+            // The point is on the surface, and the function is about to leave it.
             None if value * before >= 0.0 => Change::There(t, *state),
             None => Change::Between([before, value]),
         }
     }
 
-    /// Where the function leaves its surface after a point that is on it up to rounding; `None` where it is not on it, or does not leave it
-    /// within half a step.
+    /// Where the function leaves its surface after a point that is on it up to round-off; `None` if the point is not on
+    /// the surface, or if the function does not leave it within half a step.
     ///
-    /// With g its value, it is on the surface where `|g|` is at most what the motion changes it by in the rounding of the time, and
-    /// the rounding of the state. It has left where it is beyond twice that, so that the sign is none of rounding.
+    /// With g the value of the function, the point is on the surface if `|g|` is at most the change of g along the
+    /// motion over the round-off of the time, plus the effect of the round-off of the state. The function has left the
+    /// surface when its value exceeds twice this bound, so that its sign is not due to round-off.
     pub(crate) fn leaves(
         &mut self,
         Way { motion, pace, near }: Way<'_, N>,
@@ -357,7 +366,7 @@ impl<const N: usize> Event<'_, N> {
             let Some(left) = self.after((motion, near), (t, state), ahead.copysign(pace.h)) else { continue };
             let window = noise + (left.value - g).abs() * (rounding / ahead);
             let on = g.abs() <= window
-                // It may jump.
+                // The function may jump across its surface.
                 || g * left.value < 0.0
                     && self.after((motion, near), (t, state), rounding.copysign(pace.h)).is_some_and(|x| g * x.value < 0.0);
             if !on {
@@ -370,7 +379,7 @@ impl<const N: usize> Event<'_, N> {
         None
     }
 
-    /// The function on the motion some time after a point, where both are defined.
+    /// The function on the motion at a time after a point; `None` if the motion or the function is not defined there.
     fn after(
         &mut self,
         (motion, near): (&dyn Motion<N>, Near<N>),
@@ -383,7 +392,8 @@ impl<const N: usize> Event<'_, N> {
         value.is_finite().then_some(Left { t: there, value })
     }
 
-    /// What the rounding of a state changes the function by, each of q, p and z by its own size. Where it is not defined aside, nothing.
+    /// The effect of the round-off of a state on the function, with q, p and z each rounded relative to its own size.
+    /// Perturbations for which the function is not defined contribute nothing.
     fn rounding(&mut self, t: f64, state: &PhasePoint<N>, g: f64) -> f64 {
         let [q, p, z] = [state.q.amax(), state.p.amax(), state.z.abs()].map(|size| ROUNDINGS * size);
         let mut change =

@@ -1,11 +1,11 @@
-//! Rows as a CSV file, written while the run goes on.
+//! Rows as a CSV file, written during the run.
 
 use crate::InputError;
 use crate::run::{Observer, OutputRequest, Rows, RunInfo, StepView, Stop};
 use std::io::Write;
 use std::ops::ControlFlow;
 
-/// Writes rows as CSV as they come, and keeps none of them: a header, then the numbers of each row with all their digits.
+/// Writes rows as CSV during the run, without keeping them: a header, then the numbers of each row with all digits.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -19,12 +19,12 @@ use std::ops::ControlFlow;
 pub struct CsvRows<'f, W: Write, const N: usize> {
     rows: Rows<'f, N>,
     writer: csv::Writer<W>,
-    /// Why a row could not be written; the run then ends.
+    /// The error with which writing a row failed; it ends the run.
     pub error: Option<csv::Error>,
 }
 
 impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
-    /// These rows, to a file or another writer.
+    /// Writes these rows to a file or another writer.
     pub fn new(rows: Rows<'f, N>, to: W) -> Self {
         CsvRows { rows, writer: csv::Writer::from_writer(to), error: None }
     }
@@ -89,7 +89,7 @@ mod tests {
         Rows::every(3).unwrap().with_energy().column("q^2", |_, x| x.q[0] * x.q[0])
     }
 
-    /// What is read is what the rows have, to the last bit.
+    /// The numbers in the file are bitwise those of the rows.
     #[test]
     fn the_file_has_the_rows() {
         let (mut kept, mut text) = (rows(), Vec::new());

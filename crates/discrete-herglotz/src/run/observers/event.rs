@@ -1,10 +1,10 @@
-//! An event: a function of the state whose changes of sign are to be found.
+//! An event: a function of the state whose sign changes are located.
 
 use crate::StepError;
 use contact_geom::PhasePoint;
 use std::cell::RefCell;
 
-/// Which changes of sign count, in the sense of the run.
+/// The sign changes that count, in the direction of the run.
 #[derive(Clone, Copy)]
 enum Direction {
     Rising,
@@ -15,36 +15,36 @@ enum Direction {
 /// `g(t, state)`.
 type Function<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>;
 
-/// A function `g(t, state)` whose changes of sign are to be found: a section of Poincare, a collision, a turning point.
+/// A function `g(t, state)` whose sign changes are located: a Poincare section, a collision, a turning point.
 pub struct Event<'f, const N: usize> {
-    /// Trial runs call it as well.
+    /// In a cell, since trial runs call it too.
     function: RefCell<Function<'f, N>>,
     direction: Direction,
     pub(crate) terminal: bool,
 }
 
 impl<'f, const N: usize> Event<'f, N> {
-    /// All changes of sign of a function, which do not end the run.
+    /// All sign changes of a function; they do not end the run.
     pub fn new(function: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
         Event { function: RefCell::new(Box::new(function)), direction: Direction::Both, terminal: false }
     }
 
-    /// Those from negative to positive alone, in the sense of the run.
+    /// Restricts the event to sign changes from negative to positive, in the direction of the run.
     pub fn rising(self) -> Self {
         Event { direction: Direction::Rising, ..self }
     }
 
-    /// Those from positive to negative alone.
+    /// Restricts the event to sign changes from positive to negative, in the direction of the run.
     pub fn falling(self) -> Self {
         Event { direction: Direction::Falling, ..self }
     }
 
-    /// The first one ends the run.
+    /// The first sign change ends the run.
     pub fn terminal(self) -> Self {
         Event { terminal: true, ..self }
     }
 
-    /// The same for a trial run.
+    /// The same event for a trial run.
     pub(crate) fn borrowed(&self) -> Event<'_, N> {
         let function = |t: f64, x: &PhasePoint<N>| self.function.try_borrow_mut().map_or(f64::NAN, |mut f| f(t, x));
         Event { function: RefCell::new(Box::new(function)), direction: self.direction, terminal: self.terminal }
@@ -69,7 +69,7 @@ impl<'f, const N: usize> Event<'f, N> {
     }
 }
 
-/// A change of sign that was found.
+/// A sign change that was located.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing<const N: usize> {
     /// The time.

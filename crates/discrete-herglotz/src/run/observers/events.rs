@@ -1,4 +1,4 @@
-//! Events: where functions of the state change sign along a run.
+//! Events: sign changes of functions of the state along a run.
 
 use crate::run::observers::crossings::{LastSign, Pace, Way};
 use crate::run::observers::event::{Crossing, Event};
@@ -7,25 +7,30 @@ use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use std::ops::ControlFlow;
 
-/// Finds events along a run, each to round-off of the time, by any integrator.
+/// Locates events along a run, each to the round-off of the time, for any integrator.
 ///
-/// The motion between the ends of a step is looked at in a few parts, `s + 2` of a Gauss step of s stages and four of others, by a curve
-/// through the step: where the function has different signs at two neighbours, or at the ends, the change is found on states as exact as
-/// those of the run, by steps of the same integrator that end there, of which two are enough where the step resolves the motion. Of two changes of sign within one part neither is seen, so a function that changes faster than
-/// the motion needs shorter steps; nor is a root that the function only touches. Where a function is not finite the run ends.
+/// Within a step the functions are evaluated at a few points of an interpolant: at the ends of `s + 2` parts for a
+/// Gauss step with s stages, of four parts for other methods. If a function has different signs at neighbouring points,
+/// the sign change is located on states as accurate as those of the run, which are computed by steps of the same
+/// integrator that end there; two such steps are enough if the step resolves the motion. Two sign changes within one
+/// part are missed, so a function that varies faster than the motion needs shorter steps. A zero without a sign change
+/// is missed too. A function value that is not finite ends the run.
 ///
-/// An event is a change of sign along the motion. It is counted once, and of two runs that join in exactly one:
-/// - A run that starts on the surface, where the function is 0 up to rounding, starts on the side to which the motion goes, and does not
-///   count that zero. So a run that starts from the state of a crossing goes on to the next one.
-/// - A step that ends on the surface ends on the side to which the motion goes. Where that is another side than before, the event is
-///   counted there, also at the end of the run.
-/// - Up to rounding means: the motion is off the surface by at most the rounding of the time, or the state by that of its coordinates.
-///   A function that stays 0 has no side until it is different from 0; if it does so from the start, its first sign is no change.
+/// An event is a sign change along the motion. It is counted once, and if a run continues another one, in exactly one
+/// of the two:
+/// - If a run starts on the surface, where the function is 0 up to round-off, the sign at the start is that of the side
+///   to which the motion goes, and this zero is not counted. So a run that starts from the state of a crossing
+///   continues to the next one.
+/// - If a step ends on the surface, the sign at its end is that of the side to which the motion goes. If this is
+///   another side than before, the event is counted there, also at the end of the run.
+/// - Up to round-off means that the distance of the motion from the surface is at most that caused by the round-off of
+///   the time and by the round-off of the coordinates of the state. A function that stays 0 has no sign until it
+///   becomes nonzero; if it is 0 from the start, its first sign is not a sign change.
 ///
-/// Events of one instant are told in the order of their index.
+/// Simultaneous events are recorded in the order of their index.
 ///
-/// A terminal event ends the run with its own time and state; the other events of that instant are told too. Observers after
-/// this one do not see a step that ends in such an event.
+/// A terminal event ends the run at its time and state; other events at that time are recorded too. Observers after
+/// this one do not see the step in which the event lies.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -38,20 +43,21 @@ use std::ops::ControlFlow;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 pub struct Events<'f, const N: usize> {
-    /// The changes of sign so far, in the order of the run.
+    /// The sign changes so far, in the order of the run.
     pub crossings: Vec<Crossing<N>>,
     events: Vec<Event<'f, N>>,
     needs: OutputRequest,
     seen: Vec<LastSign<N>>,
     pace: Pace,
-    /// About the states inside of the last step.
+    /// Interpolated states within the last step.
     sketch: Vec<PhasePoint<N>>,
-    /// The time of its end with the rates there, if they were asked for: they are those of the start of the next.
+    /// The time at the end of the last step, and the time derivatives of the state there if they were computed: they
+    /// are those at the start of the next step.
     rates: Option<(f64, PhasePoint<N>)>,
 }
 
 impl<'f, const N: usize> Events<'f, N> {
-    /// These events, which crossings name by their place.
+    /// An observer of these events; crossings refer to them by their index.
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
         let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
@@ -66,12 +72,12 @@ impl<'f, const N: usize> Events<'f, N> {
         }
     }
 
-    /// The same for functions that do not depend on the action: where no one else asks for it, it is not computed.
+    /// For functions that do not depend on the action: it is not computed unless it is requested elsewhere.
     pub fn without_action(self) -> Self {
         Events { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
-    /// The crossings in a step, in the order of the run, and why there are no more.
+    /// The crossings in a step, in the order of the run, and the error that ended the search, if there was one.
     fn in_step(&mut self, step: &mut LastStep<'_, N>, way: Way<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
         let (mut found, mut cause) = (Vec::new(), None);
         if let Err(cause) = step.sketch(&mut self.sketch) {
@@ -88,11 +94,11 @@ impl<'f, const N: usize> Events<'f, N> {
             }
         }
         if let Some(StepError::Event { t }) = cause {
-            // What lies before the place where a function is not defined.
+            // Only the crossings before the time at which a function is not defined.
             found.retain(|crossing| !before(t, crossing.t));
         }
         found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
-        // Those of one instant by their index.
+        // Simultaneous crossings are ordered by their index.
         let mut rest = found.as_mut_slice();
         while let Some(first) = rest.first() {
             let (t, rounding) = (first.t, way.pace.rounding(first.t));
@@ -103,7 +109,8 @@ impl<'f, const N: usize> Events<'f, N> {
         (found, cause)
     }
 
-    /// Whether a crossing is at the instant of an earlier one: by its time, or since it would be no event of a run that starts there.
+    /// Whether a crossing is simultaneous with an earlier one: its time is the same up to round-off, or a run that
+    /// starts at the earlier crossing would not count it.
     fn together(&mut self, first: &Crossing<N>, other: &Crossing<N>, way: Way<'_, N>) -> bool {
         let event = &mut self.events[other.event];
         (other.t - first.t).abs() <= way.pace.rounding(first.t)
@@ -152,7 +159,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         self.rates = step.rates_at_end().map(|rates| (at.t, rates));
         let mut end: Option<Crossing<N>> = None;
         for crossing in found {
-            // The event that ends the run has no other crossing at its own instant.
+            // An event has only one crossing at the time at which it ends the run.
             if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, way)) {
                 continue;
             }

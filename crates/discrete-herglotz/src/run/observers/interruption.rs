@@ -1,10 +1,10 @@
-//! An observer that ends a run once an interrupt asks for it.
+//! An observer that ends a run when an interrupt requests it.
 
 use crate::integration::interrupt::BETWEEN;
 use crate::{INTERRUPTION, Interrupt, Observer, OutputRequest, StepView, Stop};
 use std::ops::ControlFlow;
 
-/// Ends a run once its [`Interrupt`] asks for it.
+/// Ends a run when its [`Interrupt`] requests it.
 pub(crate) struct Interruption<'a>(pub Interrupt<'a>);
 
 impl<const N: usize> Observer<N> for Interruption<'_> {
@@ -21,7 +21,7 @@ impl<const N: usize> Observer<N> for Interruption<'_> {
     }
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        // A run at its end is finished.
+        // A run that has reached its end is complete.
         if !at.last && self.0.is_wanted() {
             return ControlFlow::Break(Stop::here(INTERRUPTION));
         }
@@ -37,7 +37,7 @@ mod tests {
     use contact_geom::systems::Pendulum;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// Trial runs end with the first answer that is yes, whatever other search would follow.
+    /// Trial runs end at the first interrupt request, whatever other search would follow.
     #[test]
     fn a_plan_is_interrupted() {
         let pendulum = Pendulum { gamma: -0.01 };
@@ -52,7 +52,7 @@ mod tests {
                     Some(by) => run.by(by.parse::<AnyIntegrator>().unwrap()),
                     None => run,
                 };
-                // Of some thousand steps.
+                // A run of several thousand steps.
                 let refused = run.plan(Until::Time(3000.0)).err();
                 assert_eq!(refused, Some(InputError::Interrupted), "{by:?}, {yes}");
                 assert_eq!(asked.load(Ordering::Relaxed), yes + 1, "{by:?}");
@@ -60,7 +60,7 @@ mod tests {
         }
     }
 
-    /// Members end where they are, in lanes and by themselves, and not later: all of them would take hours.
+    /// Members in lanes and members with their own runs end at their current state: complete runs would take hours.
     #[test]
     fn long_members_are_interrupted() {
         let pendulum = Pendulum { gamma: -1e-9 };
@@ -80,7 +80,7 @@ mod tests {
         }
     }
 
-    /// A question that is always answered no changes no bit.
+    /// An interrupt that never requests the end leaves the results bitwise unchanged.
     #[test]
     fn a_question_changes_nothing() {
         let pendulum = Pendulum { gamma: -0.01 };

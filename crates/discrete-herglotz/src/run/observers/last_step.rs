@@ -1,19 +1,19 @@
-//! The last step of a run, with the motion between its ends.
+//! The last step of a run, with dense output.
 
 use crate::run::motion::Motion;
 use crate::{DenseStep, StepError, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// The parts in which a step without a curve of its own is looked at.
+/// The number of parts of the sketch of a step whose method has no dense output.
 const PARTS: usize = 4;
 
-/// The fraction of a step aside by which the curvature of a sketch is taken, and the relative difference of its slope from the motion's up to
-/// which it is used.
+/// The distance, as a fraction of a step, over which the curvature of the interpolant is computed, and the relative
+/// difference between its slope and that of the motion up to which the curvature is used.
 const ASIDE: f64 = 1e-3;
 const AGREEING: f64 = 1e-4;
 
-/// A motion beside one of its states, to second order in the fraction of a step.
+/// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.
 pub(crate) struct Beside<const N: usize> {
     state: PhasePoint<N>,
     slope: PhasePoint<N>,
@@ -21,10 +21,10 @@ pub(crate) struct Beside<const N: usize> {
 }
 
 impl<const N: usize> Beside<N> {
-    /// The fraction of a step up to which the third order is below rounding, where the step resolves the motion.
+    /// The fraction of a step up to which the third-order term is below round-off, if the step resolves the motion.
     pub(crate) const REACH: f64 = 1e-6;
 
-    /// The state so much further, in fractions of the step.
+    /// The state at a distance `ahead`, in fractions of the step.
     pub(crate) fn at(&self, ahead: f64) -> PhasePoint<N> {
         let Beside { state, slope, curvature } = self;
         let half = 0.5 * ahead;
@@ -36,15 +36,15 @@ impl<const N: usize> Beside<N> {
     }
 }
 
-/// A step, with the motion between its ends.
+/// A step, with dense output between its ends.
 pub struct LastStep<'r, const N: usize> {
     from: (f64, PhasePoint<N>),
     to: (f64, PhasePoint<N>),
     motion: &'r dyn Motion<N>,
     stepper: &'r dyn Stepper<N>,
-    /// Its curve, if it has one, once it is asked for.
+    /// The curve of the step, if the method has one; computed on demand.
     curve: Option<Option<DenseStep<N>>>,
-    /// The rates at both ends, once they are asked for.
+    /// The time derivatives of the state at both ends, computed on demand.
     rates: [Option<PhasePoint<N>>; 2],
 }
 
@@ -73,8 +73,8 @@ impl<'r, const N: usize> LastStep<'r, N> {
         if fraction == 1.0 { self.to.0 } else { self.from.0 + fraction * (self.to.0 - self.from.0) }
     }
 
-    /// The state at a time between the ends: by a step of the same integrator that ends there. So it is as exact as the ends are, and its
-    /// map is as conformally contact.
+    /// The state at a time between the ends, computed by a step of the same integrator that ends at this time. It is as
+    /// accurate as the states at the ends, and the map to it is conformally contact like a full step.
     ///
     /// # Errors
     /// Those of a step.
@@ -82,7 +82,7 @@ impl<'r, const N: usize> LastStep<'r, N> {
         if t == self.to.0 { Ok(self.to.1) } else { self.step_to(t).map(|(state, _)| state) }
     }
 
-    /// The same by a step of its own, with its `sigma_d`.
+    /// The same state with the `sigma_d` of the step that ends there; always computed by a step, except at the start.
     pub(crate) fn step_to(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
         let curve = self.curve.as_ref().and_then(Option::as_ref);
         if t == self.from.0 {
@@ -92,17 +92,17 @@ impl<'r, const N: usize> LastStep<'r, N> {
         }
     }
 
-    /// With the rates at its start, as the step before has found them.
+    /// The same step with the time derivatives at its start, as computed for the preceding step.
     pub(crate) fn with_rates_at_start(self, rates: Option<PhasePoint<N>>) -> Self {
         LastStep { rates: [rates, None], ..self }
     }
 
-    /// The rates at its end, if they were asked for.
+    /// The time derivatives at the end, if they have been computed.
     pub(crate) fn rates_at_end(&self) -> Option<PhasePoint<N>> {
         self.rates[1]
     }
 
-    /// About the states between the parts in which a search along the step looks at it, at no cost of a step.
+    /// Interpolated states at the ends of the parts in which a search along the step evaluates it; no step is taken.
     pub(crate) fn sketch(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
         to.clear();
         if let Some(curve) = self.curve() {
@@ -115,8 +115,9 @@ impl<'r, const N: usize> LastStep<'r, N> {
         Ok(())
     }
 
-    /// The motion beside a state of it, at a fraction of the step: by its rates there, and by the curvature of the sketch. `None` where the
-    /// slope of the sketch is another, so that its curvature may be, and where there are no rates.
+    /// The Taylor polynomial about a state of the motion at a fraction of the step: the slope from the equations of
+    /// motion, the curvature from the interpolant. `None` if the slope of the interpolant differs, so that its
+    /// curvature is unreliable, or if the time derivatives cannot be computed.
     pub(crate) fn beside(&mut self, fraction: f64, state: &PhasePoint<N>) -> Result<Option<Beside<N>>, StepError> {
         let (t0, t1) = self.span();
         let near = self.stepper.last_velocity();
@@ -143,8 +144,8 @@ impl<'r, const N: usize> LastStep<'r, N> {
         self.curve.get_or_insert_with(|| self.stepper.dense()).as_ref()
     }
 
-    /// About the state at a fraction of the step, at no cost of a step: by the collocation polynomial where there is one, else by the
-    /// cubic polynomial through both ends with their rates.
+    /// The interpolated state at a fraction of the step, without taking a step: by the collocation polynomial if there
+    /// is one, otherwise by the cubic Hermite polynomial through both ends.
     pub(crate) fn interpolate(&mut self, fraction: f64) -> Result<PhasePoint<N>, StepError> {
         if let Some(curve) = self.curve() {
             return Ok(curve.at_fraction(fraction));

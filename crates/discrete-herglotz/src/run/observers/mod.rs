@@ -1,4 +1,4 @@
-//! Observers: what is recorded of a run, and what ends it.
+//! Observers, which record a run and may end it.
 
 pub(crate) mod checkpoint;
 pub(crate) mod crossings;

@@ -4,14 +4,14 @@ use crate::run::{Observer, OutputRequest, StepView, Stop};
 use contact_geom::OneParameterGroup;
 use std::ops::ControlFlow;
 
-/// A momentum at one step of a run, with what the theorem predicts.
+/// A momentum at a step of a run, with the prediction of the discrete Noether theorem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentumRow {
     /// Time.
     pub t: f64,
     /// The momentum `J_k = p_k . xi_Q(q_k)`.
     pub momentum: f64,
-    /// Its prediction `J_0 sigma_1 ... sigma_k`, by the sum of the logarithms.
+    /// Its prediction `J_0 sigma_1 ... sigma_k`, computed from the sum of the logarithms.
     pub predicted: f64,
 }
 
@@ -31,7 +31,7 @@ pub struct MomentumDecay<G> {
 }
 
 impl<G> MomentumDecay<G> {
-    /// Observes the momentum of this group.
+    /// An observer of the momentum of this group.
     pub fn new(group: G) -> Self {
         MomentumDecay { group, rows: Vec::new() }
     }

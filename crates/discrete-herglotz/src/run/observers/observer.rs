@@ -1,52 +1,53 @@
-//! What looks at a run while it goes on.
+//! Observers of a run.
 
 use crate::InputError;
 use crate::run::observers::output_request::{OutputRequest, RunInfo};
 use crate::run::observers::step_view::{StepView, Stop};
 use std::ops::ControlFlow;
 
-/// What a run does with its states: it is shown the start, at least the steps that it asks for, and the last one.
+/// An observer of a run. It is called at the start, at least at the steps that it requests, and at the last step.
 ///
-/// Closures of [`StepView`] observe every step; pairs, triples and vectors of observers observe one after the other.
+/// Closures of [`StepView`] observe every step; pairs, triples and vectors of observers are called in their order.
 pub trait Observer<const N: usize> {
-    /// What it asks of the run. By default the action.
+    /// The quantities that it requests of the run; by default the action.
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }
 
-    /// Is told what the run will be, before work starts.
+    /// Called with the data of the run before it starts.
     ///
     /// # Errors
-    /// An [`InputError`] where it cannot observe such a run.
+    /// An [`InputError`] if it cannot observe the run.
     fn prepare(&mut self, _course: &RunInfo) -> Result<(), InputError> {
         Ok(())
     }
 
-    /// The number of the step, counted from 1, at whose end it looks next after so many: those before it may be taken at once. By
-    /// default the next one; `usize::MAX` for the last of the run alone.
+    /// The number of the step, counted from 1, at whose end it is called next after `taken` steps; the steps before
+    /// that may be taken together. By default the next step; `usize::MAX` for the last step of the run only.
     fn next(&self, taken: usize) -> usize {
         taken + 1
     }
 
-    /// Sees the start, with no step before it.
+    /// Called at the start, before the first step.
     fn start(&mut self, _at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         ControlFlow::Continue(())
     }
 
-    /// Sees the end of a step that it has asked for, or another observer, or of the last one; `Break` ends the run.
+    /// Called at the end of a step that this or another observer has requested, and of the last step; `Break` ends the
+    /// run.
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>>;
 
-    /// What ends trial runs where this one ends its run, and does nothing else; `None`, the default, where it ends none. What lies beyond is
-    /// then no reason to refuse an accuracy.
+    /// An observer that ends trial runs where this one ends its run, and has no other effect; `None`, the default, if
+    /// it never ends a run. An accuracy is then not refused because of the motion after that end.
     fn terminal(&self) -> Option<Terminal<'_, N>> {
         None
     }
 }
 
-/// An observer that only ends runs: see [`Observer::terminal`].
+/// An observer that only ends runs; see [`Observer::terminal`].
 pub type Terminal<'o, const N: usize> = Box<dyn Observer<N> + 'o>;
 
-/// Those of several observers as one.
+/// Combines the terminal observers of several observers.
 fn all_terminal<'o, const N: usize>(of: impl IntoIterator<Item = Option<Terminal<'o, N>>>) -> Option<Terminal<'o, N>> {
     let all: Vec<_> = of.into_iter().flatten().collect();
     (!all.is_empty()).then(|| Box::new(all) as Terminal<'o, N>)
@@ -58,7 +59,7 @@ impl<const N: usize, F: FnMut(&StepView<'_, N>) -> ControlFlow<Stop<N>>> Observe
     }
 }
 
-/// Several observers as one.
+/// Implements [`Observer`] for tuples of observers.
 macro_rules! one_after_the_other {
     ($($name:ident $field:tt),+) => {
         impl<const N: usize, $($name: Observer<N>),+> Observer<N> for ($($name,)+) {
@@ -111,7 +112,7 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
     }
 }
 
-/// An observer that someone else keeps.
+/// An observer that is borrowed from its owner.
 pub(crate) struct Borrowed<'o, O>(pub &'o mut O);
 
 impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {

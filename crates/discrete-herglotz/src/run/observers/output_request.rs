@@ -1,14 +1,14 @@
-//! What observers, and the outcome, request of a run.
+//! The quantities that observers, and the outcome, request of a run.
 
-/// What an observer asks of a run beside times, positions and momenta. What no observer asks for, and the outcome does not want either, is
-/// not computed.
+/// The quantities that an observer requests of a run, in addition to times, positions and momenta. Quantities that
+/// neither an observer nor the outcome requests are not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OutputRequest {
     /// The action z.
     pub action: bool,
     /// The conformal factor of the motion, the product of the `sigma_d`.
     pub conformal_factor: bool,
-    /// That the stepper can be [saved](Stepper::save).
+    /// Whether the stepper must support [saving](Stepper::save).
     pub saved: bool,
 }
 
@@ -16,7 +16,7 @@ impl OutputRequest {
     /// The action alone.
     pub const ACTION: OutputRequest = OutputRequest { action: true, conformal_factor: false, saved: false };
 
-    /// What either asks for.
+    /// The quantities of both requests.
     pub fn and(self, other: Self) -> Self {
         OutputRequest {
             action: self.action || other.action,
@@ -26,20 +26,20 @@ impl OutputRequest {
     }
 }
 
-/// What a run will be.
+/// The data of a run before it starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunInfo {
-    /// The time of its start.
+    /// The start time.
     pub t0: f64,
-    /// The time of its end; before that of the start where the run goes back.
+    /// The end time; before the start time if the run goes backward in time.
     pub t_end: f64,
-    /// The length of its steps, where all are equal; negative where the run goes back.
+    /// The step size, if all steps are equal; negative if the run goes backward in time.
     pub h: Option<f64>,
-    /// The number of its steps, where that is known before: of a time transformation it shows at the end.
+    /// The number of steps, if it is known in advance; in transformed time it results from the integration.
     pub count: Option<usize>,
 }
 
 impl RunInfo {
-    /// Of an observer that has not been told its own.
+    /// The value before an observer has been prepared.
     pub(crate) const NONE: RunInfo = RunInfo { t0: 0.0, t_end: 0.0, h: None, count: None };
 }

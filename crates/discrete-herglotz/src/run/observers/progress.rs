@@ -4,10 +4,10 @@ use crate::InputError;
 use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
 use std::ops::ControlFlow;
 
-/// The steps between two looks, where the number of all is not known.
+/// The number of steps between two reports, if the total number of steps is not known.
 const STRIDE: usize = 1 << 10;
 
-/// Tells how much of the span a run has behind it, from 0 to 1, at each hundredth: for a progress bar.
+/// Reports the completed fraction of the span of a run, from 0 to 1, at each hundredth: for a progress bar.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -24,7 +24,7 @@ pub struct Progress<F> {
 }
 
 impl<F: FnMut(f64)> Progress<F> {
-    /// Told to this function.
+    /// Reports to this function.
     pub fn new(tell: F) -> Self {
         Progress { tell, course: RunInfo::NONE }
     }

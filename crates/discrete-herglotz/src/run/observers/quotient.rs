@@ -7,8 +7,9 @@ use std::ops::ControlFlow;
 /// A quantity `f(t, state)`.
 type Quantity<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>;
 
-/// Observes the quotient of two quantities that are dissipated alike. Momenta of symmetries, and the energy of an autonomous motion, decay
-/// with the conformal factor; the quotient of two of them is conserved (section 2 of the paper).
+/// Observes the quotient of two quantities that are dissipated at the same rate. Momenta of symmetries, and the energy
+/// of an autonomous motion, decay with the conformal factor; the quotient of two of them is conserved (section 2 of the
+/// paper).
 ///
 /// ```
 /// use contact_geom::{PhasePoint, VelocityPoint, systems::Kepler};
@@ -30,7 +31,7 @@ pub struct Quotient<'f, const N: usize> {
 }
 
 impl<'f, const N: usize> Quotient<'f, N> {
-    /// Of one quantity by another.
+    /// The quotient of `above` by `below`.
     pub fn new(
         above: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f,
         below: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f,
@@ -38,7 +39,7 @@ impl<'f, const N: usize> Quotient<'f, N> {
         Quotient { rows: Vec::new(), above: Box::new(above), below: Box::new(below) }
     }
 
-    /// The largest change since the start, relative to the quotient there; NaN where a quotient is none.
+    /// The largest change since the start, relative to the quotient there; NaN if a quotient is NaN.
     pub fn largest_change(&self) -> f64 {
         let Some((_, first)) = self.rows.first() else { return 0.0 };
         contact_geom::numbers::max_abs_or_nan(self.rows.iter().map(|(_, quotient)| (quotient - first) / first))
@@ -46,7 +47,7 @@ impl<'f, const N: usize> Quotient<'f, N> {
 }
 
 impl<const N: usize> Observer<N> for Quotient<'_, N> {
-    /// The quantities may have the action in them.
+    /// The quantities may depend on the action.
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }

@@ -7,22 +7,23 @@ use contact_geom::nalgebra::SVector;
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-/// A state of a motion.
+/// A recorded state of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row<const N: usize> {
     /// The time.
     pub t: f64,
     /// The position.
     pub q: SVector<f64, N>,
-    /// The velocity, where the rows are [with](Rows::with_velocity) it.
+    /// The velocity, if it is [requested](Rows::with_velocity).
     pub v: Option<SVector<f64, N>>,
     /// The momentum.
     pub p: SVector<f64, N>,
-    /// The action, if the rows are not [without](Rows::without_action) it.
+    /// The action, unless it is [omitted](Rows::without_action).
     pub z: Option<f64>,
-    /// The energy `E_L = v.p - L`, where the rows are [with](Rows::with_energy) it.
+    /// The energy `E_L = v.p - L`, if it is [requested](Rows::with_energy).
     pub energy: Option<f64>,
-    /// The logarithm of the conformal factor of the motion since the start, where the rows are [with](Rows::with_conformal_factor) it.
+    /// The logarithm of the conformal factor of the motion since the start, if it is
+    /// [requested](Rows::with_conformal_factor).
     pub log_factor: Option<f64>,
     /// The values of the [columns](Rows::column), in their order.
     pub columns: Vec<f64>,
@@ -37,15 +38,15 @@ impl<const N: usize> Row<N> {
     }
 }
 
-/// A function of time and state, with its name.
+/// A function of time and state, with the name of its column.
 type Column<'f, const N: usize> = (String, Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>);
 
-/// Which states are recorded.
+/// The times at which states are recorded.
 #[derive(Clone, Debug)]
 enum RowTimes {
-    /// The start, every so many steps, and the end.
+    /// The start, the ends of every n-th step, and the end.
     Every(usize),
-    /// These times, in the order of the run, of which so many are recorded.
+    /// These times, in the order of the run, and how many of them have been recorded.
     At { times: Vec<f64>, recorded: usize },
 }
 
@@ -76,9 +77,10 @@ impl<'f, const N: usize> Rows<'f, N> {
         Ok(Self::when(RowTimes::Every(stride)))
     }
 
-    /// The states at these times exactly, ascending, or descending for a run that goes back; a run is refused that does not reach the
-    /// last of them. States between the ends of steps are as exact as those at the ends; see [`LastStep::at`](crate::run::LastStep::at).
-    /// A run that is [resumed](crate::run::Run::resume) records those after the time at which it goes on, so that each is in one of the two runs.
+    /// The states at exactly these times, which ascend, or descend for a run backward in time; a run that does not
+    /// contain all of them is refused. States between the ends of steps are as accurate as those at the ends; see
+    /// [`LastStep::at`](crate::run::LastStep::at). A [resumed](crate::run::Run::resume) run records the times after
+    /// that at which it resumes, so that each time is recorded by one of the two runs.
     ///
     /// # Errors
     /// [`InputError::Times`] for times that are not finite or not in order.
@@ -105,28 +107,28 @@ impl<'f, const N: usize> Rows<'f, N> {
         }
     }
 
-    /// With one more column: a function of time and state, with a name.
+    /// Adds a column: a function of time and state, with a name.
     pub fn column(mut self, name: impl Into<String>, f: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
         self.columns.push((name.into(), Box::new(f)));
         self
     }
 
-    /// Without the action, so that a run of which no one else wants it need not compute it.
+    /// Omits the action, which a run does not compute unless it is requested elsewhere.
     pub fn without_action(self) -> Self {
         Rows { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
-    /// With the conformal factor.
+    /// Includes the conformal factor.
     pub fn with_conformal_factor(self) -> Self {
         Rows { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
     }
 
-    /// With the energy, which costs an inverse Legendre transformation and a value of L a row.
+    /// Includes the energy, which costs an inverse Legendre transformation and an evaluation of L per row.
     pub fn with_energy(self) -> Self {
         Rows { energy: true, ..self }
     }
 
-    /// With the velocity, which costs an inverse Legendre transformation a row.
+    /// Includes the velocity, which costs an inverse Legendre transformation per row.
     pub fn with_velocity(self) -> Self {
         Rows { velocity: true, ..self }
     }
@@ -154,7 +156,7 @@ impl<'f, const N: usize> Rows<'f, N> {
         Ok(())
     }
 
-    /// Records the rows up to a moment.
+    /// Records the rows up to the time of the view.
     fn record_up_to(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
         let (times, recorded) = match &self.when {
             RowTimes::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
@@ -163,7 +165,7 @@ impl<'f, const N: usize> Rows<'f, N> {
         };
         let backward = self.course.t_end < self.course.t0;
         let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
-        // The last step ends where the span does but for its rounding.
+        // The last step ends at the end of the span up to round-off.
         let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
         for t in due {
             if t == at.t {
@@ -183,7 +185,7 @@ impl<'f, const N: usize> Rows<'f, N> {
 
 impl<const N: usize> Observer<N> for Rows<'_, N> {
     fn needs(&self) -> OutputRequest {
-        // The energy has L, and with it z.
+        // The energy depends on L, and so on z.
         OutputRequest { action: self.needs.action || self.energy, ..self.needs }
     }
 
@@ -195,7 +197,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         }
         let RunInfo { t0, t_end, count, .. } = *course;
         let rows = match &self.when {
-            // In transformed time the number of steps shows at the end.
+            // In transformed time the number of steps is not known in advance.
             RowTimes::Every(stride) => count.map_or(2, |count| count / stride + 2),
             RowTimes::At { times, .. } => {
                 let inside = |t: f64| (t0.min(t_end)..=t0.max(t_end)).contains(&t);
@@ -215,7 +217,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
             RowTimes::Every(stride) => (taken / stride + 1) * stride,
             RowTimes::At { times, recorded } => {
                 let Some(t) = times.get(*recorded) else { return usize::MAX };
-                // The step in which it lies, or the one before by rounding, which then records nothing.
+                // The step that contains the time or, by round-off, the one before it, which then records nothing.
                 let step =
                     self.course.h.map_or(0.0, |h| ((t - self.course.t0) / h * (1.0 - 4.0 * f64::EPSILON)).ceil());
                 (step as usize).max(taken + 1)
@@ -228,7 +230,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         if let RowTimes::At { times, recorded } = &mut self.when
             && at.k > 0
         {
-            // A run that goes on: the times up to here were recorded by the one before it.
+            // A resumed run: the times up to here were recorded by the run before it.
             *recorded = times.partition_point(|t| if backward { *t >= at.t } else { *t <= at.t });
         }
         self.step(at)
@@ -245,7 +247,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
     }
 }
 
-/// Refuses more rows at a time than are kept.
+/// Returns an error if more rows would be kept in memory than [`MAX_ROWS`].
 pub(crate) fn check(rows: usize) -> Result<(), InputError> {
     if rows > MAX_ROWS { Err(too_many(rows)) } else { Ok(()) }
 }

@@ -1,4 +1,4 @@
-//! A step as observers see it, and the end of a run by one of them.
+//! The view of a step for observers, and the request of an observer to end the run.
 
 use crate::run::findings::Findings;
 use crate::run::motion::Motion;
@@ -8,24 +8,25 @@ use crate::{StepError, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// The end of a run by one of its observers.
+/// The request of an observer to end the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop<const N: usize> {
-    /// Who ends it, for the status.
+    /// The cause, for the status.
     pub by: &'static str,
-    /// What went wrong, where that is why.
+    /// The error, if the run ends because of one.
     pub cause: Option<StepError>,
-    /// Where the run is to end, if not at the end of the step that the observer saw: a time in that step, and the state there.
+    /// The time and the state at which the run ends, within the step that the observer saw; `None` for the end of that
+    /// step.
     pub at: Option<(f64, PhasePoint<N>)>,
 }
 
 impl<const N: usize> Stop<N> {
-    /// By this observer, at the end of the step that it saw.
+    /// Ends the run at the end of the step that the observer saw, with this cause.
     pub fn here(by: &'static str) -> Self {
         Stop { by, cause: None, at: None }
     }
 
-    /// Since something that it needs cannot be computed.
+    /// Ends the run because a quantity that the observer requested cannot be computed.
     pub fn failed(cause: StepError) -> Self {
         Stop { by: "", cause: Some(cause), at: None }
     }
@@ -37,11 +38,11 @@ pub struct StepView<'r, const N: usize> {
     pub k: usize,
     /// The time.
     pub t: f64,
-    /// The state `(q, p, z)`; the action is the start's where no one has asked for it.
+    /// The state `(q, p, z)`; z is the initial action if the action was not requested.
     pub state: PhasePoint<N>,
     /// `sigma_d` of the last step, the factor by which it contracts the contact form and every momentum of a symmetry; 1 at the start.
     pub sigma: f64,
-    /// The logarithm of the conformal factor of the motion since the start, where someone has asked for it.
+    /// The logarithm of the conformal factor of the motion since the start, if it was requested.
     pub log_factor: Option<f64>,
     /// Whether the run ends here.
     pub last: bool,
@@ -49,20 +50,20 @@ pub struct StepView<'r, const N: usize> {
     pub(crate) before: Option<(f64, PhasePoint<N>)>,
     pub(crate) motion: &'r dyn Motion<N>,
     pub(crate) stepper: &'r dyn Stepper<N>,
-    /// Whether the step that leads here is a part of one that cannot be taken as a whole.
+    /// Whether the last step is a part of a step that failed as a whole.
     pub(crate) in_failed_step: bool,
 }
 
 impl<'r, const N: usize> StepView<'r, N> {
-    /// The velocity, the inverse of the Legendre transformation at the state.
+    /// The velocity, by the inverse Legendre transformation of the state.
     ///
     /// # Errors
-    /// A [`StepError`] where no velocity belongs to the momentum.
+    /// A [`StepError`] if no velocity has this momentum.
     pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
         self.motion.velocity(self.t, &self.state, self.stepper.last_velocity())
     }
 
-    /// The velocity that belongs to another state of the motion.
+    /// The velocity at another state of the motion.
     ///
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
@@ -70,8 +71,8 @@ impl<'r, const N: usize> StepView<'r, N> {
         self.motion.velocity(t, state, self.stepper.last_velocity())
     }
 
-    /// The run as it would go on from here, for [`Run::resume`](crate::run::Run::resume); `None` where its stepper cannot be saved, or the run
-    /// cannot go on.
+    /// The state from which [`Run::resume`](crate::run::Run::resume) continues the run; `None` if the stepper cannot be
+    /// saved, or within a failed step.
     pub fn resume_state(&self) -> Option<ResumeState> {
         if self.in_failed_step {
             return None;
@@ -82,7 +83,7 @@ impl<'r, const N: usize> StepView<'r, N> {
         Some(ResumeState { fingerprint, taken: self.k, log_factor, unresolved, energy, words })
     }
 
-    /// The moment at a time of the last step: see [`LastStep::at`].
+    /// The view at a time within the last step; see [`LastStep::at`].
     pub(crate) fn within(&self, t: f64) -> Result<Self, StepError> {
         let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.step_to(t)?;
         let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());

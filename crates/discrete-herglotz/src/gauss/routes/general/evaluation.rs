@@ -65,7 +65,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
                 self.l_v[i].set(r, d.y[i]);
             }
         }
-        dg.max_abs_or_nan() / sg.max_abs_or_nan()
+        dg.reduce_max() / sg.reduce_max()
     }
 
     /// Evaluates L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time; returns

@@ -26,8 +26,8 @@ impl<S: Simd> Changes<S> {
     /// The largest change of one kind of variable, relative to its largest value.
     #[inline(always)]
     fn relative(&self, kind: usize) -> f64 {
-        let change = self.change[kind].max_abs_or_nan();
-        if change > 0.0 { change / self.size[kind].max_abs_or_nan() } else { change }
+        let change = self.change[kind].reduce_max();
+        if change > 0.0 { change / self.size[kind].reduce_max() } else { change }
     }
 }
 

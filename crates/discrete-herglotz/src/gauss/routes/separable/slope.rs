@@ -46,7 +46,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
                 largest = largest.max(rest.block::<S>(r).abs());
             }
         }
-        largest.max_abs_or_nan()
+        largest.reduce_max()
     }
 
     /// Estimates the slope of the force, and refines the matrices if they are expected to be kept for long.
