@@ -1,10 +1,13 @@
-//! Discrete contact mechanics: discrete Lagrangians on Q x Q x R, their flows, and what the theory says of them.
+//! Discrete contact mechanics: discrete Lagrangians on Q x Q x R, their flows, and numerical checks of the theory.
 //!
 //! A discrete Lagrangian `L_d(q0, q1, z0)` advances the action by `z1 = z0 + L_d`; the discrete Herglotz equations
 //! `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = 0`, `sigma_d = 1 + Dz L_d`, advance the position. The flow on
-//! T\*Q x R is conformally contact by construction: it contracts the contact form, and every momentum of a symmetry, by
-//! exactly `sigma_d`. A [`Problem`] is a Lagrangian with a start; by an [`Integrator`] and some [`Steps`] it becomes a [`Run`], which
-//! [`Observer`]s look at. A [`Method`](rules::Method) makes discrete Lagrangians from Lagrangians, [`statements`](theory::statements) checks the theory on them.
+//! T\*Q x R is conformally contact by construction: it scales the contact form, and the momentum of every symmetry, by
+//! exactly `sigma_d`.
+//!
+//! A [`Problem`] is a Lagrangian with an initial state. With an [`Integrator`] and a choice of [`Steps`] it becomes a
+//! [`Run`], whose output goes to [`Observer`]s. A [`Method`](rules::Method) constructs a discrete Lagrangian from a
+//! Lagrangian; [`statements`](theory::statements) evaluates the statements of the paper for a discrete Lagrangian.
 //!
 //! ```
 //! use contact_geom::{VelocityPoint, systems::DoublePendulum};
@@ -19,9 +22,10 @@
 //! # Ok::<(), discrete_herglotz::InputError>(())
 //! ```
 //!
-//! Features: `faer` (default) for large linear systems, `csv` for rows written while a run goes on, `serde` for integrators by name.
+//! Features: `faer` (default) for large linear systems, `csv` for writing rows during a run, `serde` for integrators by
+//! name.
 //!
-//! Symbols and their names in code are in the project's `NOTATION.md`.
+//! The project's `NOTATION.md` lists the symbols and their names in code.
 
 pub mod boundary;
 pub mod ensemble;
@@ -37,7 +41,8 @@ pub mod splitting;
 mod switching;
 pub mod theory;
 
-/// Checks of a motion for programs that take its steps themselves: claims of structure, the drift of the energy, suspect intervals, jumps of L.
+/// Checks of a motion for programs that advance a stepper themselves: the claimed structure of L, the energy drift,
+/// suspect intervals, and jumps of L.
 pub mod checks {
     pub use crate::integration::{SuspectInterval, check_claims};
     pub use crate::run::{EnergyDrift, EnergyLook};

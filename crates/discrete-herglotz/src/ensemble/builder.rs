@@ -23,8 +23,8 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// Many motions with one integrator and the same steps.
 ///
 /// If the [integrator](Integrator::batch_kernel) has a kernel for them, the motions are placed in the SIMD lanes of
-/// vector registers, so that a whole pack takes a step together: for every [`SplittingScheme`] if the Lagrangian is
-/// separable with linear drag, and for [`GaussCollocation`] if it is separable with a constant rate. All other members,
+/// vector registers, so that a whole pack takes a step together: for every [`SplittingScheme`](crate::SplittingScheme) if the Lagrangian is
+/// separable with linear drag, and for [`GaussCollocation`](crate::GaussCollocation) if it is separable with a constant rate. All other members,
 /// and those that a lane cannot finish (a state that is not finite, an iteration that does not converge, a formula that
 /// branches), have a run of their own. Packs are distributed over threads in shards. The fold is called with the
 /// members in the order of their index, on the calling thread, while others are computed, so that memory does not grow
@@ -41,7 +41,7 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// and the last, and not along all motions; a start and a final state must be finite. In lanes, whether the steps
 /// resolve the motion is checked at one drift of each step of a splitting, and from the accelerations of each step of
 /// collocation. A member with a suspect step also has a run of its own, from which its
-/// [`unresolved`](Ending::unresolved) is taken; its state is that of the lane.
+/// [`unresolved`](crate::ensemble::Ending::unresolved) is taken; its state is that of the lane.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -176,7 +176,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     }
 
     /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
-    /// that follow end at their current state, with [`Status::Stopped`] by an [`INTERRUPTION`](crate::INTERRUPTION), or
+    /// that follow end at their current state, with [`Status::Stopped`](crate::Status::Stopped) by an [`INTERRUPTION`](crate::INTERRUPTION), or
     /// with [`InputError::Interrupted`] if they have not started.
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
         Ensemble { interrupt: Some(interrupt), ..self }

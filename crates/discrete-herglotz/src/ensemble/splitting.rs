@@ -30,8 +30,8 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
 ///
 /// A single run monitors all drifts, which takes a third of its time. Two consecutive drifts of lengths s1, s2 that it
 /// flags as unresolved satisfy `omega^2 (s1^2 + s2^2) > 1` for an oscillation of frequency omega (see
-/// `resolution/monitor.rs`). In the longest drift, of length s, the change of the force times s then exceeds `s^2 /
-/// (s1^2 + s2^2)` of the momentum. A member for which this holds has a run of its own, which decides.
+/// `resolution/monitor.rs`). In the longest drift, of length s, the change of the force times s then exceeds the
+/// fraction `s^2/(s1^2+s2^2)` of the momentum. A member for which this holds has a run of its own, which decides.
 struct DefectSample {
     /// The index of the drift, and its length.
     stage: usize,

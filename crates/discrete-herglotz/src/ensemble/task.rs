@@ -126,7 +126,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         digest(&words)
     }
 
-    /// The indices of the members of a shard; none where there is no such shard.
+    /// The indices of the members of a shard; empty if there is no such shard.
     pub(crate) fn members_of(&self, shard: usize) -> Range<usize> {
         let first = shard.saturating_mul(SHARD).min(self.count);
         first..self.count.min(first.saturating_add(SHARD))
@@ -233,7 +233,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 }
 
 impl<const N: usize> Start<N> {
-    /// The state `(q, p, z)`, where it is finite.
+    /// The state `(q, p, z)`, if it is finite.
     pub(crate) fn state<L: Lagrangian<N>>(&self, lagrangian: &L, t0: f64) -> Option<PhasePoint<N>> {
         let state = match self {
             Start::Velocity(x) => legendre(lagrangian, t0, x),

@@ -1,15 +1,15 @@
-//! The declared structure of a Lagrangian, after a probe.
+//! Numerical checks of the claimed structure of a Lagrangian.
 
 use crate::{InputError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
-/// The bound on derivatives that a claim says vanish, relative to the size of their terms: some thousand units of round-off, for
-/// Lagrangians whose constants are themselves rounded.
+/// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units of
+/// round-off, since the constants of a Lagrangian are rounded.
 pub(crate) const PROBE: f64 = 1e-12;
 
-/// The structure that a Lagrangian claims, after a probe at two points near a start, the second also at a time near that of the
-/// start: what a method that skips work relies on. A structure that is proved is not probed.
+/// The structure that a Lagrangian claims, verified at an initial point and at a point near it, the second at a time near the
+/// initial time. Methods that skip work rely on it. A structure that is proved is not verified.
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at neither
@@ -25,7 +25,7 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
     }
-    // At the start derivatives may vanish by symmetry, as at an equilibrium or a cosine's at t = 0; beside it they do not.
+    // At the start derivatives may vanish by symmetry, as at an equilibrium, or for a cosine at t = 0; near it they do not.
     let aside = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
     let beside = VelocityPoint {
         q: start.q.map_with_location(|i, _, q| aside(q, i)),
@@ -42,8 +42,8 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. `None` too where L is not
-/// defined, or no velocity belongs to the momentum: nothing is said there.
+/// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None` where L
+/// is not defined, or where the inverse Legendre transformation fails.
 pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
@@ -58,7 +58,8 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     structure.defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
 }
 
-/// Probes the claims at so many times of a whole span, at a start: claims on time are seen at any but special ones.
+/// Verifies the claims at an initial point at this number of times in a span. A false claim on the time dependence shows at
+/// all but special times.
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
@@ -74,7 +75,7 @@ pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
     }
     let structure = lagrangian.structure();
     for i in 1..=times {
-        // Fractions without a period, so that they do not meet the zeros of what is periodic.
+        // Multiples of the golden ratio modulo 1, which do not coincide with the zeros of a periodic function.
         let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();
         let defects = structure.defects(lagrangian, t, start).into_iter().flatten();
         if let Some(Defect { claim, size }) = { defects }.find(|d| d.size > PROBE) {
@@ -89,7 +90,7 @@ mod tests {
     use super::*;
     use contact_geom::Scalar;
 
-    /// `v^2/2 - q^2/2` with a term that has no slope in time at t = 0.
+    /// `v^2/2 - q^2/2` with a term whose time derivative vanishes at t = 0.
     enum Even {
         Drag,
         Spring,

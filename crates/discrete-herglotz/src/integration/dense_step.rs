@@ -5,18 +5,18 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::sync::OnceLock;
 
-/// The Legendre polynomials that integrals of the largest degree need.
+/// The number of Legendre polynomials that the integrals of the highest degree need.
 pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
 
-/// A step as a curve: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper), with `tau` from 0 to h
+/// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0 to h
 ///
 /// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`, `p(tau) = (p0 + int rho L_q) / rho(tau)`,
 ///
 /// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
 ///
-/// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
-/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the action is not requested
-/// and z decouples, z stays what it was at the start.
+/// At its ends it equals the states of the run, of order 2s, to round-off; between them its order is s. The curve of a run is
+/// therefore continuous, and its velocity jumps by `O(h^s)` between steps. Where the action is not requested and z decouples,
+/// z keeps its initial value.
 #[derive(Clone, Copy, Debug)]
 pub struct DenseStep<const N: usize> {
     s: usize,
@@ -30,7 +30,7 @@ pub struct DenseStep<const N: usize> {
 }
 
 impl<const N: usize> DenseStep<N> {
-    /// From the Legendre series of V, `rho L_q`, `rho L_z` and L on the step, each with `s` coefficients.
+    /// A step from the Legendre series of V, `rho L_q`, `rho L_z` and L on it, each with `s` coefficients.
     pub(crate) fn new(
         s: usize,
         (t, h): (f64, f64),
@@ -41,23 +41,23 @@ impl<const N: usize> DenseStep<N> {
         DenseStep { s, t, h, start, v, force, rate, l }
     }
 
-    /// The times of the step's start and end.
+    /// The times of the start and the end of the step.
     pub fn span(&self) -> (f64, f64) {
         (self.t, self.t + self.h)
     }
 
-    /// The state at a time of the [`span`](Self::span); beyond it the polynomials are continued.
+    /// The state at a time in the [`span`](Self::span); outside of it the polynomials are extrapolated.
     pub fn at(&self, t: f64) -> PhasePoint<N> {
         self.at_fraction((t - self.t) / self.h)
     }
 
-    /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
+    /// The velocity `dq/dt` of the curve at a time: the polynomial of degree `s - 1` through the velocities of the stages.
     pub fn velocity(&self, t: f64) -> SVector<f64, N> {
         let p = polynomials(self.s, (t - self.t) / self.h);
         SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
     }
 
-    /// Velocity, value of L and rho at a fraction of the step.
+    /// The velocity, the value of L and rho at a fraction of the step.
     pub(crate) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
         let p = polynomials(self.s, fraction);
         let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
@@ -70,12 +70,12 @@ impl<const N: usize> DenseStep<N> {
         self.h
     }
 
-    /// The parts in which [`sketch`](Self::sketch) divides the step.
+    /// The number of parts into which [`sketch`](Self::sketch) divides the step.
     pub(crate) fn parts(&self) -> usize {
         self.s + 2
     }
 
-    /// The states between the parts of the step, all at once.
+    /// Appends the states between the parts of the step.
     pub(crate) fn sketch(&self, to: &mut Vec<PhasePoint<N>>) {
         let table = integrals_to_parts(self.s);
         let along = |series: &Series| {
@@ -120,7 +120,7 @@ const RECURRENCE: [[f64; 2]; MAX_STAGES] = {
     factors
 };
 
-/// The Legendre polynomials `P_0` to `P_s` of `2 x - 1`, without divisions.
+/// The Legendre polynomials `P_0` to `P_s` of `2 x - 1` at a fraction x, without divisions.
 fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
     let x = 2.0 * fraction - 1.0;
     let mut p = [1.0; POLYNOMIALS];
@@ -132,7 +132,8 @@ fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
     p
 }
 
-/// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
+/// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`, from
+/// `(2k + 1) P_k = (P_(k+1) - P_(k-1))'`.
 fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIALS] {
     let mut integrals = [0.0; POLYNOMIALS];
     integrals[0] = fraction;
@@ -142,10 +143,11 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
     integrals
 }
 
-/// The most states between the parts of a step.
+/// The largest number of states between the parts of a step.
 const BETWEEN_PARTS: usize = MAX_STAGES + 1;
 
-/// The integrals of the Legendre polynomials to the ends of the parts of a step, of which there are s + 2: `[k][i]` to the end of part i.
+/// The integrals of the Legendre polynomials to the ends of the first s + 1 of the s + 2 parts of a step: `[k][i]` is the
+/// integral of `P_k` to the end of part i.
 fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
     static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
         [const { OnceLock::new() }; MAX_STAGES];

@@ -1,37 +1,40 @@
-//! Integrators: what advances a run.
+//! Integrators: the trait, the properties of a method and the options of its stepper.
 
 use crate::{InputError, Problem, SplittingScheme, Stepper};
 use std::borrow::Cow;
 
-/// What is known of an integrator.
+/// The properties of an integrator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MethodInfo {
     /// The name in tables, in lower case with underscores.
     pub name: Cow<'static, str>,
-    /// The order of the flow; in transformed time, in steps of its time.
+    /// The order of the flow; for a method in transformed time, in the steps of that time.
     pub order: u32,
-    /// Whether it is its own adjoint: a step back leads to where a step came from.
+    /// Whether it is symmetric (equal to its adjoint): a step with `-h` is the inverse of a step with `h`.
     pub symmetric: bool,
-    /// Whether its steps take forces alone, and solve no equation.
+    /// Whether its steps are explicit: they evaluate forces and solve no equation.
     pub explicit: bool,
-    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself.
+    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the exact flow.
     pub exact_rate: bool,
-    /// Whether its steps are equal in the transformed time that the Lagrangian states, and end where the span does.
+    /// Whether its steps have equal length in the transformed time of the Lagrangian; the last one ends at the end of the
+    /// span.
     pub in_transformed_time: bool,
-    /// The number of stages, of contact Gauss collocation.
+    /// The number of stages, for contact Gauss collocation.
     pub collocation: Option<usize>,
-    /// Whether a step consists of others, back and forth.
+    /// Whether a step is a composition of substeps, some of them backward in time.
     pub substeps: bool,
-    /// Whether it divides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
+    /// Whether it subdivides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
     pub divides: bool,
-    /// What one of its [evaluations](Stepper::evaluations) costs, in evaluations of L at a stage of Gauss collocation.
+    /// The cost of one of its [evaluations](Stepper::evaluations), in units of an evaluation of L at a stage of Gauss
+    /// collocation.
     pub cost_per_evaluation: u64,
-    /// Where it is from: authors, journal, year.
+    /// The reference: authors, journal, year.
     pub source: Cow<'static, str>,
 }
 
 impl MethodInfo {
-    /// Those of an implicit method that is not known to be symmetric: the least that is true of a discrete Lagrangian in N coordinates.
+    /// The properties of an implicit method that is not known to be symmetric: the defaults for a discrete Lagrangian in N
+    /// coordinates.
     pub fn of_discrete<const N: usize>(name: impl Into<Cow<'static, str>>, order: u32) -> Self {
         MethodInfo {
             name: name.into(),
@@ -43,40 +46,41 @@ impl MethodInfo {
             collocation: None,
             substeps: false,
             divides: false,
-            // Newton's method takes second derivatives.
+            // Newton's method evaluates second derivatives.
             cost_per_evaluation: 32 * N as u64,
             source: Cow::Borrowed(""),
         }
     }
 }
 
-/// What is asked of a stepper.
+/// The options of a stepper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepperOptions {
-    /// The action, also where it does not act back on the motion.
+    /// Whether the action is computed even where it does not act back on the motion.
     pub action: bool,
-    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::unresolved`] and [`Stepper::suspect_interval`].
+    /// Whether the stepper checks that its steps resolve the motion, if the check takes time; see [`Stepper::unresolved`] and
+    /// [`Stepper::suspect_interval`].
     pub watched: bool,
 }
 
-/// A way to advance the motions of Lagrangians L in N coordinates: the rules, the splittings, the compositions and the collocation methods
-/// of this crate, the exact flow, and a user's own.
+/// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of this
+/// crate, the exact flow, and those of a user.
 ///
-/// Who has a [`DiscreteLagrangian`](crate::DiscreteLagrangian) needs no implementation: see [`CustomMethod`](crate::CustomMethod).
+/// For a [`DiscreteLagrangian`](crate::DiscreteLagrangian), [`CustomMethod`](crate::CustomMethod) is an implementation.
 pub trait Integrator<'a, L, const N: usize> {
-    /// What is known of it.
+    /// The properties of the method.
     fn info(&self) -> MethodInfo;
 
-    /// Whether a Lagrangian meets its hypotheses.
+    /// Checks that a Lagrangian satisfies the hypotheses of the method.
     ///
     /// # Errors
     /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], [`InputError::Stages`].
     fn check(&self, lagrangian: &L) -> Result<(), InputError>;
 
-    /// A stepper at the start of a problem, by steps of h: negative ones go back in time.
+    /// A stepper at the initial state of a problem, with steps of length h, which are negative for a run backward in time.
     ///
     /// # Errors
-    /// [`InputError`] where the problem does not meet its hypotheses, or the first step cannot be taken.
+    /// [`InputError`] where the problem does not satisfy the hypotheses of the method, or the first step fails.
     fn stepper(
         &self,
         problem: &Problem<'a, L, N>,
@@ -84,19 +88,19 @@ pub trait Integrator<'a, L, const N: usize> {
         wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 
-    /// What an [`Ensemble`](crate::Ensemble) has a kernel for that takes these steps for many motions at once; `None` where each has a
-    /// stepper of its own.
+    /// The kernel with which an [`Ensemble`](crate::Ensemble) takes these steps for many motions at once; `None` where each
+    /// member has its own stepper.
     fn batch_kernel(&self) -> Option<BatchKernel> {
         None
     }
 }
 
-/// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
+/// A kernel that takes the steps of an [`Integrator`] for many motions at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BatchKernel {
     /// The steps of a splitting with linear drag.
     Splitting(SplittingScheme),
-    /// Those of contact Gauss collocation, for constant mass and constant rate of the conformal factor.
+    /// The steps of contact Gauss collocation, for a constant mass matrix and a constant rate of the conformal factor.
     Gauss {
         /// The number of stages.
         stages: usize,

@@ -1,19 +1,20 @@
-//! Whether a run is to end before its time, as from outside.
+//! Interruption of a computation from outside.
 
 use std::fmt::{Debug, Formatter};
 
-/// Who ends a run that is interrupted, for its [`Status`](crate::Status).
+/// What ends an interrupted run, as reported by its [`Status`](crate::Status).
 pub const INTERRUPTION: &str = "an interruption";
 
-/// The steps between two questions: some hundred microseconds of short ones.
+/// The number of steps between two queries: some hundred microseconds of short steps.
 pub(crate) const BETWEEN: usize = 256;
 
-/// A question that is asked from time to time while a motion is computed: whether to end it, as a user may wish who has pressed Ctrl-C.
+/// A predicate that is queried periodically during a computation and ends it when it becomes true, for example after Ctrl-C.
 #[derive(Clone, Copy)]
 pub struct Interrupt<'a>(&'a (dyn Fn() -> bool + Sync));
 
 impl<'a> Interrupt<'a> {
-    /// Ends what is computed once this is true. It is asked every few hundred steps, on the threads of the runs.
+    /// An interrupt that ends the computation once this returns true. It is queried every few hundred steps, on the threads
+    /// of the runs.
     pub fn when(is_wanted: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Interrupt(is_wanted)
     }

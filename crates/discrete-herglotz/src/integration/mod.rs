@@ -1,5 +1,5 @@
-//! What integrators are made of and for: the problem, the integrator with the facts about it, its stepper, the entries of a plan, the state
-//! that is saved.
+//! The problem, the integrator with its properties, its stepper, the table of splitting schemes, dense output, interruption
+//! and the entries of a plan.
 
 pub(crate) mod check_claims;
 pub(crate) mod dense_step;

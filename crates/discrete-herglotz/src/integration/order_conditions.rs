@@ -1,20 +1,20 @@
-//! The order conditions of every scheme, as algebra: no slope is measured here.
+//! Tests of the algebraic order conditions of every scheme.
 
 use super::SplittingScheme;
 
-/// A sum with the sum of its terms' sizes: what the rounding of the coefficients can do to it.
+/// A sum with the sum of the absolute values of its terms, which bounds the effect of the round-off of the coefficients.
 #[derive(Clone, Copy)]
 struct Sized {
     value: f64,
     size: f64,
 }
 
-/// A residual in units of its rounding.
+/// A residual in units of its round-off.
 fn in_roundings(found: Sized, exact: f64) -> f64 {
     (found.value - exact).abs() / (f64::EPSILON * (found.size + exact.abs()))
 }
 
-/// Each product of up to `order` coefficients adds as many roundings, and a sum some more.
+/// The tolerance of the residuals in units of round-off: products of up to `order` coefficients and their sums.
 const ROUNDINGS: f64 = 4.0;
 
 /// The coefficients of the words of one length in the letters A and B of `prod exp(k_i B) exp(d_i A)`, as an element of the
@@ -26,7 +26,7 @@ fn words(scheme: &SplittingScheme, length: usize) -> Vec<Vec<Sized>> {
     let mut multiply = |letter: usize, a: f64| {
         for n in (1..=length).rev() {
             for w in 0..1 << n {
-                // Longer words lose their last letters while these are the exponential's.
+                // The last k letters of the word come from the exponential, as long as they are its letter.
                 let (mut power, mut rest) = (1.0, w);
                 for k in 1..=n {
                     if rest & 1 != letter {
@@ -50,7 +50,7 @@ fn words(scheme: &SplittingScheme, length: usize) -> Vec<Vec<Sized>> {
     words
 }
 
-/// The worst residual, in roundings, of the words of this length against `exp(A + B)`.
+/// The largest residual, in units of round-off, of the words of this length against `exp(A + B)`.
 fn word_residual(words: &[Vec<Sized>], length: usize) -> f64 {
     let exact = (1..=length).map(|k| 1.0 / k as f64).product();
     words[length].iter().map(|&found| in_roundings(found, exact)).fold(0.0, f64::max)
@@ -63,10 +63,10 @@ struct Tree {
     order: usize,
 }
 
-/// The worst residual, in roundings, of the conditions of this order for `y'' = f(y)`: the velocity's of the trees of that
-/// order, and the position's of the trees of one order less.
+/// The largest residual, in units of round-off, of the conditions of this order for `y'' = f(y)`: for the velocity, of the
+/// trees of this order, and for the position, of the trees of one order less.
 ///
-/// The kicks and their times are a Nyström method: `v1 = v0 + h sum k_i f_i`, and
+/// The kicks and their times define a Nyström method: `v1 = v0 + h sum k_i f_i`, and
 /// `Y_i = y0 + c_i h v0 + h^2 sum_j k_j (c_i - c_j) f_j`.
 fn nystrom_residual(scheme: &SplittingScheme, order: usize) -> f64 {
     let (drifts, kicks) = scheme.coefficients();
@@ -78,7 +78,7 @@ fn nystrom_residual(scheme: &SplittingScheme, order: usize) -> f64 {
         })
     };
     let mut worst = in_roundings(Sized { value: times[kicks.len() - 1], size: 3.0 }, 1.0);
-    // What a vertex can bear: the velocity y', and each smaller tree, integrated twice.
+    // The branches of a vertex: the velocity y', and each smaller tree, integrated twice.
     let leaf = times.iter().map(|c| Sized { value: *c, size: 1.0 }).collect();
     let mut branches = vec![Tree { weight: leaf, exact: 1.0, order: 1 }];
     for n in 1..=order {
@@ -106,13 +106,13 @@ fn nystrom_residual(scheme: &SplittingScheme, order: usize) -> f64 {
     worst
 }
 
-/// Every product of branches whose orders sum to `order`, as the vertex that bears them.
+/// All products of branches whose orders sum to `order`, each as a vertex with these branches.
 fn bouquets(branches: &[Tree], order: usize, kicks: usize) -> Vec<Tree> {
     if order == 0 {
         return vec![Tree { weight: vec![Sized { value: 1.0, size: 1.0 }; kicks], exact: 1.0, order: 1 }];
     }
     let mut found = Vec::new();
-    // The last branch that is taken has the largest index: each multiset once.
+    // The remaining branches have indices up to that of this one, so that each multiset occurs once.
     for (i, branch) in branches.iter().enumerate().filter(|(_, b)| b.order <= order) {
         for rest in bouquets(&branches[..=i], order - branch.order, kicks) {
             let product = |(a, b): (&Sized, &Sized)| Sized { value: a.value * b.value, size: a.size * b.size };
@@ -126,7 +126,7 @@ fn bouquets(branches: &[Tree], order: usize, kicks: usize) -> Vec<Tree> {
     found
 }
 
-/// Every composition is `exp(A + B)` on every word up to its order, and not on those of one letter more.
+/// Every composition agrees with `exp(A + B)` on all words up to its order, and not on the words with one letter more.
 #[test]
 fn compositions_have_their_order() {
     for scheme in SplittingScheme::ALL.iter().filter(|s| !s.is_nystrom()) {
@@ -141,7 +141,7 @@ fn compositions_have_their_order() {
     }
 }
 
-/// Every scheme meets the conditions of Nyström trees up to its order, and not those of the next.
+/// Every scheme satisfies the conditions of the Nyström trees up to its order, and not those of the next order.
 #[test]
 fn every_scheme_has_its_order_on_nystrom_trees() {
     for scheme in &SplittingScheme::ALL {
@@ -155,7 +155,7 @@ fn every_scheme_has_its_order_on_nystrom_trees() {
     }
 }
 
-/// A Runge-Kutta-Nyström splitting lives on its hypothesis: without it the order is lower.
+/// A Runge-Kutta-Nyström splitting has a lower order without its hypothesis.
 #[test]
 fn nystrom_schemes_need_their_hypothesis() {
     for scheme in [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_MOAN_6_LONG, SplittingScheme::BLANES_CASAS_8]
@@ -166,7 +166,7 @@ fn nystrom_schemes_need_their_hypothesis() {
     }
 }
 
-/// What the table says of each scheme is what its coefficients are.
+/// The entries of the table agree with the coefficients of each scheme.
 #[test]
 fn the_table_is_consistent() {
     for scheme in &SplittingScheme::ALL {
@@ -176,7 +176,7 @@ fn the_table_is_consistent() {
         assert_eq!(kicks, reversed, "{}: symmetry of the kicks", scheme.name());
         let reversed: Vec<f64> = drifts.iter().rev().copied().collect();
         assert_eq!(drifts, reversed, "{}: symmetry of the drifts", scheme.name());
-        // The force at the start of a step is that at the end of the last.
+        // The force at the start of a step is that at the end of the previous one.
         let evaluations = kicks.iter().filter(|k| **k != 0.0).count() - usize::from(kicks[0] != 0.0);
         assert_eq!(evaluations, scheme.stages(), "{}", scheme.name());
         assert_eq!(scheme.substeps().is_none(), scheme.is_nystrom(), "{}", scheme.name());

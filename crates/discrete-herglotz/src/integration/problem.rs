@@ -1,4 +1,4 @@
-//! Problems: a Lagrangian with a start.
+//! Initial value problems: a Lagrangian with an initial state.
 
 use crate::integration::check_claims::check_claims;
 use crate::{
@@ -11,12 +11,13 @@ use contact_geom::{
     numbers::max_abs_or_nan,
 };
 
-/// Where a motion starts.
+/// The initial state of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<const N: usize> {
-    /// At a point `(q, v, z)` of TQ x R.
+    /// A point `(q, v, z)` of TQ x R.
     Velocity(VelocityPoint<N>),
-    /// At a point `(q, p, z)` of T\*Q x R, with a guess of the velocity that belongs to it; needed where several have the same momentum.
+    /// A point `(q, p, z)` of T\*Q x R, with a guess of its velocity, which is needed where several velocities have the same
+    /// momentum.
     Momentum(PhasePoint<N>, SVector<f64, N>),
 }
 
@@ -26,14 +27,14 @@ impl<const N: usize> From<VelocityPoint<N>> for Start<N> {
     }
 }
 
-/// With a velocity that is found from 0.
+/// With the guess 0 of the velocity.
 impl<const N: usize> From<PhasePoint<N>> for Start<N> {
     fn from(x: PhasePoint<N>) -> Self {
         Start::Momentum(x, SVector::zeros())
     }
 }
 
-/// A motion to be computed: a Lagrangian with a start, checked once.
+/// An initial value problem: a Lagrangian with an initial state, checked on construction.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -50,12 +51,12 @@ impl<const N: usize> From<PhasePoint<N>> for Start<N> {
 pub struct Problem<'a, L, const N: usize> {
     pub(crate) lagrangian: &'a L,
     pub(crate) t0: f64,
-    /// The start with its velocity, and with its momentum.
+    /// The initial state with its velocity, and (`state`) with its momentum.
     pub(crate) start: VelocityPoint<N>,
     pub(crate) state: PhasePoint<N>,
-    /// What the Lagrangian claims, probed at the start.
+    /// The structure that the Lagrangian claims, verified at the initial state.
     pub(crate) structure: Structure,
-    /// Whether its trial runs are to end.
+    /// The interrupt of its trial runs.
     pub(crate) interrupt: Option<Interrupt<'a>>,
 }
 
@@ -68,11 +69,11 @@ impl<L, const N: usize> Clone for Problem<'_, L, N> {
 impl<L, const N: usize> Copy for Problem<'_, L, N> {}
 
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
-    /// The motion of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
+    /// The problem of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
     ///
     /// # Errors
-    /// [`InputError`]: a time or a state that is not finite, a start at which L or a derivative is not defined, a singular `W = L_vv`, a
-    /// momentum without a velocity, a false claim of structure.
+    /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not defined, a
+    /// singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
     pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
         check_time(t0)?;
         if N == 0 {
@@ -94,11 +95,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         Ok(Problem { lagrangian, t0, start, state, structure, interrupt: None })
     }
 
-    /// The motion from two positions and the action, as the paper starts: its state at `t0` is `F-L_d (q0, q1, z0)`.
+    /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.
     ///
     /// # Errors
-    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the discrete Lagrangian is
-    /// not regular at the point, [`InputError::EqualPoints`] where that is because `q0 = q1`.
+    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the discrete
+    /// Lagrangian is not regular at the point, [`InputError::EqualPoints`] where it is not regular because `q0 = q1`.
     pub fn from_points(
         lagrangian: &'a L,
         ld: &impl DiscreteLagrangian<N>,
@@ -110,8 +111,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         Self::new(lagrangian, t0, Start::Momentum(state, (x.q1 - x.q0) / ld.step_size()))
     }
 
-    /// The same with a question that its trial runs, and estimates of its error, ask from time to time. Runs themselves are ended by an
-    /// [`Observer`](crate::Observer), which sees how far they have come.
+    /// The same with an interrupt for its trial runs and error estimates. A run itself is ended by an
+    /// [`Observer`](crate::Observer).
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
         Problem { interrupt: Some(interrupt), ..self }
     }
@@ -121,28 +122,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         self.lagrangian
     }
 
-    /// The time of the start.
+    /// The initial time.
     pub fn t0(&self) -> f64 {
         self.t0
     }
 
-    /// The start `(q, v, z)`.
+    /// The initial state `(q, v, z)`.
     pub fn start(&self) -> &VelocityPoint<N> {
         &self.start
     }
 
-    /// The structure that the Lagrangian claims, probed at the start.
+    /// The structure that the Lagrangian claims, verified at the initial state.
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
 
-    /// The start `(q, p, z)`.
+    /// The initial state `(q, p, z)`.
     pub fn state(&self) -> &PhasePoint<N> {
         &self.state
     }
 }
 
-/// The state at the first of two points.
+/// The state `F-L_d (q0, q1, z0)` at the first of two points.
 pub(crate) fn start_of<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t0: f64,
@@ -155,7 +156,7 @@ pub(crate) fn start_of<const N: usize>(
     if sigma <= 0.0 {
         return Err(InputError::Sigma { sigma });
     }
-    // Not `condition() >= 1/eps`: that would let a NaN pass.
+    // The comparison is written so that a NaN fails it.
     let regular = regularity.fibre.condition() < 1.0 / f64::EPSILON;
     if !(sigma.is_finite() && regular) {
         return Err(bad(StepError::Singular { pivot: regularity.fibre.smallest }));
@@ -163,12 +164,12 @@ pub(crate) fn start_of<const N: usize>(
     legendre_minus(ld, t0, x).map_err(bad)
 }
 
-/// Refuses a time that is not finite.
+/// Returns an error for a time that is not finite.
 pub(crate) fn check_time(t0: f64) -> Result<(), GeometryError> {
     if t0.is_finite() { Ok(()) } else { Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }) }
 }
 
-/// Refuses a start at which L is not defined, or not regular.
+/// Returns an error for an initial state at which L is not defined or not regular.
 fn check_regular<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t0: f64,
@@ -179,11 +180,11 @@ fn check_regular<const N: usize>(
     if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
         return Err(InputError::Undefined);
     }
-    // In units of the coordinates in which its rows are of size one: masses may differ by any factor.
+    // W is scaled so that its rows have size one, since masses may differ by any factor.
     let unit = SVector::<f64, N>::from_fn(|i, _| max_abs_or_nan(w.row(i).iter().copied()).sqrt());
     let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
     let Regularity { smallest, largest } = Regularity::of(scaled);
-    // A matrix of zeros has no such units, and counts as singular.
+    // A row of zeros cannot be scaled, and the comparison treats it as singular.
     if smallest > 4.0 * N as f64 * f64::EPSILON * largest {
         return Ok(());
     }

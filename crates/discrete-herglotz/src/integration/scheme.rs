@@ -1,6 +1,6 @@
 //! The table of splitting schemes: coefficients, orders, sources.
 
-// More digits than a double holds, so that the next rounding is this one.
+// The coefficients have more digits than a double, so that they are correctly rounded.
 #![allow(clippy::excessive_precision)]
 
 use HalfSequence::{Composition, Nystrom};
@@ -9,8 +9,8 @@ use HalfSequence::{Composition, Nystrom};
 /// fraction of the step.
 ///
 /// A composition is `S_(g_1 h) ... S_(g_s h)` of the Strang splitting, or of any symmetric map of order 2. A
-/// Runge-Kutta-Nyström splitting has fewer conditions to meet and smaller errors, but its order holds only where a triple
-/// commutator vanishes, `[B, [B, [B, A]]] = 0`: where the velocity enters A at most quadratically and B not at all.
+/// Runge-Kutta-Nyström splitting satisfies fewer order conditions and has smaller errors, but its order holds only where the
+/// commutator `[B, [B, [B, A]]]` vanishes: where the velocity enters A at most quadratically and B not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplittingScheme {
     name: &'static str,
@@ -20,12 +20,12 @@ pub struct SplittingScheme {
     coefficients: HalfSequence,
 }
 
-/// The first half of each symmetric sequence, the middle included.
+/// The first half of each symmetric sequence, including the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum HalfSequence {
     /// The substeps.
     Composition(&'static [f64]),
-    /// Drifts and kicks, and which of them begins and ends the step.
+    /// Drifts and kicks, and whether the step begins and ends with a kick.
     Nystrom { kick_first: bool, drifts: &'static [f64], kicks: &'static [f64] },
 }
 
@@ -45,7 +45,7 @@ impl SplittingScheme {
         coefficients: Composition(&[1.0]),
     };
 
-    /// The triple jump `1/(2 - 2^(1/3))`, of order 4: Yoshida, Phys. Lett. A 150 (1990) 262-268.
+    /// The triple jump with `1/(2 - 2^(1/3))`, of order 4: Yoshida, Phys. Lett. A 150 (1990) 262-268.
     pub const YOSHIDA_4: Self = SplittingScheme {
         name: "yoshida_4",
         order: 4,
@@ -54,7 +54,7 @@ impl SplittingScheme {
         coefficients: Composition(&[1.351_207_191_959_657_8, -1.702_414_383_919_315_3]),
     };
 
-    /// Suzuki's fractal `1/(4 - 4^(1/3))`, of order 4: Phys. Lett. A 146 (1990) 319-323.
+    /// Suzuki's fractal composition with `1/(4 - 4^(1/3))`, of order 4: Phys. Lett. A 146 (1990) 319-323.
     pub const SUZUKI_4: Self = SplittingScheme {
         name: "suzuki_4",
         order: 4,
@@ -319,7 +319,7 @@ impl SplittingScheme {
         },
     };
 
-    /// Every scheme, by order, compositions first.
+    /// Every scheme: compositions first, then Runge-Kutta-Nyström splittings, each by order.
     pub const ALL: [Self; 15] = [
         Self::STRANG,
         Self::YOSHIDA_4,
@@ -348,17 +348,17 @@ impl SplittingScheme {
         self.order
     }
 
-    /// The evaluations of forces in a step.
+    /// The number of force evaluations in a step.
     pub const fn stages(&self) -> usize {
         self.stages
     }
 
-    /// Where the coefficients were published.
+    /// The publication of the coefficients.
     pub const fn source(&self) -> &'static str {
         self.source
     }
 
-    /// Whether the order needs the hypothesis of Runge-Kutta-Nyström methods.
+    /// Whether the order relies on the hypothesis of Runge-Kutta-Nyström methods.
     pub const fn is_nystrom(&self) -> bool {
         matches!(self.coefficients, Nystrom { .. })
     }

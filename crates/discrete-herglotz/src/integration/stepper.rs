@@ -1,24 +1,24 @@
-//! A method at work on one motion.
+//! Steppers: a method applied to one motion.
 
 use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use thiserror::Error;
 
-/// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
-/// compensations, a kick that two steps share).
+/// A method applied to one motion: the current state, the workspace, and the data carried from one step to the next (initial
+/// guesses, compensation terms, a kick shared by two steps).
 ///
-/// This is what a run advances. A [`DiscreteLagrangian`](crate::DiscreteLagrangian) is a function, and a
-/// [`Flow`](crate::rules::Flow) a stepper on it; methods that gain by more than a guess of the velocity have a stepper of their own.
+/// A run advances a stepper. [`Flow`](crate::rules::Flow) is the stepper of a
+/// [`DiscreteLagrangian`](crate::DiscreteLagrangian); methods that carry more than a guess of the velocity have their own.
 pub trait Stepper<const N: usize> {
-    /// Takes `steps` steps with nothing observed between them.
+    /// Takes `steps` steps without observation between them.
     ///
     /// # Errors
-    /// [`StepFailure`] where a step cannot be taken: the state is then that before it.
+    /// [`StepFailure`] where a step fails: the state is then that before the failed step.
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure>;
 
-    /// Takes `steps` steps, or fewer where a method whose steps vary with a time transformation reaches the time `t_end` before; returns how many.
-    /// Steps of one length end where they end.
+    /// Takes `steps` steps, or fewer if a method in transformed time reaches the time `t_end` before; returns their number.
+    /// Methods with steps of constant length ignore `t_end`.
     ///
     /// # Errors
     /// As [`advance`](Self::advance).
@@ -27,7 +27,7 @@ pub trait Stepper<const N: usize> {
         self.advance(steps).map(|()| steps)
     }
 
-    /// The state `(q, p, z)`. Where the stepper was told that the action is not requested, `z` stays what it was at the start.
+    /// The state `(q, p, z)`. For a stepper without the action, `z` keeps its initial value.
     fn state(&self) -> PhasePoint<N>;
 
     /// The time of the state.
@@ -36,77 +36,79 @@ pub trait Stepper<const N: usize> {
     /// `sigma_d` of the last step; 1 before the first.
     fn sigma(&self) -> f64;
 
-    /// The evaluations of forces, or of gradients of L, since the start: one a point of R x TQ x R.
+    /// The number of evaluations of forces, or of gradients of L, since the start: one per point of R x TQ x R.
     fn evaluations(&self) -> u64;
 
-    /// The last step as a curve, for a method that has one of its own; `None` before the first, and after a step that could not be taken.
+    /// The dense output of the last step, for a method that provides it; `None` before the first step and after a failed one.
     fn dense(&self) -> Option<DenseStep<N>> {
         None
     }
 
-    /// A velocity of the motion in its last step: where several belong to a momentum, that at the state is the one from which Newton's method
-    /// finds it. `None` before the first step, and where a momentum has no other.
+    /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where several
+    /// velocities have the same momentum. `None` before the first step, and where the velocity is unique.
     fn last_velocity(&self) -> Option<SVector<f64, N>> {
         None
     }
 
-    /// Has the first step guessed from the curve of a longer one that has the same start; it changes nothing but the work.
+    /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state. This
+    /// affects only the number of iterations.
     fn guess(&mut self, _longer: &DenseStep<N>) {}
 
-    /// Whether `sigma_d` is the same in all steps, as it is known before the first.
+    /// Whether `sigma_d` is known in advance to be the same in all steps.
     fn has_constant_rate(&self) -> bool {
         false
     }
 
-    /// What its steps compute and what they skip, the action among it: as it is where that is not requested.
+    /// The entries for what its steps compute and skip; that for the action applies where the action is not requested.
     fn work_summary(&self) -> Vec<PlanEntry> {
         Vec::new()
     }
 
-    /// Everything of it that changes from step to step, as words, so that it can go on from them to the last bit; `None` where it does not
-    /// know how.
+    /// All data that change from step to step, as words for a bitwise resume; `None` where saving is not implemented.
     fn save(&self) -> Option<Vec<u64>> {
         None
     }
 
-    /// Goes on from the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they are none.
+    /// Restores the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they are
+    /// not valid.
     fn restore(&mut self, _words: &[u64]) -> bool {
         false
     }
 
-    /// The first step so far that cannot have resolved the motion, where one was seen.
+    /// The first step so far that was flagged as unresolved.
     fn unresolved(&self) -> Option<UnresolvedStep> {
         None
     }
 
-    /// The last steps since the last call that are in doubt: they may not have resolved the motion.
+    /// The latest suspect interval since the last call: steps that may not have resolved the motion.
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         None
     }
 }
 
-/// Steps that ended before the last of them.
+/// A failed step among the requested ones.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error("halted after {taken} steps: {cause}")]
 pub struct StepFailure {
-    /// The steps taken before.
+    /// The number of steps taken before the failure.
     pub taken: usize,
-    /// Why the next could not be taken.
+    /// The cause of the failure.
     pub cause: StepError,
 }
 
-/// Some steps along which the velocity has turned twice as sharply as in all before them: no fault where the force is smooth, but it may
-/// jump there, or be narrower than the steps. A [`Run`](crate::Run) looks.
+/// An interval of steps along which the second difference of the velocity is twice as large as in all steps before. For a
+/// smooth force this is harmless, but the force may jump there, or vary on a scale shorter than the steps. A
+/// [`Run`](crate::Run) examines the interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SuspectInterval<const N: usize> {
-    /// The steps taken before them.
+    /// The number of steps before the interval.
     pub step: usize,
-    /// How many they are.
+    /// The number of steps in the interval.
     pub steps: usize,
-    /// The time at their start.
+    /// The time at its start.
     pub t: f64,
-    /// The state there.
+    /// The state at its start.
     pub from: PhasePoint<N>,
-    /// The state at their end.
+    /// The state at its end.
     pub to: PhasePoint<N>,
 }

@@ -1,4 +1,4 @@
-//! What a run sees of steps that do not resolve its motion.
+//! Detection of steps that do not resolve the motion.
 
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::{UnresolvedStep, integration::SuspectInterval};
@@ -8,57 +8,59 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// What a run notes of its own steps: the first that cannot have resolved the motion, and the last that may not have.
+/// Monitor of the steps of a run: the first step that cannot have resolved the motion, and the latest suspect interval.
 ///
-/// The measure is two second differences of velocities in sequence, of opposite directions: their sum, in units of the largest of
-/// the velocities. An oscillation of frequency omega has them where its velocity vanishes, and they are as large as that for
-/// steps longer than a sixth of a period; a step past a pole of a force, or through a pulse, has them as the force comes and
-/// goes. A velocity that only grows, from rest and at whatever rate, has second differences of one direction.
+/// The defect of a step is the sum of two consecutive second differences of the velocity with opposite directions, in units
+/// of the largest of the velocities. An oscillation of frequency omega has such differences where its velocity vanishes, and
+/// the defect exceeds one for steps longer than a sixth of a period. A step past a pole of the force, or through a pulse, has
+/// them as the force rises and falls. A velocity that only grows, from rest and at any rate, has second differences in one
+/// direction.
 ///
-/// One second difference alone tells less: it is `(omega h)^2` of the velocity, and a force that jumps has one too. So a larger one than
-/// all before is a [`SuspectInterval`], for the run to look at.
+/// A single second difference is a weaker indication: it is `(omega h)^2` times the velocity, and a jump of the force also
+/// causes one. One that is larger than all before therefore yields a [`SuspectInterval`], which the run examines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ResolutionMonitor<const N: usize> {
     pub first: Option<UnresolvedStep>,
     pub doubt: Option<SuspectInterval<N>>,
-    /// The square of the second difference, in units of the velocity, beyond which the next one is a doubt.
+    /// The threshold for the next suspect interval: the square of a second difference, in units of the velocity.
     pub sharpest: f64,
-    /// What a turn moves at most that is rounding.
+    /// Changes of position below this are round-off.
     pub floor: f64,
 }
 
-/// The second difference of the velocity, in units of the velocity, that is the first doubt: a smooth motion has it with 28 steps in a
-/// period.
+/// The threshold for the first suspect interval: a second difference of the velocity, in units of the velocity. A smooth
+/// oscillation reaches it with 28 steps per period.
 const SHARP: f64 = 0.05;
 
-/// What moves a position by less than this part of it is its rounding.
+/// A change of position below this fraction of the position is round-off.
 pub(crate) const ROUNDED: f64 = 1e-10;
 
-/// What rounding moves a motion from this start by, at most. Forces are rounded as they are at its size, so that this holds too where it has
-/// come to rest beside the origin.
+/// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of the
+/// initial position, so that it also holds where the motion has come to rest near the origin.
 pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
     let reach = max_or_nan(size(q), size(v) * h.abs());
     if reach.is_finite() { ROUNDED * reach } else { 0.0 }
 }
 
 impl<const N: usize> ResolutionMonitor<N> {
-    /// Of a motion from a position and a velocity, by steps of h.
+    /// A monitor for a motion from a position and a velocity, with steps of length h.
     pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
         ResolutionMonitor { first: None, doubt: None, sharpest: SHARP * SHARP, floor: rounding(q, v, h) }
     }
 
-    /// Notes the first step with a misfit above one.
+    /// Records the first step with a defect above one.
     #[cold]
     #[inline(never)]
     pub fn note(&mut self, step: usize, defect: f64) {
         if self.first.is_none() {
             self.first = Some(UnresolvedStep { step, defect });
-            // One is enough.
+            // A run reports one unresolved step, and needs no suspect intervals after it.
             self.sharpest = f64::INFINITY;
         }
     }
 
-    /// Notes a doubt after a turn of this sharpness. The next is twice as sharp, so that there are few.
+    /// Records a suspect interval with this sharpness. The next one needs a second difference twice as large, which bounds
+    /// their number.
     #[cold]
     #[inline(never)]
     pub fn doubt(&mut self, sharpness: f64, doubt: SuspectInterval<N>) {
@@ -67,13 +69,13 @@ impl<const N: usize> ResolutionMonitor<N> {
     }
 }
 
-/// The largest component of a vector.
+/// The largest absolute component of a vector.
 pub(crate) fn size<const N: usize>(x: &SVector<f64, N>) -> f64 {
     max_abs_or_nan(x.iter().copied())
 }
 
-/// The sharpness of a turn within a time h, the square of a second difference of the velocity in units of the velocity, where it is beyond
-/// the sharpest so far; `None` where it is not, and where it moves the position q by no more than rounding.
+/// The sharpness of a change of the velocity within a time h: the square of its second difference, in units of the velocity.
+/// `None` where it does not exceed the sharpest so far, and where it changes the position q by no more than round-off.
 #[inline(always)]
 pub(crate) fn sharper<const N: usize>(
     [turn, velocity, q]: [&SVector<f64, N>; 3],
@@ -91,18 +93,20 @@ fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64,
     moves.then(|| turn.dot(turn) / velocity.dot(velocity))
 }
 
-/// What rounding may have changed of the value of L, from that of its terms and of its forces at a position: beside an equilibrium at which
-/// terms cancel a potential is a square of what is left, and its rounding one of the second order.
+/// A bound for the round-off of the value of L, from the round-off of its terms and of its forces at a position. The forces
+/// are included because near an equilibrium at which terms cancel, the potential is small of second order in the
+/// displacement.
 pub(crate) fn value_rounding<const N: usize>(of_terms: f64, of_force: &SVector<f64, N>, q: &SVector<f64, N>) -> f64 {
     of_terms + size(of_force) * size(q)
 }
 
-/// Whether velocities move by no more than rounding in a step of h.
+/// Whether the velocities change the position by no more than round-off in a step of length h.
 pub(crate) fn at_rest<const N: usize>(velocities: [&SVector<f64, N>; 4], h: f64, floor: f64) -> bool {
     max_abs_or_nan(velocities.into_iter().flatten().copied()) * h.abs() <= floor
 }
 
-/// The misfit of four velocities in sequence, steps of h apart, the last of them at the position q; `None` where it is at most one.
+/// The defect of four consecutive velocities, at steps of length h, the last of them at the position q; `None` where it is
+/// at most one.
 #[inline(always)]
 pub(crate) fn defect<const N: usize>(
     [first, second, third, fourth]: [&SVector<f64, N>; 4],
@@ -115,9 +119,11 @@ pub(crate) fn defect<const N: usize>(
     if now.dot(&before) < 0.0 { turning([&before, &now], [second, third, fourth], q, h, floor) } else { None }
 }
 
-/// The misfit of two second differences of opposite directions among three velocities. What moves q by less than a 256th of it is
-/// none: a motion that has come to rest keeps velocities of rounding alone, and where velocity and force vanish together the
-/// substeps of a long scheme turn by their own errors.
+/// The defect of two second differences of opposite directions among three velocities; `None` where it is at most one.
+///
+/// Differences that change q by less than 1/256 of its size are ignored: in a motion that has come to rest the velocities
+/// are round-off, and where velocity and force vanish together the substeps of a long scheme have such differences from
+/// their own errors.
 #[inline(never)]
 pub(crate) fn turning<const N: usize>(
     changes: [&SVector<f64, N>; 2],
@@ -131,11 +137,11 @@ pub(crate) fn turning<const N: usize>(
     (change > velocity && change * h.abs() > max_or_nan(LEAST * size(q), floor)).then(|| change / velocity)
 }
 
-/// See [`turning`]; the same for the difference of a step from two halves.
+/// The smallest relative change of position that counts in [`turning`], and in the comparison of a step with two half steps.
 pub(crate) const LEAST: f64 = 1.0 / 256.0;
 
-/// The misfit of a rational conformal factor, the exponential of a rate in the motion itself: above one where a step contracts or
-/// grows by more than three. `(1 + x)/(1 - x)`, which is three at `x = 1/2`, is then off by a tenth or more.
+/// The defect of a rational conformal factor, which approximates an exponential: it exceeds one where a step contracts or
+/// expands by more than a factor of three. At `x = 1/2`, where `(1 + x)/(1 - x) = 3`, its relative error is about a tenth.
 #[inline(always)]
 pub(crate) fn factor_defect(sigma: f64) -> Option<f64> {
     if (1.0 / 3.0..=3.0).contains(&sigma) { None } else { Some(sigma.ln().abs() / 3.0f64.ln()) }

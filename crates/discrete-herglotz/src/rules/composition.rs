@@ -10,14 +10,16 @@ use crate::{
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// A symmetric discrete Lagrangian of order 2, at work in a composition of higher order: `F_(g_s h) ... F_(g_1 h)`.
+/// A symmetric composition `F_(g_s h) ... F_(g_1 h)` of higher order of the flow of a symmetric discrete Lagrangian of
+/// order 2, with its current state.
 ///
-/// The substeps `g_i` of a [`SplittingScheme`] sum to 1 and cancel the errors of order 3 and more, so that a user's own rule
-/// is raised to any order of the table; Yoshida, Phys. Lett. A 150 (1990). Some substeps are negative: for a symmetric rule
-/// the step with `-h` is the inverse of that with `h`, which is its [`backward`](DiscreteLagrangian::backward).
+/// The substeps `g_i` of a [`SplittingScheme`] sum to 1 and satisfy the order conditions of the scheme, so that a rule of
+/// the user is raised to the order of the scheme; Yoshida, Phys. Lett. A 150 (1990). Some substeps are negative: for a
+/// symmetric rule the step with `-h` is the inverse of the step with `h`, which is
+/// [`backward`](DiscreteLagrangian::backward).
 ///
-/// The hypotheses are the order 2 and the symmetry `F_(-h) = F_h^(-1)`; nothing here can see whether a rule has them, and
-/// one that has not keeps its own order. Each substep is conformally contact, and `sigma_d` of the step their product.
+/// The hypotheses are order 2 and the symmetry `F_(-h) = F_h^(-1)`. They are not verified; without them the order of the
+/// scheme is not attained. Each substep is conformally contact, and `sigma_d` of the step is the product of the factors.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::DoublePendulum};
@@ -40,7 +42,7 @@ pub struct Composition<D, const N: usize> {
     sigma: f64,
     evaluations: u64,
     solver: Solver<N>,
-    /// The difference quotient of the last two mean velocities, and its last change over a substep.
+    /// The difference quotient of the last two mean velocities.
     acceleration: SVector<f64, N>,
     change: SVector<f64, N>,
     /// The state before the last step.
@@ -48,25 +50,26 @@ pub struct Composition<D, const N: usize> {
     watch: ResolutionMonitor<N>,
 }
 
-/// One substep: its rule by index, and the earlier of its two times after the step's start.
+/// One substep: the index of its rule, and the earlier of its two times, relative to the start of the step.
 #[derive(Clone, Copy, Debug)]
 struct Substep {
     rule: usize,
     start: f64,
     back: bool,
-    /// Its length, with the sign of what the middle of two mean velocities moves by.
+    /// Its length, with the sign of the time between the midpoints of consecutive differences of mean velocities.
     length: f64,
-    /// The time from the middle of the substep before to the middle of this one.
+    /// The time from the midpoint of the previous substep to the midpoint of this one.
     apart: f64,
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
-    /// A composition of the rules that `rule` makes for each length of a substep, from the state `(q, p, z)` at `t0`.
+    /// A composition of the discrete Lagrangians that `rule` returns for the lengths of the substeps, from the state
+    /// `(q, p, z)` at time `t0`.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Hypothesis`] for a scheme that is no composition;
-    /// [`InputError::Geometry`] where the time or the state is not finite, or the Lagrangian singular; [`InputError::Sigma`] and
-    /// [`InputError::FirstStep`] where the first substep cannot be taken; those of `rule`.
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Hypothesis`] for a Runge-Kutta-Nystrom scheme;
+    /// [`InputError::Geometry`] where the time or the state is not finite, or the Lagrangian singular;
+    /// [`InputError::Sigma`] and [`InputError::FirstStep`] where the first substep fails; those of `rule`.
     pub fn new(
         mut rule: impl FnMut(f64) -> Result<D, InputError>,
         scheme: &SplittingScheme,
@@ -85,13 +88,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             });
         };
         let (mut rules, mut substeps, mut time) = (Vec::new(), Vec::new(), 0.0);
-        // Symmetric: the last two middles are as far apart as the first two.
+        // By symmetry the last two midpoints are as far apart as the first two.
         let mut last_apart = match lengths[..] {
             [first, second, ..] => 0.5 * (first + second) * h,
             _ => h,
         };
         for (i, &g) in lengths.iter().enumerate() {
-            // The second half of the substeps mirrors the first, and shares its rules.
+            // The second half of the substeps mirrors the first and shares its rules.
             let index = i.min(lengths.len() - 1 - i);
             if index == i {
                 rules.push(rule(g.abs() * h)?);
@@ -99,7 +102,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             let before = if i == 0 { lengths[lengths.len() - 1] } else { lengths[i - 1] };
             let start = f64::min(time, time + g) * h;
             let apart = 0.5 * (before + g) * h;
-            // Forward or back, as the middle of the last two mean velocities moves.
+            // The sign is the direction in which the midpoint of the last two mean velocities moves.
             let length = (g * h).abs().copysign(apart + last_apart);
             last_apart = apart;
             substeps.push(Substep { rule: index, start, back: g < 0.0, length, apart });
@@ -131,7 +134,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         Ok(composition)
     }
 
-    /// One substep of the step that is at work.
+    /// One substep of the current step.
     fn substep(
         &mut self,
         substep: &Substep,
@@ -146,7 +149,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         }
     }
 
-    /// One step; the state changes only if each substep can be taken.
+    /// Takes one step; the state changes only if every substep succeeds.
     fn step(&mut self) -> Result<(), StepError> {
         let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
         let mut sharpest = self.watch.sharpest;
@@ -155,14 +158,14 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             let next = self.substep(&substep, &state, &velocity)?;
             sigma *= if substep.back { 1.0 / next.sigma } else { next.sigma };
             self.watch(&substep, &velocity, &next, &mut sharpest);
-            // Newton's method evaluates once for each iteration, and once where it ends.
+            // Newton's method evaluates once in each iteration and once at the solution.
             self.evaluations += u64::from(next.iterations) + 1;
             (state, velocity) = (next.end, next.velocity);
         }
         if sharpest > self.watch.sharpest
             && let Some(step) = self.taken.checked_sub(1)
         {
-            // What turns the first mean velocity may lie in the step before.
+            // The cause of a change of the first mean velocity may lie in the previous step.
             let t = self.t0 + step as f64 * self.h;
             self.watch.doubt(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
         }
@@ -174,8 +177,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
-    /// Looks whether a substep resolves the motion: by its rule's factor, and by the second differences of the mean velocities
-    /// along a time as long as the substep. The first step has nothing before it to compare with.
+    /// Checks whether a substep resolves the motion, by the conformal factor of its rule and by the second differences of
+    /// the mean velocities, scaled to the length of the substep. Differences are compared from the second step on.
     #[inline(always)]
     fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &DiscreteStep<N>, sharpest: &mut f64) {
         let now = &next.velocity;

@@ -1,4 +1,4 @@
-//! The discrete Hamiltonian flow at work on a motion.
+//! The discrete Hamiltonian flow with a current state.
 
 use crate::integration::problem::{check_time, start_of};
 use crate::numbers::state_words::{Saved, saved};
@@ -13,25 +13,25 @@ use contact_geom::{DiscretePoint, PhasePoint};
 /// One step of a [`Flow`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowStep<const N: usize> {
-    /// The number of steps taken, this one included: the state `to` is that of index `k`.
+    /// The number of steps taken, including this one: `to` is the state of index `k`.
     pub k: usize,
-    /// The time at the step's end, `t0 + k h`.
+    /// The time at the end of the step, `t0 + k h`.
     pub t: f64,
-    /// The state before.
+    /// The state at the start of the step.
     pub from: PhasePoint<N>,
-    /// The state after.
+    /// The state at the end of the step.
     pub to: PhasePoint<N>,
     /// The mean velocity `(q_k - q_{k-1}) / h`, to full precision.
     pub velocity: SVector<f64, N>,
-    /// `sigma_d` of the step: the factor by which it contracts the contact form, and every momentum of a symmetry.
+    /// `sigma_d` of the step, the factor by which it scales the contact form and the momentum of every symmetry.
     pub sigma: f64,
     /// Newton iterations taken.
     pub iterations: u32,
 }
 
-/// A discrete Hamiltonian flow with its current state: what a run of a rule advances.
+/// A discrete Hamiltonian flow with its current state `(q, p, z)`; the stepper of a run with a discrete Lagrangian.
 ///
-/// The state is `(q, p, z)`; there is a second door for those who start, as the paper does, from `(q0, q1, z0)`.
+/// [`from_points`](Self::from_points) is a second constructor, from `(q0, q1, z0)` as in the paper.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
@@ -47,7 +47,8 @@ pub struct Flow<D, const N: usize> {
     t0: f64,
     k: usize,
     state: PhasePoint<N>,
-    /// The mean velocities of the last steps, the latest first: the start of Newton's method is extrapolated from them.
+    /// The mean velocities of the last steps, the latest first; the initial guess of Newton's method is extrapolated from
+    /// them.
     velocities: [SVector<f64, N>; 3],
     solver: Solver<N>,
     /// `sigma_d` of the last step.
@@ -68,8 +69,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         Self::with_guess(ld, t0, state, SVector::zeros())
     }
 
-    /// Like [`new`](Self::new), with a guess of the velocity from which the first step is solved; needed where several
-    /// velocities have the same momentum.
+    /// Like [`new`](Self::new), with an initial guess of the velocity for the first step; needed where several velocities
+    /// have the same momentum.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -78,7 +79,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         state.check()?;
         let mut solver = Solver::default();
         let first = ld.forward(t0, &state, &guess, &mut solver);
-        // A singular Lagrangian is the reason of what goes wrong, where something does.
+        // Checked first, because a singular Lagrangian is the cause of a first step that fails.
         ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
         let first = first.map_err(InputError::first_step)?;
         let (velocities, watch) =
@@ -86,11 +87,11 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, watch })
     }
 
-    /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
+    /// A flow from two positions `q0, q1` and the action `z0`: the state at `t0` is `F-L_d (q0, q1, z0)`.
     ///
     /// # Errors
     /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
-    /// point; [`InputError::EqualPoints`] where that is because `q0 = q1`.
+    /// point; [`InputError::EqualPoints`] where it is not regular because `q0 = q1`.
     pub fn from_points(ld: D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
         check_time(t0)?;
         let state = start_of(&ld, t0, &x)?;
@@ -98,8 +99,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         Self::with_guess(ld, t0, state, velocity)
     }
 
-    /// The first step so far that cannot have resolved the motion, where one was seen: as fewer than six steps in a period of
-    /// the velocity, or a conformal factor beyond three.
+    /// The first step so far that was flagged as unresolved: for example with fewer than six steps per period of the
+    /// velocity, or a conformal factor outside of `[1/3, 3]`.
     pub fn unresolved(&self) -> Option<UnresolvedStep> {
         self.watch.first
     }
@@ -117,7 +118,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// Takes one step.
     ///
     /// # Errors
-    /// A [`StepError`]; the state is then the one before.
+    /// A [`StepError`]; the state is then unchanged.
     #[inline(always)]
     pub fn step(&mut self) -> Result<FlowStep<N>, StepError> {
         let t = self.time();
@@ -137,17 +138,17 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         if let Some(defect) = self.ld.defect(velocities, &next.end, next.sigma) {
             self.suspect(defect, velocities, &next);
         }
-        // The first velocity has none before it.
+        // The second difference is valid from the third step on.
         let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
         if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.watch.floor, self.watch.sharpest)
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
-            // What turns mean velocities lies in this step or the last.
+            // The cause of a change of the mean velocities lies in this step or the previous one.
             let doubt =
                 SuspectInterval { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
             self.watch.doubt(sharpness, doubt);
         }
-        // Before the first step velocities changed as they do in the second, for all that is known.
+        // After two steps, the velocity before the first is extrapolated linearly.
         self.velocities = match self.k {
             1 => [next.velocity; 3],
             2 => [next.velocity, latest, latest * 2.0 - next.velocity],
@@ -156,12 +157,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         self.before = self.state;
         self.state = next.end;
         self.sigma = next.sigma;
-        // A second jet an iteration, and the jet that makes the next momentum.
+        // One second jet per iteration, and the jet for the momentum at the end.
         self.evaluations += u64::from(next.iterations) + 1;
         Ok(step)
     }
 
-    /// Notes the misfit of a step. What is at rest turns by its rounding, and has a misfit by its factor alone.
+    /// Records the defect of a step. The velocities of a motion at rest are round-off, so that only the conformal factor
+    /// counts there.
     #[cold]
     #[inline(never)]
     fn suspect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {
@@ -172,7 +174,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         }
     }
 
-    /// Takes one step back by the inverse flow `F-L_d o (F+L_d)^-1`.
+    /// Takes one step backward, by the inverse flow `F-L_d o (F+L_d)^-1`.
     ///
     /// # Errors
     /// A [`StepError`]; the state is then unchanged.
@@ -244,7 +246,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
     }
 }
 
-/// What the steps or substeps of discrete Lagrangians compute.
+/// The work summary of the steps or substeps of discrete Lagrangians.
 pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
     let solved = if explicit {
         [

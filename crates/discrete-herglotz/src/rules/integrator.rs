@@ -8,15 +8,16 @@ use contact_geom::Lagrangian;
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
-/// What makes a discrete Lagrangian for each time step: a rule. Of a user's own, [`CustomMethod`] is one.
+/// A discretisation method: it constructs the discrete Lagrangian of a problem for a time step. [`CustomMethod`] makes one
+/// from a closure.
 pub trait DiscretizationMethod<'a, L, const N: usize> {
     /// The discrete Lagrangian.
     type DiscreteLagrangian: DiscreteLagrangian<N> + 'a;
 
-    /// What is known of its flow.
+    /// The properties of its flow.
     fn info(&self) -> MethodInfo;
 
-    /// Whether a Lagrangian meets its hypotheses. By default all do.
+    /// Checks the hypotheses of the method for a Lagrangian. By default every Lagrangian is accepted.
     ///
     /// # Errors
     /// Those of [`Integrator::check`].
@@ -24,14 +25,15 @@ pub trait DiscretizationMethod<'a, L, const N: usize> {
         Ok(())
     }
 
-    /// The discrete Lagrangian of the time step h, negative to go back.
+    /// The discrete Lagrangian for the time step h, which is negative for a run backward in time.
     ///
     /// # Errors
-    /// An [`InputError`] where there is none.
+    /// An [`InputError`] where the method cannot construct it.
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError>;
 }
 
-/// An integrator by its discretisation. (For all of them at once another crate could make a second implementation.)
+/// Implements [`Integrator`] for a discretisation method. (A blanket implementation would overlap with implementations in
+/// other crates.)
 macro_rules! integrates {
     (<$($parameter:ident: $bound:path),*> $rule:ty) => {
         impl<'a, L: Lagrangian<N> + 'a, $($parameter: $bound,)* const N: usize> Integrator<'a, L, N> for $rule
@@ -63,7 +65,8 @@ integrates!(<> Method);
 integrates!(<R: Rule> QuadratureMethod<R>);
 integrates!(<F: Sized> CustomMethod<F>);
 
-/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that names it compiles no other rule.
+/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that uses it compiles only
+/// this rule.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadratureMethod<R>(PhantomData<R>);
 
@@ -106,7 +109,8 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
     }
 }
 
-/// A user's own discrete Lagrangian as an integrator: what makes one for each time step, with a name and the order of its flow.
+/// A custom discrete Lagrangian as an integrator: a closure that constructs it for a time step, with a name and the order
+/// of its flow.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -127,12 +131,12 @@ pub struct CustomMethod<F> {
 }
 
 impl<F> CustomMethod<F> {
-    /// With a name, the order of its flow, and what makes it for a time step.
+    /// A method with a name, the order of its flow, and a closure that constructs the discrete Lagrangian for a time step.
     pub fn new(name: impl Into<Cow<'static, str>>, order: u32, make: F) -> Self {
         CustomMethod { name: name.into(), order, symmetric: false, make }
     }
 
-    /// The same, known to be its own adjoint.
+    /// The same method, declared to be symmetric (equal to its adjoint).
     pub fn symmetric(self) -> Self {
         CustomMethod { symmetric: true, ..self }
     }
@@ -154,7 +158,7 @@ where
     }
 }
 
-/// A symmetric [`Composition`] of a rule that is symmetric and of order 2, as an integrator.
+/// A symmetric [`Composition`] of a symmetric rule of order 2 as an integrator.
 #[derive(Clone, Copy, Debug)]
 pub struct CompositionMethod<D> {
     rule: D,
@@ -162,7 +166,7 @@ pub struct CompositionMethod<D> {
 }
 
 impl<D> CompositionMethod<D> {
-    /// The composition of this rule by the substeps of a scheme.
+    /// The composition of this rule with the substeps of a scheme.
     pub fn new(rule: D, scheme: SplittingScheme) -> Self {
         CompositionMethod { rule, scheme }
     }

@@ -1,4 +1,4 @@
-//! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
+//! The table of methods: their properties, and the discrete Lagrangian of a method chosen at run time.
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use crate::{
@@ -13,7 +13,7 @@ use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A method that makes a discrete Lagrangian from a Lagrangian and a time step.
+/// A method that constructs a discrete Lagrangian from a Lagrangian and a time step.
 ///
 /// ```
 /// use contact_geom::{Lagrangian, PhasePoint, systems::Pendulum};
@@ -28,14 +28,14 @@ use thiserror::Error;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
-/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::rules::Midpoint) and so on) saves
-/// the choice in every step.
+/// Where the method is known at compile time, its own type ([`Midpoint`](crate::rules::Midpoint) and so on) avoids the
+/// dispatch in every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Method {
     /// The rectangle rule, [`RectangleRule`].
     Rectangle,
-    /// The paper's midpoint rule, [`LeftMidpointRule`].
+    /// The midpoint rule of the paper, [`LeftMidpointRule`].
     LeftMidpoint,
     /// The symmetric midpoint rule, [`MidpointRule`].
     Midpoint,
@@ -45,13 +45,13 @@ pub enum Method {
     Strang,
 }
 
-/// Something done with every quadrature rule.
+/// A visitor of the quadrature rules; see [`Method::visit_rules`].
 pub trait RuleVisitor {
-    /// Does it with one rule, which is a method of this name.
+    /// Visits one rule, which is this method.
     fn visit<R: Rule>(&mut self, method: Method);
 }
 
-/// What is known of a method.
+/// The properties of a method.
 struct Known {
     name: &'static str,
     order: u32,
@@ -61,30 +61,29 @@ struct Known {
 }
 
 impl Known {
-    /// Those of a quadrature rule, read off its nodes.
+    /// The properties of a quadrature rule, derived from its nodes.
     fn of_rule<R: Rule>() -> Self {
         Known {
             name: R::NAME,
             order: R::ORDER,
             symmetric: R::is_symmetric(),
             implicit_in_z: R::NODES.iter().any(|node| node.action != 0.0),
-            // Rational in h gamma, whatever the nodes.
+            // The conformal factor is a rational function of h gamma for all nodes.
             exact_rate: false,
         }
     }
 }
 
 impl Method {
-    /// The quadrature rules, which take every regular Lagrangian.
+    /// The quadrature rules, which apply to every regular Lagrangian.
     pub const RULES: &'static [Method] =
         &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal];
 
-    /// Every method of this table. What holds for all of them is tested by walking this
-    /// table.
+    /// Every method of this table.
     pub const ALL: &'static [Method] =
         &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal, Method::Strang];
 
-    /// The methods of [`ALL`](Self::ALL) whose hypothesis a Lagrangian of this structure meets.
+    /// The methods of [`ALL`](Self::ALL) whose hypotheses a Lagrangian of this structure satisfies.
     pub fn applicable(structure: &Structure) -> impl Iterator<Item = Method> {
         Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
     }
@@ -119,25 +118,25 @@ impl Method {
         self.known().order
     }
 
-    /// Whether the method is its own adjoint: a step of the motion reversed in time leads back.
+    /// Whether the method is symmetric (equal to its adjoint): a step with `-h` is the inverse of the step with `h`.
     pub fn symmetric(self) -> bool {
         self.known().symmetric
     }
 
-    /// Whether the action at the end of a step is defined by an equation that contains it, where L depends on z;
-    /// otherwise it is an explicit function of `(q0, q1, z0)`.
+    /// Whether, for L that depends on z, the action at the end of a step is defined implicitly; otherwise it is an explicit
+    /// function of `(q0, q1, z0)`.
     pub fn implicit_in_z(self) -> bool {
         self.known().implicit_in_z
     }
 
-    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A
-    /// quadrature rule has a rational function of `h gamma` in its place, `1 + h gamma` where it is explicit in z.
+    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the exact flow. For a
+    /// quadrature rule it is a rational function of `h gamma`, `1 + h gamma` for a rule that is explicit in z.
     pub fn exact_rate(self) -> bool {
         self.known().exact_rate
     }
 
-    /// Whether the claims of this structure are all that the method needs. The quadrature rules take
-    /// every regular Lagrangian; the Strang splitting one that is separable, with a linear drag.
+    /// Checks that a Lagrangian of this structure satisfies the hypotheses of the method. The quadrature rules apply to
+    /// every regular Lagrangian; the Strang splitting requires a separable one with a linear drag.
     ///
     /// # Errors
     /// [`InputError::Unclaimed`] with the claim that is missing.
@@ -150,15 +149,16 @@ impl Method {
         }
     }
 
-    /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`. The form of
-    /// the Lagrangian is verified at a time and a state, and its constants are read there, by the methods that rest on it;
-    /// of the state they take position and action. Whether it is regular shows where a run starts, as at
+    /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`, which is
+    /// negative for steps backward in time.
+    ///
+    /// A method that requires a special form of the Lagrangian verifies it, and reads its constants, at the given time and
+    /// the position and action of the given state. Regularity is checked at the start of a run, as in
     /// [`Flow::new`](crate::rules::Flow::new).
     ///
     /// # Errors
-    /// [`InputError::Geometry`] where the time or the state is not finite, and those of the method's constructor:
-    /// [`InputError::Step`] unless `h` is finite and not 0; it is negative to go back in time, [`InputError::Dimension`] if `N = 0`, and those of
-    /// [`Strang::new`].
+    /// [`InputError::Geometry`] where the time or the state is not finite, [`InputError::Step`] unless `h` is finite and
+    /// not 0, [`InputError::Dimension`] if `N = 0`, and those of [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,
         lagrangian: L,
@@ -178,27 +178,27 @@ impl Method {
     }
 }
 
-/// The discrete Lagrangian that a [`Method`] chosen at run time makes from a Lagrangian.
+/// The discrete Lagrangian that a [`Method`] chosen at run time constructs from a Lagrangian.
 ///
-/// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
-/// for each method. [`Gauss`](crate::gauss::Gauss) is not among them: derivatives of its value, through the stages, would be
-/// compiled into every program that names this type.
+/// It is one type for all methods, so that code that is generic over discrete Lagrangians is compiled once for each
+/// Lagrangian instead of once for each method. [`Gauss`](crate::gauss::Gauss) is not included, because the derivatives of
+/// its value through the stages would be compiled into every program that uses this type.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum AnyDiscreteLagrangian<L, const N: usize> {
-    /// By the rectangle rule.
+    /// The rectangle rule.
     Rectangle(Rectangle<L>),
-    /// By the paper's midpoint rule.
+    /// The midpoint rule of the paper.
     LeftMidpoint(LeftMidpoint<L>),
-    /// By the symmetric midpoint rule.
+    /// The symmetric midpoint rule.
     Midpoint(Midpoint<L>),
-    /// By the symmetric trapezoidal rule.
+    /// The symmetric trapezoidal rule.
     Trapezoidal(Trapezoidal<L>),
-    /// By the Strang splitting.
+    /// The Strang splitting.
     Strang(Strang<L, N>),
 }
 
-/// The same expression for each method.
+/// Evaluates one expression for whichever method the value holds.
 macro_rules! each {
     ($self:ident, $ld:ident => $result:expr) => {
         match $self {
@@ -269,14 +269,14 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for AnyDiscreteLagr
     }
 }
 
-/// The [`name`](Method::name).
+/// Writes the [`name`](Method::name).
 impl Display for Method {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
 }
 
-/// From the [`name`](Method::name).
+/// Parses the [`name`](Method::name).
 impl FromStr for Method {
     type Err = UnknownMethod;
 
@@ -286,11 +286,11 @@ impl FromStr for Method {
     }
 }
 
-/// No method has this name.
+/// The error for a name that no method has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("there is no method {name:?}; the methods are {}", names())]
 pub struct UnknownMethod {
-    /// The name that was asked for.
+    /// The requested name.
     pub name: String,
 }
 

@@ -6,7 +6,7 @@ use crate::rules::{Node, Quadrature, Rule};
 /// `z1 = z0 + h L(t + h/2, (q0 + q1)/2, (q1 - q0)/h, (z0 + z1)/2)` with
 /// `sigma_d = (1 + h L_z/2)/(1 - h L_z/2)`.
 ///
-/// The midpoint rule of Vermeeren, Bravetti and Seri on `Q x Q x R^2`, solved for `z1`.
+/// It is the midpoint rule of Vermeeren, Bravetti and Seri on `Q x Q x R^2`, solved for `z1`.
 #[derive(Clone, Copy, Debug)]
 pub struct MidpointRule;
 

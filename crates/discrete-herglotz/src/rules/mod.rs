@@ -1,4 +1,4 @@
-//! Rules: discrete Lagrangians from Lagrangians, one file each for the quadratures of the action; their flow, and compositions of it.
+//! Rules: discrete Lagrangians from quadratures of the action (one file per rule), their flow, and compositions of it.
 
 mod composition;
 mod extended_path;

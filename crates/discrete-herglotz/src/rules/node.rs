@@ -8,6 +8,6 @@ pub struct Node {
     pub weight: f64,
     /// The fraction `a` of the step at which position and time are taken.
     pub place: f64,
-    /// The fraction `b` at which the action is taken; 0 at all nodes makes the rule explicit in z.
+    /// The fraction `b` at which the action is taken; a rule with 0 at all nodes is explicit in z.
     pub action: f64,
 }

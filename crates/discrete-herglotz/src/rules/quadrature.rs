@@ -1,4 +1,4 @@
-//! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
+//! Discrete Lagrangians by quadrature of the action: the common part of the rules of [`crate::rules`].
 
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::node::Node;
@@ -14,7 +14,7 @@ use contact_geom::{
 };
 use std::marker::PhantomData;
 
-/// The roundings of L's terms that a residual may hold: of a few nodes, and a few units each.
+/// The round-off allowed in a residual, in units of the round-off of the terms of L: a few nodes with a few units each.
 const ROUNDINGS: f64 = 64.0;
 
 /// A quadrature rule for the action of one step.
@@ -26,7 +26,7 @@ pub trait Rule: 'static {
     /// The nodes.
     const NODES: &'static [Node];
 
-    /// Whether it is its own adjoint: its nodes, mirrored in time, are the same.
+    /// Whether the rule is symmetric (equal to its adjoint): its nodes are invariant under reflection in time.
     fn is_symmetric() -> bool {
         let mirrored = |n: &Node| Node { weight: n.weight, place: 1.0 - n.place, action: 1.0 - n.action };
         Self::NODES.iter().all(|node| Self::NODES.contains(&mirrored(node)))
@@ -36,8 +36,8 @@ pub trait Rule: 'static {
 /// The discrete Lagrangian of a [`Rule`]: `L_d(q0, q1, z0) = z1 - z0`, where
 /// `z1 = z0 + S(q0, q1, z0, z1)` and `S = h sum_i w_i L(node i)`.
 ///
-/// `S` is a discrete Lagrangian on `Q x Q x R^2` in the sense of Vermeeren, Bravetti and Seri; solving for `z1` brings it
-/// back to `Q x Q x R`. With `S_1, S_2, S_z0, S_z1` its partial derivatives,
+/// `S` is a discrete Lagrangian on `Q x Q x R^2` in the sense of Vermeeren, Bravetti and Seri; solving for `z1` gives one
+/// on `Q x Q x R`. With the partial derivatives `S_1, S_2, S_z0, S_z1` of `S`,
 /// `sigma_d = (1 + S_z0)/(1 - S_z1)`, `p0 = -S_1/(1 + S_z0)` and `p1 = S_2/(1 - S_z1)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Quadrature<L, R> {
@@ -65,7 +65,8 @@ impl<L, R: Rule> Quadrature<L, R> {
     /// The rule applied to a Lagrangian with the time step `h`.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless `h` is finite and not 0; it is negative to go back in time, [`InputError::Dimension`] if `N = 0`.
+    /// [`InputError::Step`] unless `h` is finite and not 0 (it is negative for steps backward in time),
+    /// [`InputError::Dimension`] if `N = 0`.
     pub fn new<const N: usize>(lagrangian: L, h: f64) -> Result<Self, InputError>
     where
         L: Lagrangian<N>,
@@ -84,7 +85,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         &self.lagrangian
     }
 
-    /// Whether the rule, or its adjoint, is implicit in the action at the step's end.
+    /// Whether the rule, or its adjoint, is implicit in the action at the end of the step.
     const fn implicit(adjoint: bool) -> bool {
         let (mut i, mut implicit) = (0, false);
         while i < R::NODES.len() {
@@ -106,7 +107,7 @@ impl<L, R: Rule> Quadrature<L, R> {
             let (at, w) = (place(node, h, x, z1), h * node.weight);
             let (value, g) = self.value_and_gradient(t + node.place * h, &at);
             jet.value += w * value;
-            // The velocity moves by `1/h` of the positions' difference.
+            // The velocity is the difference of the positions divided by h.
             let slope = g.y * node.weight;
             jet.s1 += g.x * (w * (1.0 - node.place)) - slope;
             jet.s2 += g.x * (w * node.place) + slope;
@@ -116,14 +117,14 @@ impl<L, R: Rule> Quadrature<L, R> {
         jet
     }
 
-    /// The action `z1` at the end of the step, solved for over any scalar.
+    /// The action `z1` at the end of the step, by Newton's method over any scalar type.
     fn end_action<T: Scalar, const N: usize>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>
     where
         L: Lagrangian<N>,
     {
         let mut z1 = x.z0;
         let mut last = f64::INFINITY;
-        // After the value has converged, each further iteration makes one more order of differentials exact.
+        // After the value has converged, each further iteration makes the derivatives of one more order exact.
         let mut extra = 4;
         for _ in 0..crate::solve::newton::ITERATION_LIMIT {
             let unknown = Dual { re: z1, d: SVector::<T, 1>::new(T::one()) };
@@ -171,8 +172,8 @@ impl<L, R: Rule> Quadrature<L, R> {
     ///
     /// With left directions `l_i = (h (1-a) e_i, -e_i, h (1-b) p0_i)` at each node, the momentum equation is
     /// `r_i = p0_i + sum w dL[l_i] = 0`; its derivatives are `d2L[l_i, r_j]` along the right directions
-    /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested duals carry just these, in
-    /// blocks of directions.
+    /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested dual numbers carry only these
+    /// directions, in blocks.
     #[inline(always)]
     fn linearise<const N: usize, const ADJOINT: bool>(
         &self,
@@ -266,24 +267,25 @@ impl<L, R: Rule> Quadrature<L, R> {
             slope_1 += node.weight * node.action * rate;
         }
         let (q, sigma) = (from.q + u * h, 1.0 + h * slope_0);
-        // The difference of the two momentum equations, `p1 (1 - S_z1) - p0 (1 + S_z0) = h sum w L_q`, as a change of p0: it
-        // holds neither the rounding of u, nor that of `1 + S_z0`, which would be the same in all steps.
+        // The momentum is updated by the difference of the two momentum equations,
+        // `p1 (1 - S_z1) - p0 (1 + S_z0) = h sum w L_q`. This increment contains neither the round-off of u nor that of
+        // `1 + S_z0`, which would have the same sign in all steps.
         let change = (force + from.p * (slope_0 + slope_1)) * h;
         if !Self::implicit(ADJOINT) {
             let end = PhasePoint { q, p: from.p + change, z: from.z + h * value };
             return Ok(DiscreteStep { end, velocity: u, sigma, iterations: root.iterations });
         }
         let pivot = 1.0 - h * slope_1;
-        // One more Newton step for z1, free here, so that its last digits are those of this evaluation.
+        // One more Newton step for z1, at no extra cost, so that its last digits agree with this evaluation.
         let z = root.z + (from.z - root.z + h * value) / pivot;
-        // A quotient by the pivot, which is rounded alike in all steps, would stretch each change by the same part of its size.
+        // Dividing by the pivot directly would change each increment by the same relative round-off in all steps.
         let end = PhasePoint { q, p: from.p + (change + change * (h * slope_1 / pivot)), z };
         Ok(DiscreteStep { end, velocity: u, sigma: sigma / pivot, iterations: root.iterations })
     }
 }
 
 impl<L, R: Rule> Quadrature<L, R> {
-    /// A forward step, never inlined.
+    /// A forward step that is never inlined; see [`forward`](DiscreteLagrangian::forward) for the reason.
     #[inline(never)]
     fn step_apart<const N: usize>(
         &self,
@@ -299,8 +301,9 @@ impl<L, R: Rule> Quadrature<L, R> {
     }
 }
 
-/// What rounding within L may leave of the residual of a step of h, and of its action, at a point in its middle: forces that cancel beside an
-/// equilibrium are rounded like the terms that cancel, and so is the potential, of which they are the differential.
+/// Bounds for the round-off of L in the residual of a step of length h and in its action, at a point in the middle of the
+/// step. Near an equilibrium the terms of the force cancel, and its round-off is that of these terms; the same holds for the
+/// potential.
 #[cold]
 #[inline(never)]
 fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
@@ -314,13 +317,13 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
     [h.abs() * (max_abs(&once.x) + max_abs(p) * once.z) + max_abs(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
 }
 
-/// The node, or its mirror image for the adjoint rule.
+/// The node, or its reflection for the adjoint rule.
 #[inline(always)]
 fn directed<const ADJOINT: bool>(node: &Node) -> Node {
     if ADJOINT { Node { place: 1.0 - node.place, action: 1.0 - node.action, ..*node } } else { *node }
 }
 
-/// The point of TQ x R at which a node takes L.
+/// The point of TQ x R at which L is evaluated for a node.
 #[inline]
 fn place<T: Scalar, const N: usize>(node: &Node, h: f64, x: &DiscretePoint<N, T>, z1: T) -> VelocityPoint<N, T> {
     VelocityPoint {
@@ -339,14 +342,14 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         Ok(self.end_action(t, x)? - x.z0)
     }
 
-    /// Refuses a Lagrangian whose `W = L_vv` is singular: its motion obeys constraints, of which the rules know nothing. The
-    /// units of the coordinates do not count, so W is scaled by its rows.
+    /// Returns an error for a Lagrangian with singular `W = L_vv`: its motion is constrained, which the rules do not
+    /// handle. W is scaled by its rows, so that the result does not depend on the units of the coordinates.
     fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
         let w = self.lagrangian.mass_matrix(t, &VelocityPoint { q: from.q, v: *velocity, z: from.z });
         let rows: Vec<f64> =
             (0..N).map(|i| contact_geom::numbers::max_abs_or_nan((0..N).map(|j| w[(i, j)])).sqrt()).collect();
         let scaled = Regularity::of(DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (rows[i] * rows[j])));
-        // Not `condition() >= 1/eps`: that would let a NaN pass.
+        // The comparison is written so that a NaN fails it.
         if scaled.condition() < 1.0 / f64::EPSILON {
             return Ok(());
         }
@@ -363,7 +366,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         Some(R::ORDER)
     }
 
-    // A part of the second jet, which shares what it computes.
+    // Inlined into `second_jet`, so that both share their subexpressions.
     #[inline(always)]
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         if !Self::implicit(false) {
@@ -377,8 +380,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         Ok(DiscreteJet::new(s.value, s.s1 / pivot, s.s2 / pivot, (s.z0 + s.z1) / pivot))
     }
 
-    /// By the chain rule from the Hessian of L at the nodes, along the total directions of `(q0, q1, z0)`:
-    /// `z1` moves with them by `(D1, D2, sigma_d)`.
+    /// By the chain rule from the Hessian of L at the nodes, where `z1` depends on `(q0, q1, z0)` with the derivatives
+    /// `(D1, D2, sigma_d)`.
     #[inline(always)]
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let first = self.jet(t, x)?;
@@ -396,7 +399,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         for node in R::NODES {
             let (at, time, w) = (place(node, h, x, z1), t + node.place * h, h * node.weight);
             let l = self.lagrangian.hessian(time, &at);
-            // The positions move by these parts of `dq0` and `dq1`, the velocities by `1/h` of their difference.
+            // The derivatives of the position in `q0` and `q1`; those of the velocity are `-1/h` and `1/h`.
             let (start, end) = (1.0 - node.place, node.place);
             let (qq, qv, vv) = ([start * start * w, start * end * w, end * end * w], node.weight, node.weight / h);
             for j in 0..N {
@@ -416,7 +419,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
             jet.dzz += l.zz * (w * z * z);
             if node.action != 0.0 {
                 slope += w * node.action * self.lagrangian.gradient(time, &at).z;
-                // The action at the node moves with `q0` and `q1` by these covectors.
+                // The derivatives of the action at the node in `q0` and `q1`.
                 let (of_start, of_end) = (first.d1 * node.action, first.d2 * node.action);
                 let form =
                     |a: &SVector<f64, N>, of_a: &SVector<f64, N>, b: &SVector<f64, N>, of_b: &SVector<f64, N>| {
@@ -449,8 +452,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
     ) -> Result<DiscreteStep<N>, StepError> {
-        // Inlined into its loop a step of one unknown stays in registers (58 against 81 ns for the pendulum); with more
-        // unknowns it spills there, and is faster on its own (162 against 209 ns for the double pendulum).
+        // Inlined, a step with one unknown stays in registers (58 against 81 ns for the pendulum). With more unknowns it
+        // spills, and a separate function is faster (162 against 209 ns for the double pendulum).
         if N == 1 {
             self.step::<N, false>(t, self.h, from, guess, solver)?.checked()
         } else {
@@ -458,7 +461,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         }
     }
 
-    /// The forward step of the adjoint rule with `-h`: each node mirrored.
+    /// The forward step of the adjoint rule with `-h`: each node is reflected.
     fn backward(
         &self,
         t: f64,

@@ -1,4 +1,4 @@
-//! The step equations of a quadrature rule: L along just the directions that a Newton step needs.
+//! The step equations of a quadrature rule, with derivatives of L only along the directions that a Newton step needs.
 
 use crate::rules::node::Node;
 pub(crate) use crate::solve::mass_matrix::BLOCK;
@@ -6,7 +6,7 @@ use crate::solve::unknowns::Unknowns;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint, numbers::AugmentedVector};
 
-/// The sums over the nodes that the step equations consist of.
+/// The sums over the nodes in the step equations.
 pub(crate) struct Sums<const N: usize> {
     /// `sum w L`.
     pub value: f64,
@@ -20,7 +20,7 @@ pub(crate) struct Sums<const N: usize> {
     pub slope: AugmentedVector<N>,
 }
 
-/// One node with the point at which L is taken there.
+/// One node with the point at which L is evaluated.
 pub(crate) struct Frame<'a, const N: usize> {
     pub node: Node,
     pub h: f64,
@@ -30,7 +30,7 @@ pub(crate) struct Frame<'a, const N: usize> {
 }
 
 impl<const N: usize> Frame<'_, N> {
-    /// Adds the part of the sums with left directions from `left` on and right directions from `right` on.
+    /// Adds the part of the sums with one block of left directions from `left` and one of right directions from `right`.
     #[inline(always)]
     pub fn accumulate<U: Unknowns, const A: usize>(
         &self,
@@ -82,7 +82,7 @@ impl<const N: usize> Frame<'_, N> {
         }
     }
 
-    /// All blocks of a large system; never inlined, so that small systems do not pay for its stack.
+    /// All blocks of a large system; never inlined, so that small systems do not reserve its stack.
     #[inline(never)]
     pub fn by_blocks(&self, lagrangian: &impl Lagrangian<N>, unknowns: usize, sums: &mut Sums<N>) {
         for left in (0..N).step_by(BLOCK) {
@@ -93,7 +93,7 @@ impl<const N: usize> Frame<'_, N> {
     }
 }
 
-/// `L`, `L_q` and `L_z`: what the end of a step needs of a node.
+/// `L`, `L_q` and `L_z` at a node, as needed at the end of a step.
 #[inline(always)]
 pub(crate) fn rates_at<const N: usize>(
     lagrangian: &impl Lagrangian<N>,

@@ -6,7 +6,7 @@ use crate::rules::{Node, Quadrature, Rule};
 /// `z1 = z0 + h/2 L(t, q0, u, z0) + h/2 L(t + h, q1, u, z1)` and
 /// `sigma_d = (1 + h L_z(t, q0, u, z0)/2)/(1 - h L_z(t + h, q1, u, z1)/2)`.
 ///
-/// For `v^2/2 - V(q) + gamma z` the contact form of the Stoermer-Verlet method.
+/// For `v^2/2 - V(q) + gamma z` it is the contact version of the Stoermer-Verlet method.
 #[derive(Clone, Copy, Debug)]
 pub struct TrapezoidalRule;
 

@@ -12,7 +12,7 @@ use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use std::sync::Arc;
 
-/// A [`Problem`] with an integrator, steps and observers; a builder.
+/// The builder of a run: a [`Problem`] with an integrator, steps and observers.
 ///
 /// From these and the declared structure of the Lagrangian a [`Plan`] selects the least expensive route, and describes
 /// what will be computed and what is skipped. The declared structure is checked at sample points; a false claim is an
@@ -80,9 +80,10 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Run { length: Some(StepControl::For(wanted, accuracy::choose)), ..self }
     }
 
-    /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are those of `q_i /
-    /// scales_i`, and of `v_i / scales_i` relative to the largest such speed of the motion. The scales apply to
-    /// [`accuracy`](Self::accuracy) and to the [error estimate](Self::with_error_estimate).
+    /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are then those of the
+    /// scaled coordinates `q_i/scales_i`, and of the scaled velocities `v_i/scales_i` relative to the largest such
+    /// speed of the motion. The scales apply to [`accuracy`](Self::accuracy) and to the [error
+    /// estimate](Self::with_error_estimate).
     pub fn scales(self, scales: [f64; N]) -> Self {
         Run { scales: Some(scales.into()), ..self }
     }

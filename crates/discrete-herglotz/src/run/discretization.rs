@@ -135,7 +135,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         if self.info.in_transformed_time { usize::MAX } else { self.count }
     }
 
-    /// Whether the run has reached its end after so many steps, at a time.
+    /// Whether the run has reached its end after this number of steps, at this time.
     pub fn is_over(&self, taken: usize, t: f64) -> bool {
         let passed = if self.h < 0.0 { t <= self.t_end } else { t >= self.t_end };
         taken == self.most() || self.info.in_transformed_time && passed

@@ -124,7 +124,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         Ok(())
     }
 
-    /// What the run computes and what it skips, within the steps and otherwise.
+    /// The quantities that the run computes and skips, within its steps and otherwise.
     pub fn entries(&self) -> Vec<PlanEntry> {
         let (needs, structure) = (self.steps.needs, self.steps.problem.structure);
         let mut entries = self.work_summary.clone();

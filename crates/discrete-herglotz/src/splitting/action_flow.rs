@@ -1,14 +1,14 @@
-//! Flows of the action's own part, `f(z)`.
+//! Flows of `z' = f(z)`, the part of a splitting that acts on the action.
 
 use super::separable::{FALSE_CLAIM, without_symmetry};
 use crate::InputError;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
-/// The flow of `z' = f(z)`, `p' = f'(z) p`: the third part of a splitting where L is not affine in z.
+/// The flow of `z' = f(z)`, `p' = f'(z) p`: the third part of a splitting for L that is not affine in z.
 ///
-/// It moves the action by `z -> phi_s(z)` and the momentum by `p -> phi_s'(z) p`, which is conformally contact with the
-/// factor `phi_s'(z)`; the derivative comes by automatic differentiation.
+/// It maps the action by `z -> phi_s(z)` and the momentum by `p -> phi_s'(z) p`, which is conformally contact with the
+/// factor `phi_s'(z)`. The derivative is computed by automatic differentiation.
 ///
 /// ```
 /// use contact_geom::Scalar;
@@ -27,31 +27,31 @@ use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPo
 /// }
 /// ```
 pub trait ActionFlow {
-    /// The map `phi_s`, with what it needs of s computed once.
+    /// The map `phi_s`, with the quantities that depend only on s precomputed.
     type Map: ActionMap;
 
     /// The rate `f(z)`.
     fn rate<T: Scalar>(&self, z: T) -> T;
 
-    /// The map over a time s, of either sign.
+    /// The map `phi_s` for a time s of either sign.
     fn over(&self, s: f64) -> Self::Map;
 }
 
 /// The map `phi_s` of an [`ActionFlow`].
 pub trait ActionMap: Copy + std::fmt::Debug {
-    /// `phi_s(z)`; not a number where the flow is not defined up to s.
+    /// `phi_s(z)`; NaN where the flow is not defined up to the time s.
     fn apply<T: Scalar>(&self, z: T) -> T;
 
-    /// The change `phi_s(z) - z`. To be written without that difference where the flow is slow: the digits that it loses are
-    /// lost to the rate `phi_s'(z) - 1` of the momentum too, in the same direction in all steps.
+    /// The change `phi_s(z) - z`. An implementation should avoid the cancellation in this difference where the flow is slow,
+    /// because it affects the factor `phi_s'(z) - 1` of the momentum with the same sign in all steps.
     #[inline(always)]
     fn change<T: Scalar>(&self, z: T) -> T {
         self.apply(z) - z
     }
 }
 
-/// The flow of `f(z) = b z + c z^2`, a Riccati equation; a constant belongs to the potential. In closed form, with
-/// `d = (e^(b s) - 1)/b`: `phi_s(z) = e^(b s) z/(1 - c d z)`, as long as the denominator is positive.
+/// The flow of `f(z) = b z + c z^2`, a Riccati equation; a constant term belongs to the potential. In closed form, with
+/// `d = (e^(b s) - 1)/b`, it is `phi_s(z) = e^(b s) z/(1 - c d z)` as long as the denominator is positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Riccati {
     /// The linear rate.
@@ -101,7 +101,7 @@ impl ActionMap for RiccatiMap {
 }
 
 impl Riccati {
-    /// Reads b and c off a Lagrangian, and verifies that `L_z = b + 2 c z`.
+    /// Determines b and c from a Lagrangian and verifies that `L_z = b + 2 c z`.
     pub(super) fn of<const N: usize>(
         lagrangian: &impl Lagrangian<N>,
         t: f64,
@@ -115,14 +115,14 @@ impl Riccati {
     }
 }
 
-/// A value with its derivative.
+/// The value and the derivative of a map at z.
 #[inline(always)]
 pub(super) fn with_slope(map: impl Fn(Dual<f64, SVector<f64, 1>>) -> Dual<f64, SVector<f64, 1>>, z: f64) -> (f64, f64) {
     let image = map(Dual { re: z, d: SVector::<f64, 1>::new(1.0) });
     (image.re, image.d[0])
 }
 
-/// Refuses a flow that is not that of the Lagrangian's f.
+/// Returns an error unless the flow is that of the function f of the Lagrangian.
 pub(super) fn check_flow<const N: usize>(
     flow: &impl ActionFlow,
     lagrangian: &impl Lagrangian<N>,
@@ -138,7 +138,7 @@ pub(super) fn check_flow<const N: usize>(
     Ok(())
 }
 
-/// Whether `f'(z) = L_z` at the state's action and others.
+/// Whether `f'(z) = L_z` at the action of the state and at two others.
 fn is_rate_of<const N: usize>(
     flow: &impl ActionFlow,
     lagrangian: &impl Lagrangian<N>,
@@ -151,8 +151,8 @@ fn is_rate_of<const N: usize>(
     })
 }
 
-/// Whether the maps are the flow of the rate near an action: `phi_s' f = f o phi_s`, and `phi_s = z + s f` for small s, both
-/// signs, to the second order.
+/// Whether the maps are the flow of the rate near an action: `phi_s' f = f o phi_s`, and
+/// `phi_s - phi_(-s) = 2 s f` for small s up to higher order.
 pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
     beside(z).all(|z| {
         let (rate, slope) = with_slope(|z| flow.rate(z), z);
@@ -166,7 +166,7 @@ pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
     })
 }
 
-/// An action and some beside it.
+/// An action and one value on either side of it.
 fn beside(z: f64) -> impl Iterator<Item = f64> {
     [0.0, -0.1, 0.1].into_iter().enumerate().map(move |(i, d)| z + d * without_symmetry(i))
 }

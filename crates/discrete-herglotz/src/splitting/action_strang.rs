@@ -1,4 +1,4 @@
-//! The Strang splitting of a drag that is not linear, as a discrete Lagrangian.
+//! The Strang splitting for a nonlinear drag, as a discrete Lagrangian.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::separable::SeparableForm;
@@ -12,22 +12,23 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 ///
 /// `z0 + L_d = phi(phi(z0) + (q1 - q0).M(q1 - q0)/(2h) - h/2 V(t, q0) - h/2 V(t + h, q1))`.
 ///
-/// Symmetric and explicit; `sigma_d` is the product of the two factors `phi'`.
+/// It is symmetric and explicit; `sigma_d` is the product of the two factors `phi'`.
 #[derive(Clone, Debug)]
 pub struct ActionStrang<L, F: ActionFlow, const N: usize> {
     form: SeparableForm<L, N>,
     h: f64,
     forth: F::Map,
     back: F::Map,
-    /// The action at which the potential is read, and f there.
+    /// The action at which L is evaluated for the potential, and the value of f there.
     rest: (f64, f64),
 }
 
 impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
-    /// That of a Lagrangian whose f is a polynomial of degree two, read off and verified at a time and a state.
+    /// The splitting for a Lagrangian whose f is a polynomial of degree two, which is determined and verified at a time and
+    /// a state.
     ///
     /// # Errors
-    /// Those of [`ActionSplitting::new`](crate::splitting::ActionSplitting::new), but for the last.
+    /// Those of [`ActionSplitting::new`](crate::splitting::ActionSplitting::new) except [`InputError::FirstStep`].
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         let form = SeparableForm::read(lagrangian, h, t, state)?;
         let flow = Riccati::of(&form.lagrangian, t, state)?;
@@ -36,10 +37,11 @@ impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
 }
 
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
-    /// That of a Lagrangian with the flow of its f, verified at a time and a state.
+    /// The splitting for a Lagrangian with the given flow of its f, verified at a time and a state.
     ///
     /// # Errors
-    /// Those of [`ActionSplitting::with_flow`](crate::splitting::ActionSplitting::with_flow), but for the last.
+    /// Those of [`ActionSplitting::with_flow`](crate::splitting::ActionSplitting::with_flow) except
+    /// [`InputError::FirstStep`] and the one for a Runge-Kutta-Nystrom scheme.
     pub fn with_flow(lagrangian: L, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         Self::of(SeparableForm::read(lagrangian, h, t, state)?, flow, h, t, state)
     }
@@ -51,13 +53,14 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
         Ok(ActionStrang { form, h, forth, back, rest: (state.z, flow.rate(state.z)) })
     }
 
-    /// One step from `t`, forward with `h > 0` or back with `h < 0`; its factor is that of the map.
+    /// One step of length h, of either sign, from the time `t`, with the map over `h/2`. Returns the final state, the mean
+    /// velocity and the conformal factor.
     #[inline(always)]
     fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, map: &F::Map) -> (PhasePoint<N>, SVector<f64, N>, f64) {
         let (change, first) = with_slope(|z| map.change(z), from.z);
         let z = from.z + change;
         let (value, force) = self.form.kick(t, &from.q, self.rest.0);
-        // In one sum, as in a linear drag.
+        // Both changes are added in one sum, as for a linear drag.
         let p = from.p + (from.p * first + force * (0.5 * h));
         let v = self.form.velocity(&p);
         let q = from.q + v * h;

@@ -1,4 +1,4 @@
-//! A linear drag, and the flow of the kinetic part with it.
+//! A linear drag, and the flow of the kinetic part together with it.
 
 use super::separable::SeparableForm;
 use crate::InputError;
@@ -6,20 +6,20 @@ use crate::gauss::tables::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
-/// The nodes of the quadrature along a drift: its error is that of order 12, far below that of any scheme here.
+/// The number of nodes of the quadrature along a drift. Its order 12 is higher than that of every scheme here.
 const NODES: usize = 6;
 
 /// The rate `gamma(t) = L_z` of a linear drag.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Drag<const N: usize> {
-    /// The same at all times.
+    /// A constant rate.
     Constant(f64),
-    /// As L states it, read at a place where L is defined.
+    /// A rate that depends on time, evaluated at a position and an action at which L is defined.
     Timed { q: SVector<f64, N>, z: f64 },
 }
 
 impl<const N: usize> Drag<N> {
-    /// That of a separable Lagrangian.
+    /// The drag of a separable Lagrangian.
     pub(crate) fn of<L: Lagrangian<N>>(
         form: &SeparableForm<L, N>,
         t: f64,
@@ -41,7 +41,7 @@ impl<const N: usize> Drag<N> {
         }
     }
 
-    /// The drift over a time s, which may be negative, from the time t.
+    /// The drift over a time s of either sign, from the time t.
     #[inline(never)]
     pub(crate) fn drift(&self, lagrangian: &impl Lagrangian<N>, t: f64, s: f64) -> Drift {
         if let Drag::Constant(gamma) = self {
@@ -49,7 +49,7 @@ impl<const N: usize> Drag<N> {
             let length = if *gamma == 0.0 { s } else { damping / gamma };
             return Drift { length, damping, lift: 0.5 * (1.0 + damping) * length };
         }
-        // What ends a step that begins with a kick drifts not at all.
+        // A step that begins with a kick ends with an empty drift.
         if s == 0.0 {
             return Drift { length: 0.0, damping: 0.0, lift: 0.0 };
         }
@@ -67,15 +67,16 @@ impl<const N: usize> Drag<N> {
 }
 
 /// The flow of the kinetic part with the drag over a time s: with `g` the integral of gamma from the start,
-/// `q += length M^-1 p`, `p += damping p`, `z += damping z + lift p.M^-1 p`. A conformal contact map of rate `1 + damping`, so
-/// for any value of the two integrals.
+/// `q += length M^-1 p`, `p += damping p`, `z += damping z + lift p.M^-1 p`.
+///
+/// For any values of the two integrals it is a conformal contact map with the factor `1 + damping`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drift {
     /// The integral of `e^g`; for a constant gamma `(e^(gamma s) - 1)/gamma`.
     pub(crate) length: f64,
-    /// `e^g(s) - 1`: a momentum that is multiplied by `e^g` itself gathers the rounding of that factor.
+    /// `e^g(s) - 1`: multiplying the momentum by `e^g` itself would accumulate the round-off of that factor.
     pub(crate) damping: f64,
-    /// The action of `p.M^-1 p`: `e^g(s) length / 2`.
+    /// The coefficient of `p.M^-1 p` in the action, `e^g(s) length / 2`.
     pub(crate) lift: f64,
 }
 
@@ -86,7 +87,7 @@ mod tests {
     use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
     use std::cell::Cell;
 
-    /// `v^2/2 - q^2/2 + cos(t) z/10` with its derivatives in closed form, which counts what it is asked for.
+    /// `v^2/2 - q^2/2 + cos(t) z/10` with its derivatives in closed form; it counts their evaluations.
     #[derive(Default)]
     struct Counting {
         gradients: Cell<usize>,
@@ -113,7 +114,8 @@ mod tests {
         }
     }
 
-    /// A rate that depends on time is asked for alone: once a node of each drift, and of a step that ends without one not at all.
+    /// Steps evaluate a time-dependent rate without the gradient: once per node of each drift, and not for the empty drift at
+    /// the end of a step.
     #[test]
     fn a_rate_in_time_is_asked_for_alone() {
         let system = Counting::default();

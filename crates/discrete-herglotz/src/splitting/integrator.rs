@@ -7,7 +7,7 @@ use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 
-/// For `v.Mv/2 - V(t, q) + f(z)`; a Runge-Kutta-Nyström scheme for `f(z) = gamma z`.
+/// For Lagrangians `v.Mv/2 - V(t, q) + f(z)`; a Runge-Kutta-Nyström scheme requires `f(z) = gamma z`.
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingScheme {
     fn info(&self) -> MethodInfo {
         MethodInfo {
@@ -30,7 +30,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         if !structure.separable {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
-        // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
+        // The third flow, that of f(z), violates the hypothesis of Runge-Kutta-Nyström methods.
         if self.is_nystrom() && !structure.is_affine_in_z() {
             return Err(InputError::Unclaimed { claim: "z_affine" });
         }
@@ -48,7 +48,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
             return Ok(Box::new(if watched { splitting.doubting() } else { splitting }));
         }
-        // The problem has verified what its Lagrangian claims.
+        // The problem has already verified the claims of its Lagrangian.
         let form = SeparableForm::read_of(lagrangian, h, t0, &state, true)?;
         let splitting = Splitting::of(form, self, h, t0, state)?.compensated_where_tiny();
         let splitting = if watched { splitting.watched() } else { splitting };

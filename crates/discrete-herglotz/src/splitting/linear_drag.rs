@@ -1,4 +1,4 @@
-//! Splittings where the drag is linear.
+//! Splittings for a linear drag.
 
 use super::drag::{Drag, Drift};
 use super::motion::{CompensatedState, Reached, SplittingRun};
@@ -10,20 +10,21 @@ use crate::{
 };
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
+/// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + gamma(t) z`.
 ///
-/// The flow of the kinetic part with the drag, over a time s, is `q += (e^(gamma s) - 1)/gamma M^-1 p`,
-/// `p = e^(gamma s) p` for a constant gamma; that of `-V` is the kick `p += s L_q`; each is exact, with its action, and is a
-/// conformal contact map, of rate `e^(gamma s)` and 1. So every step has `sigma_d = e^(gamma h)`. The drag goes with the
-/// kinetic part because that keeps the hypothesis of Runge-Kutta-Nyström schemes. Time goes with it too: a kick takes V at
-/// the time of the drifts before it.
+/// For a constant gamma, the flow of the kinetic part with the drag over a time s is
+/// `q += (e^(gamma s) - 1)/gamma M^-1 p`, `p = e^(gamma s) p`; that of `-V` is the kick `p += s L_q`. Each flow is exact,
+/// including the action, and is a conformal contact map, with the factors `e^(gamma s)` and 1, so that every step has
+/// `sigma_d = e^(gamma h)`. The drag is combined with the kinetic part because this preserves the hypothesis of
+/// Runge-Kutta-Nyström schemes. Time advances with the drifts: a kick evaluates V at the time reached by the drifts before
+/// it.
 ///
-/// Where L does not claim that its rate is constant, the rate of a drift is `e^g`, where g is the integral of `L_z` over it,
-/// and both integrals are taken by a Gauss formula of order 12; `sigma_d` is the product of these rates.
+/// Where L does not claim that its rate is constant, the factor of a drift is `e^g` with the integral g of `L_z` over the
+/// drift. Both integrals are computed by a Gauss formula of order 12, and `sigma_d` is the product of these factors.
 ///
-/// Explicit, with [`stages`](SplittingScheme::stages) forces a step. The last kick of a step and the first of the next (or its
-/// drifts) are one: the motion is kept before it, and a state that is asked for is completed on a copy. So the numbers do not
-/// depend on what is observed, and on how many steps are taken at once.
+/// The steps are explicit, with [`stages`](SplittingScheme::stages) force evaluations each. The last kick (or drift) of a
+/// step and the first of the next are combined: the motion is stored before that kick, and the state is completed on a copy.
+/// The results therefore do not depend on what is observed nor on how many steps are taken at once.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
@@ -46,25 +47,25 @@ pub struct Splitting<'a, L, const N: usize> {
     watched: bool,
 }
 
-/// The stages of a step, in the lengths of this step and this drag.
+/// The stages of a step, scaled to the length of the step and with the drifts for the drag.
 #[derive(Clone, Debug)]
 pub(crate) struct SubstepTable {
-    /// Those of the first step.
+    /// The stages of the first step.
     pub(crate) first: Vec<Stage>,
-    /// Those of a later one: its first kick, or its first drift, is one with the last of the step before.
+    /// The stages of a later step: the first kick or drift includes the last one of the previous step.
     pub(crate) joined: Vec<Stage>,
-    /// What completes a step: the last kick, and the last drift of a scheme that begins with one.
+    /// The end of a step: the last kick, and the last drift of a scheme that begins with a drift.
     pub(crate) closing: Stage,
 }
 
-/// A kick, with the force that the motion holds, and the drift that follows; there the force is taken anew.
+/// A kick with the stored force, followed by a drift, after which the force is evaluated again.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stage {
     pub(crate) kick: f64,
     pub(crate) drift: Drift,
-    /// The length of the drift in time.
+    /// The duration of the drift.
     pub(crate) span: f64,
-    /// The time of its end after the step's start.
+    /// The time of the end of the drift, relative to the start of the step.
     pub(crate) time: f64,
 }
 
@@ -85,7 +86,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         Self::of(SeparableForm::read(lagrangian, h, t0, &state)?, scheme, h, t0, state)
     }
 
-    /// The same of a form that was read.
+    /// The same for a separable form that has already been read.
     pub(crate) fn of(
         form: SeparableForm<&'a L, N>,
         scheme: &SplittingScheme,
@@ -101,32 +102,35 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         Ok(Splitting { form, drag, table, progress, action: true, compensated: false, watched: false })
     }
 
-    /// Without the action: z stays what it is at the start, and costs nothing.
+    /// The same without the action: z keeps its initial value and is not computed.
     pub fn without_action(self) -> Self {
         Splitting { action: false, ..self }
     }
 
-    /// With compensated sums (Kahan's): the rounding of each step is carried to the next, so that it no longer grows with
-    /// the number of steps. Worth its cost, about a tenth of the pendulum's time, on long runs near round-off.
+    /// The same with compensated summation (Kahan): the round-off of each step is carried to the next, so that it does not
+    /// grow with the number of steps. It adds about 10% to the time for the pendulum, and pays off in long runs with errors
+    /// near round-off.
     pub fn compensated(self) -> Self {
         Splitting { compensated: true, ..self }
     }
 
-    /// With compensated sums where the steps from the start are tiny.
+    /// The same with compensated summation if the first steps change the state by very little.
     pub(crate) fn compensated_where_tiny(self) -> Self {
         let SplittingRun { h, state, motion, .. } = &self.progress;
         if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
     }
 
-    /// With a look at each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved). It costs a sixth of the
-    /// time of a Kepler orbit, a third of a pendulum's and up to twice an oscillator's more, so it is for motions that are not known.
+    /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved). The
+    /// check adds a sixth to the time of a Kepler orbit, a third to that of a pendulum and up to twice the time of an
+    /// oscillator; it is intended for motions that are not known in advance.
     pub fn watched(self) -> Self {
         Splitting { watched: true, ..self }
     }
 }
 
 impl SubstepTable {
-    /// Of a drag that depends on time the drifts are those from `t0`; each step makes its own.
+    /// The stages of a scheme for steps of length h. For a time-dependent drag the drifts stored here are those from `t0`,
+    /// and each step computes its own.
     pub(crate) fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
@@ -139,7 +143,7 @@ impl SubstepTable {
                 stage(kicks[i], drifts[i], time * h)
             })
             .collect();
-        // Only a scheme that begins with a drift ends with one.
+        // A scheme ends with a drift if and only if it begins with one.
         let (last_kick, last_drift) = (kicks[stages], drifts.get(stages).copied().unwrap_or(0.0));
         let mut joined = first.clone();
         joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], first[0].time);
@@ -204,7 +208,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 }
 
-/// What a step consists of.
+/// The maps that a step consists of.
 struct StepMaps<'s, 'a, L, const N: usize> {
     form: &'s SeparableForm<&'a L, N>,
     drag: &'s Drag<N>,
@@ -234,7 +238,7 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         }
     }
 
-    /// The motion after some steps more, and the state that it then stands for.
+    /// The motion after this number of further steps, and its completed state.
     #[inline(never)]
     fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const WATCHED: bool>(
         &self,
@@ -266,7 +270,8 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         Reached { motion: m, state: end.state(), seen }
     }
 
-    /// `sigma_d` of the step from the time t. Found where it is asked for: of a drag in time it costs as much as the drifts.
+    /// `sigma_d` of the step from the time t. It is computed on request, since for a time-dependent drag it costs as much as
+    /// the drifts.
     fn sigma(&self, t: f64, h: f64) -> f64 {
         if let Drag::Constant(gamma) = self.drag {
             return (gamma * h).exp();
@@ -275,7 +280,8 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         stages.map(|stage| 1.0 + self.drift_of::<true>(t, stage).damping).product()
     }
 
-    /// The drift of a stage of the step from the time t. A look at the drag in each stage would cost a fifth of a Strang step.
+    /// The drift of a stage of the step from the time t. `TIMED` is a constant, because a branch on the drag in each stage
+    /// would cost a fifth of a Strang step.
     #[inline(always)]
     fn drift_of<const TIMED: bool>(&self, t: f64, stage: &Stage) -> Drift {
         if TIMED {
@@ -300,7 +306,7 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
             m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
         }
         m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
-        // What rounding takes from the drag is the same function of p in all steps, and piles up; it is carried on.
+        // Always compensated: the round-off of the drag is the same function of p in all steps and would accumulate.
         m.p.add::<true>(|_, p| drift.damping * p);
     }
 }

@@ -1,4 +1,4 @@
-//! Splittings of contact flows, with exact rate.
+//! Splittings of contact flows, with the exact conformal factor for a linear drag.
 
 mod action_flow;
 mod action_strang;
@@ -20,7 +20,7 @@ pub use strang::Strang;
 
 use crate::PlanEntry;
 
-/// What the steps of splittings compute, with what is said of the action.
+/// The work summary of the steps of a splitting, with the given entry for the action.
 fn work_summary(action: PlanEntry) -> Vec<PlanEntry> {
     vec![
         PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),

@@ -1,4 +1,4 @@
-//! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
+//! The common part of the splittings: compensated sums, a state of them, and a run in chunks of steps.
 
 use crate::numbers::state_words::saved;
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
@@ -6,7 +6,7 @@ use crate::{StepError, StepFailure, integration::SuspectInterval};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, PhasePoint, numbers::max_or_nan};
 
-/// A vector that many small changes are added to, with what rounding has taken from the compensated ones so far.
+/// A vector to which many small changes are added, with the round-off carried by compensated summation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CompensatedVector<const N: usize> {
     pub(super) value: SVector<f64, N>,
@@ -18,7 +18,7 @@ impl<const N: usize> CompensatedVector<N> {
         CompensatedVector { value, carry: SVector::zeros() }
     }
 
-    /// Adds `change(i, value_i)` to each component; compensated by Kahan's sum.
+    /// Adds `change(i, value_i)` to each component, by Kahan's compensated summation if `COMPENSATED`.
     #[inline(always)]
     pub(super) fn add<const COMPENSATED: bool>(&mut self, change: impl Fn(usize, f64) -> f64) {
         for i in 0..N {
@@ -34,7 +34,7 @@ impl<const N: usize> CompensatedVector<N> {
     }
 }
 
-/// Where a run goes on from, with the value and the derivative of the next kick: those at the last position.
+/// The stored state of a run, with the value and the force of the next kick, evaluated at the last position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CompensatedState<const N: usize> {
     pub(super) q: CompensatedVector<N>,
@@ -42,7 +42,7 @@ pub(super) struct CompensatedState<const N: usize> {
     pub(super) z: CompensatedVector<1>,
     pub(super) force: SVector<f64, N>,
     pub(super) value: f64,
-    /// What the last drift changed of the force, times its length: the second difference of the momentum.
+    /// The change of the force over the last drift, times its length: a second difference of the momentum.
     change: SVector<f64, N>,
     /// `sigma_d` of the last step.
     pub(super) sigma: f64,
@@ -66,7 +66,7 @@ impl<const N: usize> CompensatedState<N> {
         PhasePoint { q: self.q.value, p: self.p.value, z: self.z.value[0] }
     }
 
-    /// The flow of `-V` over a time s, with the force that the motion holds.
+    /// The flow of `-V` over a time s, with the stored force.
     #[inline(always)]
     pub(super) fn kick<const ACTION: bool, const COMPENSATED: bool>(&mut self, s: f64) {
         let (value, force) = (self.value, self.force);
@@ -76,8 +76,8 @@ impl<const N: usize> CompensatedState<N> {
         self.p.add::<COMPENSATED>(|i, _| s * force[i]);
     }
 
-    /// Looks at a drift over the time s, between the momentum and the force before it and those that the motion holds, as a
-    /// [`ResolutionMonitor`] does at steps as long as the drift.
+    /// Checks the drift over the time s that starts with the given momentum and force and ends with the stored ones, by the
+    /// measures of a [`ResolutionMonitor`] for steps as long as the drift.
     #[inline(always)]
     pub(super) fn look<const DOUBTS: bool>(
         &mut self,
@@ -100,38 +100,38 @@ impl<const N: usize> CompensatedState<N> {
     }
 }
 
-/// What looks at drifts have seen.
+/// The results of the checks of drifts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DriftLooks {
-    /// The largest misfit; 0 where none is above one.
+    /// The largest defect; 0 if none exceeds one.
     defect: f64,
-    /// The sharpness of the sharpest turn, or what none is beyond.
+    /// The largest sharpness so far, or the threshold if none exceeds it.
     sharpest: f64,
-    /// What is moved at most by rounding.
+    /// Changes of position below this are round-off.
     floor: f64,
 }
 
-/// Where some steps lead.
+/// The result of some steps.
 pub(super) struct Reached<const N: usize> {
     pub(super) motion: CompensatedState<N>,
-    /// The state that the motion stands for.
+    /// The completed state of the motion.
     pub(super) state: PhasePoint<N>,
     pub(super) seen: DriftLooks,
 }
 
-/// The steps between two looks whether the motion is finite.
+/// The number of steps between two checks that the motion is finite.
 const CHUNK: usize = 256;
 
-/// How far a run has come.
+/// The progress of a run.
 #[derive(Clone, Debug)]
 pub(super) struct SplittingRun<const N: usize> {
     pub(super) h: f64,
     pub(super) t0: f64,
     pub(super) taken: usize,
-    /// The forces of a step.
+    /// The number of force evaluations per step.
     pub(super) forces: usize,
     pub(super) motion: CompensatedState<N>,
-    /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
+    /// The state after the steps taken: the motion, completed by the part of the last step that is combined with the next.
     pub(super) state: PhasePoint<N>,
     pub(super) watch: ResolutionMonitor<N>,
 }
@@ -142,25 +142,25 @@ impl<const N: usize> SplittingRun<N> {
         SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, watch }
     }
 
-    /// The time after so many steps more.
+    /// The time after this number of further steps.
     #[inline(always)]
     pub(super) fn time_after(&self, steps: usize) -> f64 {
         self.t0 + (self.taken + steps) as f64 * self.h
     }
 
-    /// The forces evaluated so far: those of the steps, and the first.
+    /// The number of force evaluations so far: those of the steps and the first one.
     pub(super) fn evaluations(&self) -> u64 {
         (self.taken * self.forces) as u64 + 1
     }
 
-    /// Nothing, so far.
+    /// The initial value of the check results for the next steps.
     #[inline(always)]
     pub(super) fn seen(&self) -> DriftLooks {
         DriftLooks { defect: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
     }
 
-    /// Takes steps in chunks; one that ends with what is not finite step by step up to the last that is, and one with the first
-    /// misfit, or with a doubt, step by step up to that.
+    /// Takes steps in chunks. A chunk that ends with a non-finite value, or that contains the first unresolved step or a new
+    /// suspect interval, is repeated step by step in order to locate it.
     pub(super) fn advance(
         &mut self,
         steps: usize,
@@ -170,7 +170,7 @@ impl<const N: usize> SplittingRun<N> {
         while taken < steps {
             let chunk = longest.min(steps - taken);
             let Reached { motion, state, seen: DriftLooks { defect, sharpest, .. } } = after(self, chunk);
-            // What is not finite in the motion is not finite in its state, or in the next.
+            // A non-finite value in the motion makes this state or the next one non-finite.
             let finite = ChartVector::from(state).is_finite() && motion.sigma.is_finite();
             let defect = (defect > 0.0 && self.watch.first.is_none()).then_some(defect);
             let sharper = sharpest > self.watch.sharpest;

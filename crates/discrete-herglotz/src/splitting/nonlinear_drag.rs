@@ -1,4 +1,4 @@
-//! Splittings where the drag is not linear in the action.
+//! Splittings for a drag that is nonlinear in the action.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{CompensatedState, Reached, SplittingRun};
@@ -10,12 +10,12 @@ use crate::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// A splitting at work on `L = v.Mv/2 - V(t, q) + f(z)`, in three exact flows: the kinetic part `A`, the kick `B` of `-V`, and
-/// the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half its length; steps are
-/// compositions of it.
+/// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + f(z)`, with three exact flows: the kinetic part `A`, the
+/// kick `B` of `-V`, and the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half
+/// its length; steps are compositions of it.
 ///
-/// `sigma_d` is the product of the factors `phi'(z)` of C, exact for the step taken. The action is always computed: it drives
-/// the momentum. One force a substep; the C of two substeps is one.
+/// `sigma_d` is the product of the factors `phi'(z)` of C, exact for the step taken. The action is always computed, since it
+/// acts on the momentum. A substep has one force evaluation, and consecutive flows C of two substeps are combined.
 #[derive(Clone, Debug)]
 pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
     form: SeparableForm<&'a L, N>,
@@ -29,9 +29,9 @@ pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
 #[derive(Clone, Debug)]
 struct DragTable<C> {
     stages: Vec<ActionStage<C>>,
-    /// The map that ends a step.
+    /// The last map of a step.
     closing: C,
-    /// The action at which the potential is read, and f there.
+    /// The action at which L is evaluated for the potential, and the value of f there.
     rest: (f64, f64),
 }
 
@@ -41,15 +41,15 @@ struct ActionStage<C> {
     action: C,
     half: f64,
     length: f64,
-    /// The time of the second kick after the step's start.
+    /// The time of the second kick, relative to the start of the step.
     time: f64,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> ActionSplitting<'a, L, Riccati, N> {
-    /// A splitting from the state `(q, p, z)` at time `t0`, where f is a polynomial of degree two, read off L.
+    /// A splitting from the state `(q, p, z)` at time `t0`, where f is a polynomial of degree two, determined from L.
     ///
     /// # Errors
-    /// Those of [`with_flow`](Self::with_flow); [`InputError::Hypothesis`] also where f is no such polynomial.
+    /// Those of [`with_flow`](Self::with_flow); [`InputError::Hypothesis`] also where f is not such a polynomial.
     pub fn new(
         lagrangian: &'a L,
         scheme: &SplittingScheme,
@@ -63,7 +63,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> ActionSplitting<'a, L, Riccati, N> {
 }
 
 impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L, F, N> {
-    /// A splitting from the state `(q, p, z)` at time `t0`, with the flow of f.
+    /// A splitting from the state `(q, p, z)` at time `t0`, with the given flow of f.
     ///
     /// # Errors
     /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
@@ -101,18 +101,19 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
-    /// With compensated sums (Kahan's), as [`Splitting::compensated`](crate::splitting::Splitting::compensated).
+    /// The same with compensated summation (Kahan), as in
+    /// [`Splitting::compensated`](crate::splitting::Splitting::compensated).
     pub fn compensated(self) -> Self {
         ActionSplitting { compensated: true, ..self }
     }
 
-    /// With compensated sums where the steps from the start are tiny.
+    /// The same with compensated summation if the first steps change the state by very little.
     pub(crate) fn compensated_where_tiny(self) -> Self {
         let SplittingRun { h, state, motion, .. } = &self.progress;
         if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
     }
 
-    /// With doubts, for a run that looks at them: they cost a tenth of its time.
+    /// The same with the detection of suspect intervals, which takes a tenth of the time.
     pub(crate) fn doubting(self) -> Self {
         ActionSplitting { doubting: true, ..self }
     }
@@ -168,7 +169,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 }
 
-/// The motion after some steps more, and its state.
+/// The motion after this number of further steps, and its state.
 #[inline(never)]
 fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
     form: &SeparableForm<&L, N>,
@@ -199,12 +200,12 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, 
     Reached { motion: m, state: m.state(), seen }
 }
 
-/// The flow of f, and its factor.
+/// Applies a map of the flow of f, and multiplies `sigma` by its factor.
 #[inline(always)]
 fn apply<C: ActionMap, const N: usize, const COMPENSATED: bool>(m: &mut CompensatedState<N>, map: &C) {
     let (change, rate) = with_slope(|z| map.change(z), m.z.value[0]);
     m.z.add::<COMPENSATED>(|_, _| change);
-    // Carried on as in a linear drag.
+    // Always compensated, as for a linear drag.
     m.p.add::<true>(|_, p| rate * p);
     m.sigma *= 1.0 + rate;
 }

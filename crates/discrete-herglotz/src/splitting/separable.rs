@@ -1,4 +1,4 @@
-//! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
+//! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
 use crate::integration::check_claims::PROBE;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
@@ -6,25 +6,26 @@ use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
-/// What is left of a false claim's derivative by the rounding of a true one, with some margin.
+/// The bound on a quantity that vanishes if a hypothesis holds: the round-off for a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
-/// A separable Lagrangian with its mass matrix, read once.
+/// A separable Lagrangian with its mass matrix, evaluated once.
 #[derive(Clone, Debug)]
 pub(crate) struct SeparableForm<L, const N: usize> {
     pub(crate) lagrangian: L,
     mass: Box<SMatrix<f64, N, N>>,
-    /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
+    /// The inverse mass matrix; `None` for the identity, whose product would take a third of a step of the oscillator.
     pub(crate) inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
-    /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
+    /// Evaluates M, and verifies the claims of the Lagrangian at a state and at a point near it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
-    /// The same of a Lagrangian whose claims may be known to hold: probes cost as much as a hundred steps.
+    /// The same for a Lagrangian whose claims may already be verified (`check_claims`); the probes, which are skipped then,
+    /// cost as much as a hundred steps.
     pub(crate) fn read_of(
         lagrangian: L,
         h: f64,
@@ -45,7 +46,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
         for x in probes(state).into_iter().filter(|_| !check_claims) {
-            // A state beside the given one may be outside of the domain.
+            // The point near the given state may lie outside of the domain of L.
             let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
             if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
                 return Err(InputError::FalseClaim { claim, size });
@@ -61,13 +62,13 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         Ok(SeparableForm { lagrangian, mass, inverse })
     }
 
-    /// Verifies, at some times, that `L_z` does not depend on time.
+    /// Verifies at three times that `L_z` does not depend on time.
     pub(crate) fn check_steady_drag(&self, t: f64, state: &PhasePoint<N>) -> Result<(), InputError> {
         let structure = self.lagrangian.structure();
         if structure.autonomous || structure.has_constant_rate() {
             return Ok(());
         }
-        // It is known of one that is proved.
+        // Structure that is proved is complete: a drag that does not depend on time would be claimed.
         if const { L::HINTS.proved } {
             return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
         }
@@ -86,21 +87,20 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         Ok(())
     }
 
-    /// `L(t, q, 0, z)`, which is `-V` up to `f(z)`, and `L_q`. Duals carry the directions of `q` alone, so that the
-    /// compiler drops what velocity and action would add.
+    /// `L(t, q, 0, z) = -V + f(z)`, and `L_q`. Only the derivatives in `q` are carried.
     #[inline(always)]
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
         self.lagrangian.with_force(t, &rest)
     }
 
-    /// `L_q` alone, for what does not ask for the action.
+    /// `L_q` alone, for steps without the action.
     #[inline(always)]
     pub(crate) fn force(&self, t: f64, q: &SVector<f64, N>, z: f64) -> SVector<f64, N> {
         self.lagrangian.force(t, &VelocityPoint { q: *q, v: SVector::zeros(), z })
     }
 
-    /// The kick at a start.
+    /// The value and the force of the kick at an initial state.
     ///
     /// # Errors
     /// [`InputError::FirstStep`] where it is not finite.
@@ -110,12 +110,12 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if finite { Ok((value, force)) } else { Err(InputError::FirstStep(StepError::NonFinite)) }
     }
 
-    /// Whether steps of this length from a state under this force move a position, or kick a momentum, by so little that half of its digits
-    /// are lost in each: they change so little from step to step that they are rounded in the same way, and the error piles up.
+    /// Whether steps of this length from a state with this force change a position or a momentum by less than half of its
+    /// digits. Such changes vary so little from step to step that their round-off has the same sign and accumulates.
     pub(crate) fn has_tiny_steps(&self, h: f64, state: &PhasePoint<N>, force: &SVector<f64, N>) -> bool {
         let (v, a) = (self.velocity(&state.p), self.velocity(force));
         let is_tiny = |change: f64, number: f64| change < f64::EPSILON.sqrt() * number.abs();
-        // A momentum without force stays, unless the force begins later.
+        // A momentum without force is constant, unless a time-dependent force sets in later.
         let kicks = |i: usize| force[i] != 0.0 || !self.lagrangian.structure().autonomous;
         (0..N).any(|i| {
             let moved = h.abs() * (v[i].abs() + h.abs() * a[i].abs());
@@ -152,7 +152,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     }
 }
 
-/// The state's position, and one beside it where the state's own may be special; with generic velocities.
+/// The position of the state, and one near it in case that of the state is special; with generic velocities.
 fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
     let v = SVector::from_fn(|i, _| without_symmetry(i));
     let beside =
@@ -160,7 +160,7 @@ fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
     [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
 }
 
-/// Numbers between 0.3 and 1.3 without special relation.
+/// Generic numbers between 0.3 and 1.3.
 pub(super) fn without_symmetry(i: usize) -> f64 {
     0.3 + (((i + 1) * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract()
 }
@@ -171,7 +171,7 @@ mod tests {
     use contact_geom::nalgebra::SVector;
     use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 
-    /// `v.v/2 + c f(t) q0 - b q1^2/2`: the first coordinate is pushed by next to nothing, from the start on or later.
+    /// `v.v/2 + c f(t) q0 - b q1^2/2` with `f = 1` or `f = t`: a very small force acts on the first coordinate.
     struct Whisper {
         force: f64,
         later: bool,
@@ -196,7 +196,8 @@ mod tests {
         }
     }
 
-    /// From rest too, beside what moves much, and where it is the momentum that is kicked by little: alone and in lanes.
+    /// A very small force accumulates correctly: from rest, next to a coordinate with large motion, and for a momentum with
+    /// small kicks; in single runs and in lanes.
     #[test]
     fn a_force_of_next_to_nothing_adds_up() {
         let (h, count) = (1e-3, 2000_u32);
@@ -206,7 +207,7 @@ mod tests {
             .flat_map(|v| [false, true].into_iter().flat_map(move |later| [0.0, 1.0].map(|spring| (v, later, spring))))
         {
             let system = Whisper { force: 1e-13, later, spring };
-            // What the force has added to position and momentum; of one that is t, t^3/6 and t^2/2.
+            // The contribution of the force to position and momentum; for the force t it is t^3/6 and t^2/2.
             let added = if later { [t * t * t / 6.0, t * t / 2.0] } else { [t * t / 2.0, t] }.map(|x| x * 1e-13);
             let start = VelocityPoint::new([1.0, spring], [v, 0.0], 0.0);
             for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6, SplittingScheme::KAHAN_LI_8] {
@@ -223,7 +224,7 @@ mod tests {
                     .unwrap();
                 assert_eq!(ends.len(), 4);
                 for (q, p) in ends {
-                    // A rounding of the end, and of t; the sums have none beside it.
+                    // The tolerance is the round-off of the final value and of t; the sums add none.
                     let off = max_or_nan((q[0] - (1.0 + v * t + added[0])).abs(), (p[0] - (v + added[1])).abs());
                     let name = scheme.name();
                     assert!(off <= 2.0 * f64::EPSILON * (1.0 + v * t), "{name}, v = {v}, {later}, {spring}: {off:e}");

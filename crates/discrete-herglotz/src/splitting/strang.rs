@@ -12,10 +12,11 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 ///
 /// `L_d = e^(gamma h) ((q1 - q0).M(q1 - q0)/(2d) - h/2 V(t, q0)) - h/2 V(t + h, q1) + (e^(gamma h) - 1) z0`.
 ///
-/// Where gamma depends on time, `gamma h` is its integral over the step, and d that of the exponential of the integral so far.
-/// So `sigma_d = e^(gamma h)` at every point, and the step is explicit: the drift alone joins the positions, which gives the
-/// momentum between the kicks. Symmetric; the second-order member of [`SplittingScheme`](crate::SplittingScheme), whose
-/// runs are a [`Splitting`](crate::splitting::Splitting)'s.
+/// Where gamma depends on time, `gamma h` stands for its integral over the step, and d for the integral of the exponential
+/// of that integral from the start. Hence `sigma_d = e^(gamma h)` at every point. The step is explicit, because the drift
+/// alone connects the positions, which determines the momentum between the kicks. The method is symmetric, and is the
+/// second-order member of [`SplittingScheme`](crate::SplittingScheme), whose stepper is
+/// [`Splitting`](crate::splitting::Splitting).
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
@@ -32,15 +33,15 @@ pub struct Strang<L, const N: usize> {
     form: SeparableForm<L, N>,
     h: f64,
     drag: Drag<N>,
-    /// Where the drag is constant, its drifts over h and -h.
+    /// For a constant drag, the drifts over h and -h.
     steady: Option<(Drift, Drift)>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
-    /// That of a Lagrangian whose form is verified at a time and a state.
+    /// The splitting for a Lagrangian whose form is verified at a time and a state.
     ///
     /// # Errors
-    /// Those of [`Splitting::new`](crate::splitting::Splitting::new), but for the last.
+    /// Those of [`Splitting::new`](crate::splitting::Splitting::new) except [`InputError::FirstStep`].
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         let form = SeparableForm::read(lagrangian, h, t, state)?;
         let drag = Drag::of(&form, t, state)?;
@@ -49,7 +50,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         Ok(Strang { form, h, drag, steady })
     }
 
-    /// The drift of a step from `t`, forward or back.
+    /// The drift of a step from the time `t`, forward or backward.
     #[inline(always)]
     fn drift(&self, t: f64, forward: bool) -> Drift {
         match &self.steady {
@@ -58,7 +59,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         }
     }
 
-    /// Kick, drift, kick over a step from `t`, forward or back.
+    /// Kick, drift, kick over a step from the time `t`, forward or backward.
     #[inline(always)]
     fn step(&self, t: f64, from: &PhasePoint<N>, forward: bool) -> Result<DiscreteStep<N>, StepError> {
         let h = if forward { self.h } else { -self.h };
@@ -72,7 +73,8 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         q += v * drift.length;
         let (value, force) = self.form.kick(t + h, &q, 0.0);
         z += 0.5 * h * value;
-        // In one sum: rounded on its own, a small drag loses the same digits in all steps.
+        // Both changes are added in one sum: rounded separately, a small drag would have round-off of the same sign in all
+        // steps.
         p += p * drift.damping + force * (0.5 * h);
         let velocity = v * (drift.length / h);
         let sigma = if forward { 1.0 + drift.damping } else { 1.0 / (1.0 + drift.damping) };

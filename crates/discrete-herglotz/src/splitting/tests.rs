@@ -1,4 +1,4 @@
-//! Splittings against an independent reference, and against what the theory says of them.
+//! Tests of splittings against an independent reference and against the theory.
 
 use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, Strang};
 use crate::SplittingScheme;
@@ -11,12 +11,12 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, numbers::MaxAbsOrNan};
 
-/// The time that errors are measured after.
+/// The time after which errors are measured.
 const DURATION: f64 = 4.0;
 
 type Outcome = Result<(), InputError>;
 
-/// Two unlike masses with a coupled inertia, in a quartic potential that changes in time.
+/// Two different masses with coupled inertia in a time-dependent quartic potential.
 struct Inertia;
 
 impl Lagrangian<2> for Inertia {
@@ -30,7 +30,7 @@ impl Lagrangian<2> for Inertia {
     }
 }
 
-/// A pendulum with a drag of the second degree in z, and a constant in it.
+/// A pendulum with a drag of degree two in z, and a constant term in L.
 struct Curved;
 
 impl Lagrangian<1> for Curved {
@@ -42,7 +42,7 @@ impl Lagrangian<1> for Curved {
     }
 }
 
-/// A pendulum of which the drag depends on time.
+/// A pendulum with a time-dependent drag.
 struct Tides;
 
 impl Lagrangian<1> for Tides {
@@ -58,20 +58,22 @@ fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
     ChartVector::from(a).minus(ChartVector::from(b)).max_abs_or_nan()
 }
 
-/// The state after so many steps.
+/// The state after this number of steps.
 fn run<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> PhasePoint<N> {
     assert_eq!(motion.advance(steps), Ok(()));
     motion.state()
 }
 
-/// The state after [`DURATION`] from a code that shares nothing with the splittings: the midpoint rule raised to order 10.
+/// The state after [`DURATION`] from a method that is independent of the splittings: a composition of order 10 of the
+/// midpoint rule.
 fn by_midpoint<const N: usize>(l: &impl Lagrangian<N>, start: PhasePoint<N>) -> Result<PhasePoint<N>, InputError> {
     let (steps, scheme) = (400, SplittingScheme::SOFRONIOU_SPALETTA_10);
     Ok(run(Composition::new(|h| Midpoint::new(l, h), &scheme, DURATION / steps as f64, 0.0, start)?, steps))
 }
 
-/// Asserts that the error of each scheme falls with its power of the step, to 0.15: the slope over the last four of ever
-/// finer resolutions before round-off is near. The reference is a fine run, which agrees with another code.
+/// Asserts that the observed order of each scheme agrees with its order to 0.15: the slope of the error over the last four
+/// of a sequence of finer resolutions above round-off. The reference is a run with small steps, which agrees with another
+/// method.
 fn assert_orders<const N: usize, S: Stepper<N>>(
     name: &str,
     schemes: impl Iterator<Item = &'static SplittingScheme>,
@@ -100,7 +102,7 @@ fn assert_orders<const N: usize, S: Stepper<N>>(
     Ok(())
 }
 
-/// The schemes whose leading error shows before round-off on a gentle motion; order 10 needs a rougher one.
+/// The schemes whose leading error is above round-off for a smooth motion; order 10 needs a less smooth one.
 fn gentle() -> impl Iterator<Item = &'static SplittingScheme> {
     SCHEMES.iter().filter(|s| s.order() < 10)
 }
@@ -146,7 +148,7 @@ fn nonlinear_drag_has_the_schemes_order() -> Outcome {
     })
 }
 
-/// `sigma_d = e^(gamma h)`, and the work is the stages'.
+/// `sigma_d = e^(gamma h)`, and the number of evaluations is that of the stages.
 #[test]
 fn steps_are_what_they_say() -> Outcome {
     let (forced, start, h) = (Duffing::forced(), PhasePoint::new([1.0], [1.0], 0.2), 0.1);
@@ -161,8 +163,8 @@ fn steps_are_what_they_say() -> Outcome {
     Ok(())
 }
 
-/// The numbers after 700 steps (three chunks of a run) and their `sigma_d` are the same to the last bit, whether the steps are
-/// taken at once, one by one or in unequal parts, with their states looked at.
+/// The state after 700 steps (three chunks of a run) and `sigma_d` are bitwise the same whether the steps are taken at once,
+/// one by one or in unequal parts, with the states read in between.
 fn assert_same_bits<const N: usize, S: Stepper<N>>(
     name: &str,
     start: impl Fn() -> Result<S, InputError>,
@@ -185,7 +187,7 @@ fn assert_same_bits<const N: usize, S: Stepper<N>>(
     Ok(at_once.0)
 }
 
-/// Nor do they depend on whether the action is computed.
+/// The results do not depend on what is observed, nor on whether the action is computed.
 #[test]
 fn what_is_observed_changes_no_bit() -> Outcome {
     fn linear<L: Lagrangian<N>, const N: usize>(name: &str, l: &L, h: f64, start: PhasePoint<N>) -> Outcome {
@@ -218,8 +220,8 @@ fn what_is_observed_changes_no_bit() -> Outcome {
     Ok(())
 }
 
-/// The rate of a drag that depends on time is the exponential of its integral over each step, exact for the step that was
-/// taken; for Lane and Emden's `-2/t` it is `(t/(t + h))^2`. The quadrature leaves `(h/t)^13` of it.
+/// The conformal factor of a time-dependent drag is the exponential of its integral over each step; for the rate `-2/t` of
+/// Lane and Emden it is `(t/(t + h))^2`. The relative error of the quadrature is of the order of `(h/t)^13`.
 #[test]
 fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
     let (system, h, t0) = (LaneEmden::default(), 0.05, 1.0);
@@ -243,11 +245,10 @@ fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
     Ok(())
 }
 
-/// `sigma_d` of a drag that is not linear is the contraction of the contact form: that of the momentum under a shift of it,
-/// the same in each direction of the difference quotient of `p1` and of `z1` by `z0`.
+/// `sigma_d` of a nonlinear drag is the product of the factors of its steps, here the ratio of the momenta of a free motion.
 #[test]
 fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
-    // Without forces the momentum is scaled, and nothing else happens to it.
+    // Without forces the momentum changes only by the conformal factor.
     struct Free;
     impl Lagrangian<1> for Free {
         fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -270,7 +271,8 @@ fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
     Ok(())
 }
 
-/// In a uniform field without drag a step is exact but for its rounding: compensated, a hundred thousand of them are too.
+/// In a uniform field without drag a step is exact up to round-off; with compensated summation so are a hundred thousand
+/// steps.
 #[test]
 fn compensated_sums_keep_the_floor() -> Outcome {
     #[derive(Clone)]
@@ -294,7 +296,7 @@ fn compensated_sums_keep_the_floor() -> Outcome {
     Ok(())
 }
 
-/// A discrete Lagrangian of which only the value is known: its steps are the trait's own.
+/// A discrete Lagrangian that implements only the value, with the default steps of the trait.
 struct ByValue<D>(D);
 
 impl<D: DiscreteLagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByValue<D> {
@@ -306,7 +308,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByValue
     }
 }
 
-/// The explicit step of a closed discrete Lagrangian is that of its value, both ways, and so is its rate.
+/// The explicit steps of a discrete Lagrangian, forward and backward, agree with those derived from its value, and so does
+/// `sigma_d`.
 fn assert_step_is_of_value<const N: usize>(ld: &impl DiscreteLagrangian<N>, start: PhasePoint<N>) -> Outcome {
     let (mut solver, t) = (Solver::default(), 0.7);
     let bad = InputError::FirstStep;
@@ -338,7 +341,7 @@ fn strang_is_the_flow_of_its_value() -> Outcome {
     Ok(())
 }
 
-/// Compositions of the discrete Lagrangian are the splittings, to rounding.
+/// Compositions of the discrete Lagrangian agree with the splittings to round-off.
 #[test]
 fn compositions_of_strang_are_splittings() -> Outcome {
     let (start, h) = (PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2), 0.1);
@@ -365,7 +368,7 @@ fn compositions_of_strang_are_splittings() -> Outcome {
     Ok(())
 }
 
-/// The Riccati flow in closed form is one: a group in s, with the rate that it says, and none beyond its blow-up.
+/// The closed form of the Riccati flow is a one-parameter group with the stated rate, and NaN after the blow-up.
 #[test]
 fn the_riccati_flow_is_a_flow() {
     for (b, c) in [(0.0, 0.3), (-0.4, 0.3), (2.0, -1.0), (1e-9, 1.0), (0.5, 0.0)] {
@@ -379,7 +382,7 @@ fn the_riccati_flow_is_a_flow() {
     assert!(Riccati { b: 0.0, c: 1.0 }.over(2.0).apply(1.0_f64).is_nan());
 }
 
-/// An action flow that is not that of L, or not that of its own rate.
+/// An action flow that may differ from that of L, and whose maps may differ from the flow of its rate.
 #[derive(Clone, Copy, Debug)]
 struct Wrong {
     rate: f64,
@@ -396,7 +399,7 @@ impl ActionFlow for Wrong {
     }
 }
 
-/// Euler's step in place of the flow: right for small times alone.
+/// Euler's step in place of the flow, which is accurate for small times only.
 struct Euler;
 
 #[derive(Clone, Copy, Debug)]
@@ -418,7 +421,7 @@ impl ActionMap for EulerMap {
     }
 }
 
-/// Each hypothesis that is not met is refused by name.
+/// Each violated hypothesis yields the error that names it.
 #[test]
 fn what_does_not_fit_is_refused() {
     let (start, scheme) = (PhasePoint::new([1.0], [1.0], 0.2), &SplittingScheme::STRANG);
@@ -472,7 +475,7 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(euler, Some(InputError::Hypothesis { .. })));
 }
 
-/// A motion that leaves every bound halts at its last finite state, in mid-chunk too, and stays there.
+/// An unbounded motion halts at its last finite state, also within a chunk of steps, and stays there.
 #[test]
 fn a_run_away_halts_at_its_last_finite_state() -> Outcome {
     struct Hill;

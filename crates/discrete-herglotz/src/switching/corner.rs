@@ -1,4 +1,4 @@
-//! What becomes of the momentum where the Lagrangian jumps.
+//! The corner conditions at a jump of the Lagrangian.
 
 use super::surfaces::{Surfaces, TimedState};
 use crate::StepError;
@@ -9,32 +9,33 @@ use contact_geom::{
     support::linear,
 };
 
-/// The distance from the surface at which one side is read, relative to the position and to what a step moves: far beyond the rounding of a position,
-/// and so near that what is continuous differs by little.
+/// The distance from the surface at which L is evaluated on one side, relative to the position and to its change in a step:
+/// far larger than the round-off of a position, and small enough that continuous functions change little over it.
 const BESIDE: f64 = 1e-9;
 
-/// By so many roundings of its terms L differs on both sides at the least where it jumps.
+/// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms.
 const ROUNDINGS: f64 = 256.0;
 
-/// The distances, relative to the coordinates, of the differences for the normal of a surface: with differences of order six their error is the rounding
-/// of the function over this, 1e-13.
+/// The step, relative to the coordinates, of the differences for the normal of a surface. With differences of order six the
+/// error is the round-off of the function divided by this, 1e-13.
 const DIFFERENCE: f64 = 1e-3;
 
-/// Newton's iterations for one number or one velocity.
+/// The limit of Newton iterations for one number or one velocity.
 const ITERATIONS: usize = 60;
 
-/// What a motion does at a zero of a switching function.
+/// The behaviour of a motion at a zero of a switching function.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Corner<const N: usize> {
-    /// It passes, since L is continuous.
+    /// It crosses the surface with the same momentum, since L is continuous.
     Continuous,
-    /// It passes with another momentum.
+    /// It crosses the surface with this momentum.
     Refracted(SVector<f64, N>),
-    /// It stays on its side, since its energy does not suffice on the other.
+    /// It stays on its side with this momentum, since its energy does not suffice on the other side.
     Reflected(SVector<f64, N>),
 }
 
-/// L on one side of a surface, at the surface: extrapolated from three points beside it, so that it is exact to the third power of their distance.
+/// The one-sided limit of L at a surface, extrapolated from three points on that side with an error of third order in their
+/// distance.
 struct OneSided<'a, L, const N: usize> {
     lagrangian: &'a L,
     t: f64,
@@ -69,7 +70,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
         self.points(v).map(of).fold(SMatrix::zeros(), |sum, w| sum + w)
     }
 
-    /// The velocity that belongs to a momentum, and the energy.
+    /// The velocity of a momentum, by Newton's method from a guess, and the energy.
     fn velocity(&self, p: &SVector<f64, N>, guess: &SVector<f64, N>) -> Result<(SVector<f64, N>, f64), StepError> {
         let (mut v, mut before) = (*guess, f64::INFINITY);
         for _ in 0..ITERATIONS {
@@ -80,7 +81,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            // Down to the rounding of the extrapolation, where changes do not fall any more.
+            // The corrections decrease down to the round-off of the extrapolation.
             if size <= f64::EPSILON * max_abs_or_nan(v.iter().copied())
                 || (size >= before && size <= 1e-10 * max_abs_or_nan(v.iter().copied()))
             {
@@ -108,12 +109,12 @@ fn slope<const N: usize>(
     (45.0 * differences[0] - 9.0 * differences[1] + differences[2]) / (60.0 * distance)
 }
 
-/// The corner conditions at a zero of a switching function, of a motion that comes from the side on which it is now; `reach` is what a step
-/// moves at most.
+/// Solves the corner conditions at a zero of a switching function, for a motion that arrives from its current side; `reach`
+/// is a bound for the change of position in a step.
 ///
 /// # Errors
-/// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z; those of the inverse Legendre transformation on
-/// either side.
+/// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion can
+/// neither cross the surface nor be reflected; those of the inverse Legendre transformation on either side.
 pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     surfaces: &mut Surfaces,
@@ -142,7 +143,8 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
         OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
     };
     if size == 0.0 {
-        // Time alone: z and the momentum are continuous. Velocity or action alone: both sides are read along these.
+        // The surface does not depend on the position. If it depends on time alone, z and the momentum are continuous; if it
+        // depends on the velocity or z, both sides are compared along these.
         let depends = along_v != 0.0 || along_z != 0.0;
         return if depends && jumps_along(lagrangian, at, index, surfaces) {
             Err(StepError::JumpAlong { t: at.t })
@@ -150,7 +152,7 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
             Ok(Corner::Continuous)
         };
     }
-    // A jump stays what it is nearer to the surface; what is continuous falls.
+    // Closer to the surface a jump keeps its size, while the difference of a continuous function decreases.
     let jump = |of: f64| beside(-1.0, of).value(&x.v) - beside(1.0, of).value(&x.v);
     let (wide, near) = (jump(1.0), jump(0.125));
     let (old, new) = (beside(1.0, 0.125), beside(-1.0, 0.125));
@@ -182,9 +184,11 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// The momentum `p + lambda g_q` with `E = E- - lambda g_t` on a side, that leaves the surface in the sense of `approach`; `None` where there is none.
-/// The energy is convex in lambda and its slope is the rate of the switching function, so that Newton's method from outside finds the root or
-/// passes the smallest energy, where the rate changes its sign.
+/// The momentum `p + lambda g_q` with `E = E- - lambda g_t` on a side, with which the switching function changes in the
+/// direction of `approach`; `None` where there is none.
+///
+/// The energy is convex in lambda, and its slope is the rate of the switching function. Newton's method from outside
+/// therefore either finds the root or passes the minimum of the energy, where the rate changes its sign.
 fn conditions<L: Lagrangian<N>, const N: usize>(
     side: &OneSided<'_, L, N>,
     at: &TimedState<N>,
@@ -211,11 +215,11 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
         }
         before = size;
     }
-    // Neither a root nor a turn was found: that is no reflection.
+    // Neither a root nor the minimum of the energy was found, so that a reflection cannot be concluded.
     Err(StepError::NotConverged { residual: before, iterations: ITERATIONS as u32 })
 }
 
-/// Whether L or its momenta jump across a surface that depends on the velocity or on z alone.
+/// Whether L or its momenta jump across a surface that does not depend on the position but on the velocity or z.
 fn jumps_along<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     at: &TimedState<N>,
@@ -228,7 +232,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
     let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
     let here = |by: f64| lagrangian.value(at.t, &x.q, &moved(by).v, moved(by).z);
     let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(lagrangian, index, (at.t, &moved(by)));
-    // Along the diagonal of the velocities and z the function has both signs, or it says nothing.
+    // A jump is looked for only if the function changes its sign along the diagonal of the velocities and z.
     if crossed(surfaces, length(1.0)) * crossed(surfaces, -length(1.0)) >= 0.0 {
         return false;
     }

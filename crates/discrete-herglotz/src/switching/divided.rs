@@ -1,13 +1,16 @@
-//! Contact Gauss collocation with steps that are divided where the motion is fast.
+//! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
 use super::{Reach, SwitchingStepper};
 use crate::gauss::info;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
-/// Contact Gauss collocation, each of whose steps is divided into parts where its curve does not solve Herglotz' equations between the nodes up to
-/// a misfit: halved until it does, and twice as long after each part that does. Each part is conformally contact, and so is the step. An accuracy is
-/// reached with such steps where a part of the motion, as a close encounter, asks for many times shorter steps than the rest.
+/// Contact Gauss collocation with adaptive subdivision of its steps.
+///
+/// A step is divided into parts where the defect of its curve in Herglotz' equations, between the nodes, exceeds a bound: a
+/// part is halved until its defect is within the bound, and the next part may be twice as long. Each part is conformally
+/// contact, and so is the step. Such steps attain an accuracy where a part of the motion, such as a close encounter, requires
+/// much shorter steps than the rest.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Kepler};
@@ -24,18 +27,18 @@ use contact_geom::Lagrangian;
 pub struct DividedGauss {
     /// The number of stages.
     pub stages: usize,
-    /// The largest misfit of a part, relative to its momenta.
+    /// The bound for the defect of a part, relative to its momenta.
     pub most_misfit: f64,
 }
 
 impl DividedGauss {
-    /// The name in tables, from which it is read too.
+    /// The name in tables, which can also be parsed.
     pub(crate) fn name(&self) -> String {
         let DividedGauss { stages, most_misfit } = self;
         format!("divided_gauss_{stages}_{most_misfit:e}")
     }
 
-    /// A stepper, which also ends its steps on kinks and jumps.
+    /// The stepper, whose parts also end on kinks and jumps.
     pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
         self,
         problem: &Problem<'a, L, N>,

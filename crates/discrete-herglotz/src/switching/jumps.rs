@@ -5,9 +5,10 @@ use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
 use crate::gauss::StepStart;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
 
-/// Whether the Lagrangian itself jumps on the way between two points of a motion, across one of its [switching
-/// functions](Lagrangian::switching_functions): there the motion has a corner, and no vector field has a flow. The way is taken to be the cubic curve
-/// through both points with their velocities.
+/// Whether the Lagrangian jumps between two points of a motion, across a zero of one of its [switching
+/// functions](Lagrangian::switching_functions). There the motion has a corner and is not the flow of a vector field.
+///
+/// The motion between the points is approximated by the cubic Hermite curve through both points with their velocities.
 pub fn jumps_between<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     [from, to]: [(f64, VelocityPoint<N>); 2],

@@ -1,4 +1,4 @@
-//! The steps of any integrator, ended on the zeros of switching functions.
+//! The steps of any integrator, divided at the zeros of switching functions.
 
 use super::corner::{Corner, corner};
 use super::surfaces::{SignChange, StepCurve, Surfaces, TimedState};
@@ -20,27 +20,27 @@ use contact_geom::{
 };
 use std::sync::Arc;
 
-/// The parts that a step may have: beyond that the Lagrangian switches without end.
+/// The limit of the parts of a step; a step with more fails with [`StepError::Switching`] or [`StepError::Undivided`].
 const MOST_PARTS: usize = 4096;
 
-/// The changes of sign at one place: a motion that is pushed back to a surface from both sides has no end of them.
+/// The limit of sign changes at one point: a motion that is pushed to a surface from both sides has infinitely many.
 const MOST_AT_A_PLACE: usize = 16;
 
-/// The attempts to find a zero by Newton's method before it is bracketed.
+/// The Newton iterations for a zero before bisection.
 const NEWTON: usize = 8;
 
-/// What is, or holds, a stepper.
+/// A type that is, or holds, a stepper.
 pub(crate) trait AsStepper<const N: usize> {
     fn stepper(&self) -> &(dyn Stepper<N> + '_);
     fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
 
-    /// What its sums carry beyond the last digits of the state, and the way back.
+    /// The compensation terms of its sums, beyond the last digits of the state. [`add_rests`](Self::add_rests) restores them.
     fn rests(&self) -> StepStart<N> {
         StepStart::ZERO
     }
     fn add_rests(&mut self, _rests: &StepStart<N>) {}
 
-    /// The largest misfit of its last step between the nodes, relative to the momenta; 0 where that is not known.
+    /// The largest defect of its last step between the nodes, relative to the momenta; 0 where it is unknown.
     fn defect(&self) -> f64 {
         0.0
     }
@@ -64,7 +64,7 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
     }
     fn defect(&self) -> f64 {
         self.look(1).map_or(0.0, |look| {
-            // A jump that has no gradient at either side is seen in the values of L alone.
+            // A jump with vanishing gradients on both sides shows only in the values of L.
             let of_value = if look.kinetic > 0.0 { look.of_value / look.kinetic } else { 0.0 };
             if look.is_underflown() { of_value } else { max_or_nan(look.defect, of_value) }
         })
@@ -83,21 +83,23 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
 pub(crate) enum Reach {
     /// Between the ends of its steps, as Gauss collocation does.
     Inside,
-    /// At the ends too, or beyond them by this fraction of a step.
+    /// Also at the ends of its steps, or beyond them by this fraction of a step.
     Beside(f64),
 }
 
-/// A fraction of a step that is beyond the rounding of its ends.
+/// A fraction of a step that exceeds the round-off of its ends.
 const AT_ENDS: f64 = 1e-9;
 
-/// The most that substeps back and forth go beyond a step, in units of the step.
+/// A bound for the distance by which negative substeps make a composition leave its step, in units of the step.
 const SUBSTEPS: f64 = 0.5;
 
-/// The highest order of parts.
+/// The highest order of the parts.
 const HIGHEST: u32 = 2 * Gauss::<()>::STAGES as u32;
 
-/// The stepper of an integrator, with steps that end on kinks and jumps. What evaluates L at the ends of its steps or beyond would meet both sides
-/// of a surface there: its parts of a step, and steps beside a surface, are taken by contact Gauss collocation of the same order.
+/// The stepper of an integrator with steps that end on kinks and jumps.
+///
+/// An integrator that evaluates L at the ends of its steps, or beyond, would mix both sides of a surface there. The parts of
+/// its steps, and its steps near a surface, are therefore taken by contact Gauss collocation of the same order.
 pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
     problem: &Problem<'a, L, N>,
@@ -118,29 +120,30 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     Ok(Box::new(SwitchingStepper::new(problem, h, reach, make)?))
 }
 
-/// Steps of one length by any integrator. A step along which a switching function changes its sign consists of parts, which end on the zeros.
+/// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of parts
+/// that end on the zeros.
 ///
-/// `make` makes a stepper at a problem, for steps of a length, and is given whether these are parts.
+/// `make` constructs a stepper for a problem and a step length; its last argument is whether the steps are such parts.
 pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     problem: Problem<'a, L, N>,
     make: M,
     reach: Reach,
     h: f64,
-    /// The steps taken.
+    /// The number of steps taken.
     k: usize,
-    /// The stepper of the steps since the last one with a zero in it, its start, and the steps before it.
+    /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it (`before`).
     base: S,
     origin: TimedState<N>,
     before: usize,
     here: TimedState<N>,
     surfaces: Surfaces,
-    /// The misfit beyond which a step is divided.
+    /// The bound for the defect of a step; a step with a larger one is divided.
     most_misfit: f64,
     sigma: f64,
-    /// The evaluations of the steppers before `base`.
+    /// The number of evaluations of the steppers before `base`.
     spent: u64,
     unresolved: Option<UnresolvedStep>,
-    /// The steppers of the parts of the last step, where it had some and they are kept.
+    /// The steppers of the parts of the last step that had parts, if they are kept.
     parts: Option<Vec<S>>,
     switched: bool,
 }
@@ -180,12 +183,12 @@ where
         })
     }
 
-    /// The same, with the steppers of the parts of the last step.
+    /// The same, keeping the steppers of the parts of a step.
     pub fn keeping_parts(self) -> Self {
         SwitchingStepper { parts: Some(Vec::new()), ..self }
     }
 
-    /// The same, with steps divided where their misfit is larger than this: into parts that are as short as it asks for.
+    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it.
     pub fn dividing(self, most_misfit: f64) -> Self {
         SwitchingStepper { most_misfit, ..self }
     }
@@ -199,7 +202,7 @@ where
         defect.is_nan() || defect > self.most_misfit
     }
 
-    /// The steppers of the last step: of its parts where it had some, else that of all steps.
+    /// The steppers of the last step: those of its parts if it had some, otherwise the common stepper of all steps.
     pub fn last_step(&self) -> &[S] {
         match &self.parts {
             Some(parts) if self.switched => parts,
@@ -221,14 +224,14 @@ where
         Ok(stepper)
     }
 
-    /// The state of a stepper with its velocity.
+    /// The state of a stepper, with its velocity.
     fn reached(&self, stepper: &S, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
         let (state, rests) = (stepper.stepper().state(), stepper.rests());
         let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
         Ok(TimedState { t, state, v, rests })
     }
 
-    /// One step of a length from a state.
+    /// One part of a step, from a state to the time t.
     fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(S, TimedState<N>), StepError> {
         let mut stepper = self.stepper_at(at, t - at.t, true)?;
         let taken = stepper.stepper_mut().advance(1).map_err(|halt| halt.cause);
@@ -257,7 +260,7 @@ where
                 return Ok(());
             }
         }
-        // What was noted before this step; the step itself has crossed a surface.
+        // Unresolved steps before this one are kept; a flag of this step is dropped, since it may be due to the surface.
         let earlier = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
         self.unresolved = first(self.unresolved, earlier.filter(|s| s.step < self.k));
         self.spent += self.base.stepper().evaluations();
@@ -282,7 +285,7 @@ where
         }
     }
 
-    /// A step in parts, which end on zeros.
+    /// A step in parts that end on zeros.
     fn in_parts(&mut self, from: TimedState<N>, t_end: f64) -> Result<(TimedState<N>, f64), StepError> {
         let (mut at, mut sigma, mut at_a_place) = (from, 1.0, 0);
         let span = t_end - from.t;
@@ -319,7 +322,7 @@ where
                 continue;
             };
             let Some(Part { stepper, to }) = self.locate(&curve, &change, spacing) else {
-                // The curve crosses, and the motion does not: that of a shorter part is nearer to it.
+                // The curve crosses the surface, but the motion does not; the curve of a shorter part is more accurate.
                 longest = 0.5 * (t - at.t).abs();
                 continue;
             };
@@ -352,7 +355,7 @@ where
         }
     }
 
-    /// The state at a zero, on the side where the motion goes on.
+    /// The state at a zero, on the side where the motion continues.
     fn through(&mut self, at: TimedState<N>, index: usize, span: f64) -> Result<TimedState<N>, StepError> {
         let reach = max_abs_or_nan(at.v.iter().map(|v| v * span));
         let lagrangian = self.problem.lagrangian;
@@ -372,8 +375,8 @@ where
         Ok(TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at })
     }
 
-    /// The part that ends on a zero, to the spacing of time; no stepper where that is the start itself. `None` where the motion does not
-    /// cross.
+    /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.
+    /// `None` where the motion does not cross the surface.
     fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<S, N>> {
         let SignChange { index, ends, about, slope } = *change;
         let (lagrangian, from, span) = (self.problem.lagrangian, curve.from, curve.span());
@@ -406,7 +409,7 @@ where
                 break;
             }
         }
-        // Between ends at which the motion itself has both signs.
+        // The zero is bracketed between two times at which the function has different signs along the motion itself.
         let side = self.surfaces.side(index);
         let mut toward = |fraction: f64| -> Result<f64, StepError> {
             if fraction * span.abs() <= spacing {
@@ -509,7 +512,7 @@ where
     S: AsStepper<N>,
     M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
-    /// Everything but the words of the base, which is made anew where it began.
+    /// Loads everything except the words of `base`, which is constructed again at its origin.
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         let mut counts = [self.k, self.before];
         counts.load(from)?;

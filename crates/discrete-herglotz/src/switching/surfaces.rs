@@ -8,16 +8,16 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use std::convert::Infallible;
 
-/// The parts in which a step without a curve of its own is searched for changes of sign.
+/// The number of parts in which a step without dense output is searched for sign changes.
 const PARTS: usize = 8;
 
-/// Halvings of the part after a zero, in which a function that has just changed its sign is searched for the place where it changes back.
+/// The limit of halvings of the part after a zero, in the search for a point where the function still has its old sign.
 const HALVINGS: i32 = 30;
 
 /// Whether a Lagrangian has switching functions.
 ///
 /// # Errors
-/// [`InputError::SwitchingUnstated`] where it has some without saying so.
+/// [`InputError::SwitchingUnstated`] where it has some that its `HINTS` do not state.
 pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
@@ -38,7 +38,7 @@ pub(super) struct TimedState<const N: usize> {
     pub t: f64,
     pub state: PhasePoint<N>,
     pub v: SVector<f64, N>,
-    /// What the sums of the stepper carry beyond the last digits of the state.
+    /// The compensation terms of the sums of the stepper, beyond the last digits of the state.
     pub rests: StepStart<N>,
 }
 
@@ -48,7 +48,7 @@ impl<const N: usize> TimedState<N> {
     }
 }
 
-/// A step between its ends: by its collocation polynomial, or by the cubic polynomial through both ends with their velocities.
+/// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their velocities.
 pub(super) struct StepCurve<const N: usize> {
     pub from: TimedState<N>,
     pub to: TimedState<N>,
@@ -80,20 +80,21 @@ impl<const N: usize> StepCurve<N> {
     }
 }
 
-/// A change of sign on the curve of a step: of which function, between which fractions of the step, and about where.
+/// A sign change on the curve of a step: the index of the function, the fractions of the step between which it lies, and the
+/// approximate fraction `about`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SignChange {
     pub index: usize,
     pub ends: [f64; 2],
     pub about: f64,
-    /// The rate of the function there, per unit of time.
+    /// The time derivative of the function there.
     pub slope: f64,
 }
 
-/// The switching functions of a Lagrangian, and on which side of each zero the motion is.
+/// The switching functions of a Lagrangian, with the side of each surface on which the motion is.
 #[derive(Clone, Debug)]
 pub(super) struct Surfaces {
-    /// The signs; 0 of one that has had none yet.
+    /// The signs of the functions; 0 for one that has only been zero so far.
     pub sides: Vec<f64>,
     values: Vec<f64>,
 }
@@ -106,7 +107,7 @@ impl Surfaces {
         Surfaces { sides, values }
     }
 
-    /// The value of a function, not a number where there is no such function.
+    /// The value of a function; NaN for an index without a function.
     pub fn value<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -122,15 +123,15 @@ impl Surfaces {
         self.sides.get(index).copied().unwrap_or(0.0)
     }
 
-    /// The motion is now on the other side of a surface.
+    /// Sets the motion on the other side of a surface.
     pub fn cross(&mut self, index: usize) {
         if let Some(side) = self.sides.get_mut(index) {
             *side = -*side;
         }
     }
 
-    /// Whether a surface lies within a part of a step before its start or after its end, where its motion is continued straight on: an integrator that
-    /// evaluates L there, or at the ends themselves, may meet the other side.
+    /// Whether a surface lies within the fraction `beside` of a step before its start or after its end, where the curve is
+    /// extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -142,12 +143,12 @@ impl Surfaces {
             let x = hermite(&curve.from.point(), &curve.to.point(), span, fraction * span);
             self.values.clear();
             lagrangian.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
-            // A surface on which the motion starts has no side yet.
+            // A surface on which the motion starts counts as near.
             self.sides.iter().zip(&self.values).any(|(side, value)| *side == 0.0 || side * sign(*value) < 0.0)
         })
     }
 
-    /// The first change of sign along a step, as its curve shows it. Functions without a side so far get that of the first value beside 0.
+    /// The first sign change along the curve of a step. A function without a side takes the sign of its first nonzero value.
     pub fn first_change<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -180,7 +181,7 @@ impl Surfaces {
         None
     }
 
-    /// The zero of a function between two fractions of a step, at the second of which it is on the other side.
+    /// The zero of a function between two fractions of a step, where the second one is on the other side.
     pub(super) fn change<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -195,7 +196,7 @@ impl Surfaces {
         };
         let (mut before, after) = (toward(from), toward(to));
         if before.is_nan() || before <= 0.0 {
-            // The part begins at a zero: where is the function on its side?
+            // The part begins at a zero: find a point where the function still has the sign of its side.
             let inside = (1..=HALVINGS).map(|k| from + (to - from) * f64::powi(2.0, -k));
             match inside.map(|x| (x, toward(x))).find(|(_, value)| *value > 0.0) {
                 Some(place) => (from, before) = place,
@@ -210,7 +211,7 @@ impl Surfaces {
     }
 }
 
-/// 1, -1, or 0 for what is neither.
+/// The sign of a number as 1 or -1, and 0 for 0 and NaN.
 pub(super) fn sign(x: f64) -> f64 {
     if x > 0.0 {
         1.0

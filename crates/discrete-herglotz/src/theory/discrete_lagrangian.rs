@@ -8,13 +8,14 @@ use contact_geom::{
     ChartVector, DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, support::seed,
 };
 
-/// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
+/// A discrete Lagrangian `L_d : Q x Q x R -> R`, with the recursion `z1 = z0 + L_d(q0, q1, z0)` of the action; paper,
+/// section 3.
 ///
-/// Only the value is asked for, as a generic function; derivatives come by automatic differentiation and steps by Newton's
-/// method on them. The discretisations of this crate override both by cheaper routes to the same numbers. For a
-/// time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
+/// Only the step size and the value, a generic function, are required. By default derivatives are computed by automatic
+/// differentiation and steps by Newton's method; the discretisations of this crate override both with faster
+/// implementations. For a time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
 pub trait DiscreteLagrangian<const N: usize> {
-    /// The time step h; negative where steps go back in time.
+    /// The time step h; negative for steps backward in time.
     fn step_size(&self) -> f64;
 
     /// The value `L_d(q0, q1, z0)`.
@@ -23,33 +24,36 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
 
-    /// What must hold at the start of a run beside the regularity of `L_d`: that of the Lagrangian behind it, where there is one.
+    /// Checks the hypotheses at the initial state of a run, beyond the regularity of `L_d`: for example that the
+    /// Lagrangian which `L_d` discretises is regular. By default there are none.
     ///
     /// # Errors
-    /// An [`InputError`] that names what does not hold.
+    /// An [`InputError`] that names the violated hypothesis.
     fn check_start(&self, _t: f64, _from: &PhasePoint<N>, _velocity: &SVector<f64, N>) -> Result<(), InputError> {
         Ok(())
     }
 
-    /// How far a step is from one that resolves its motion, in units of the largest misfit that such a step can have; `None` where
-    /// it is below one, and where nothing is known, as by default: a discrete Lagrangian may be exact for long steps.
-    /// `velocities` are the mean velocities of the last four steps, the latest last, `to` and `sigma` the latest one's end.
+    /// The defect of a step, in units of the largest defect of a step that resolves the motion; `None` where it is at
+    /// most one, and where it is unknown, as by default: a discrete Lagrangian may be exact for long steps.
+    ///
+    /// `velocities` are the mean velocities of the last four steps, the latest last; `to` and `sigma` are the final state
+    /// and the conformal factor of the latest step.
     #[inline(always)]
     fn defect(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
         None
     }
 
-    /// The order of its flow, where that is known. By default it is not.
+    /// The order of the flow; `None`, the default, where it is unknown.
     fn order(&self) -> Option<u32> {
         None
     }
 
-    /// Whether its steps solve no equation. By default they do.
+    /// Whether steps are explicit. By default they are implicit.
     fn is_explicit(&self) -> bool {
         false
     }
 
-    /// Whether `sigma_d` is the same at all points. By default it is not known to be.
+    /// Whether `sigma_d` is known to be the same at all points. By default it is not.
     fn constant_rate(&self) -> bool {
         false
     }
@@ -206,9 +210,9 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
 /// One step of a discrete Hamiltonian flow, forward or backward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiscreteStep<const N: usize> {
-    /// The state that the step leads to.
+    /// The final state of the step.
     pub end: PhasePoint<N>,
-    /// The mean velocity `(q1 - q0) / h`, kept apart because the difference of the positions loses its digits.
+    /// The mean velocity `(q1 - q0) / h`, stored because the difference of the positions suffers from cancellation.
     pub velocity: SVector<f64, N>,
     /// `sigma_d = 1 + Dz L_d` at the step's point of Q x Q x R.
     pub sigma: f64,
@@ -217,7 +221,7 @@ pub struct DiscreteStep<const N: usize> {
 }
 
 impl<const N: usize> DiscreteStep<N> {
-    /// Refuses a step that is not finite or not conformally contact.
+    /// Returns the step if it is finite with `sigma_d > 0`, and an error otherwise.
     ///
     /// # Errors
     /// [`StepError::NonFinite`], [`StepError::SigmaVanished`].
@@ -233,7 +237,7 @@ impl<const N: usize> DiscreteStep<N> {
     }
 }
 
-/// The first jet by automatic differentiation of the value.
+/// The value and first derivatives, by automatic differentiation of the value.
 ///
 /// # Errors
 /// Those of the value.
@@ -262,7 +266,7 @@ pub fn derived_jet<const N: usize>(
     Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
 }
 
-/// The second jet by automatic differentiation of the value.
+/// The value, first and second derivatives, by automatic differentiation of the value.
 ///
 /// # Errors
 /// Those of the value.
@@ -286,12 +290,13 @@ pub fn derived_second_jet<const N: usize>(
     })
 }
 
-/// The starts of the blocks of the `2N + 1` coordinates.
+/// The first indices of the blocks into which the `2N + 1` coordinates are divided.
 fn blocks<const N: usize>() -> impl Iterator<Item = usize> {
     (0..=2 * N).step_by(BLOCK)
 }
 
-/// The point with the coordinates from `start` on as directions, in the order `q0, q1, z0`: one block of [`seed`].
+/// The point as dual numbers, with the [`BLOCK`] coordinates from `start` as directions, in the order `q0, q1, z0`: one
+/// block of [`seed`].
 fn lifted<T: Scalar, const N: usize>(
     x: &DiscretePoint<N, T>,
     start: usize,
@@ -310,7 +315,7 @@ fn lifted<T: Scalar, const N: usize>(
     }
 }
 
-/// [`derived_second_jet`] of many coordinates: by blocks of directions, for the sake of the stack.
+/// [`derived_second_jet`] for many coordinates, by blocks of directions, which bounds the use of the stack.
 fn second_jet_by_blocks<const N: usize>(
     ld: &(impl DiscreteLagrangian<N> + ?Sized),
     t: f64,

@@ -21,7 +21,7 @@ pub fn discrete_flow<const N: usize>(
 /// The linearisation `T Phi_d = (T F-L_d)^-1 T F+L_d`, the first factor at `Phi_d(x)`.
 ///
 /// # Errors
-/// [`StepError::Singular`] where F-L_d is no local diffeomorphism, and those of a step.
+/// [`StepError::Singular`] where F-L_d is not a local diffeomorphism, and those of the discrete Lagrangian.
 pub fn discrete_flow_jacobian<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -36,7 +36,7 @@ pub fn discrete_flow_jacobian<const N: usize>(
 /// The linearisation `T Phi~_d = T F+L_d (T F-L_d)^-1`, both at the step's point of Q x Q x R.
 ///
 /// # Errors
-/// [`StepError::Singular`] where F-L_d is no local diffeomorphism, and those of the discrete Lagrangian.
+/// [`StepError::Singular`] where F-L_d is not a local diffeomorphism, and those of the discrete Lagrangian.
 pub fn hamiltonian_flow_jacobian<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -50,16 +50,16 @@ pub fn hamiltonian_flow_jacobian<const N: usize>(
 /// The paper's three expressions of the discrete Hamiltonian flow Phi~_d.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HamiltonianFlow {
-    /// `F+L_d o (F-L_d)^-1`: one implicit solve; what a run uses.
+    /// `F+L_d o (F-L_d)^-1`: one implicit solve; the expression that a run uses.
     Direct,
-    /// `F+L_d o Phi_d o (F+L_d)^-1`, through the step before.
+    /// `F+L_d o Phi_d o (F+L_d)^-1`, through the previous step.
     ThroughPlus,
-    /// `F-L_d o Phi_d o (F-L_d)^-1`, through the step after.
+    /// `F-L_d o Phi_d o (F-L_d)^-1`, through the next step.
     ThroughMinus,
 }
 
 /// `Phi~_d`, from `(q0, p0, z0)` at time `t` to `(q1, p1, z1)` at `t + h`, by one of its expressions; paper, section 3.1.
-/// `guess` is a guess of the mean velocity.
+/// `guess` is an initial guess of the mean velocity.
 ///
 /// # Errors
 /// Those of a step.

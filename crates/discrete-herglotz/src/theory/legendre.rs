@@ -4,7 +4,7 @@ use crate::{DiscreteLagrangian, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint, Regularity};
 
-/// `sigma_d = 1 + Dz L_d`, the conformal factor of the step; paper, section 3.1.
+/// The conformal factor `sigma_d = 1 + Dz L_d` of a step; paper, section 3.1.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.
@@ -16,7 +16,7 @@ pub fn sigma_d<const N: usize>(
     Ok(ld.jet(t, x)?.sigma())
 }
 
-/// `F-L_d (q0, q1, z0) = (q0, -D1 L_d / (1 + Dz L_d), z0)`; paper, section 3.1.
+/// The discrete Legendre transform `F-L_d (q0, q1, z0) = (q0, -D1 L_d / (1 + Dz L_d), z0)`; paper, section 3.1.
 ///
 /// # Errors
 /// [`StepError::SigmaVanished`] where `sigma_d` vanishes, and those of the discrete Lagrangian.
@@ -33,7 +33,7 @@ pub fn legendre_minus<const N: usize>(
     Ok(PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: x.z0 })
 }
 
-/// `F+L_d (q0, q1, z0) = (q1, D2 L_d, z0 + L_d)`; paper, section 3.1.
+/// The discrete Legendre transform `F+L_d (q0, q1, z0) = (q1, D2 L_d, z0 + L_d)`; paper, section 3.1.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.
@@ -46,10 +46,10 @@ pub fn legendre_plus<const N: usize>(
     Ok(PhasePoint { q: x.q1, p: jet.d2, z: x.z0 + jet.value })
 }
 
-/// The inverse of F-L_d near a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the state.
+/// The inverse of F-L_d, by Newton's method from a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the state.
 ///
 /// # Errors
-/// Those of a step: where F-L_d is no local diffeomorphism, [`StepError::Singular`].
+/// Those of a step; [`StepError::Singular`] where F-L_d is not a local diffeomorphism.
 pub fn legendre_minus_inverse<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -60,7 +60,8 @@ pub fn legendre_minus_inverse<const N: usize>(
     Ok(DiscretePoint { q0: state.q, q1: step.end.q, z0: state.z })
 }
 
-/// The inverse of F+L_d near a guess of the mean velocity; `t` is the time a step before that of the state.
+/// The inverse of F+L_d, by Newton's method from a guess of the mean velocity; `t` is the time one step before that of
+/// the state.
 ///
 /// # Errors
 /// Those of a backward step.
@@ -74,7 +75,7 @@ pub fn legendre_plus_inverse<const N: usize>(
     Ok(DiscretePoint { q0: step.end.q, q1: state.q, z0: step.end.z })
 }
 
-/// How regular a discrete Lagrangian is at a point: it is regular where `sigma_d` does not vanish and F-L_d is a local
+/// The regularity of a discrete Lagrangian at a point: it is regular where `sigma_d` does not vanish and F-L_d is a local
 /// diffeomorphism; paper, section 3.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiscreteRegularity {
@@ -84,7 +85,7 @@ pub struct DiscreteRegularity {
     pub fibre: Regularity,
 }
 
-/// Measures the regularity of a discrete Lagrangian at a point.
+/// Computes the [`DiscreteRegularity`] of a discrete Lagrangian at a point.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.

@@ -8,14 +8,18 @@ use crate::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
 
-/// The corrections that have not become smaller after which they are rounding.
+/// After this number of corrections that do not decrease, the remaining ones are taken for round-off.
 const STALLED: u32 = 8;
 
-/// `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method from a guess of the velocity: the state of a run with its
-/// velocity, and back to [`legendre`](contact_geom::legendre). A guess of 0 finds it where there is one alone.
+/// The inverse Legendre transformation `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method from a
+/// guess of the velocity; the inverse of [`legendre`](contact_geom::legendre).
+///
+/// The guess selects a solution where several velocities have the same momentum; where the velocity is unique, 0 is a
+/// suitable guess.
 ///
 /// # Errors
-/// [`StepError::Singular`] where W is, [`StepError::NonFinite`] where L is not defined on the way, [`StepError::NotConverged`].
+/// [`StepError::Singular`] where `W = L_vv` is singular, [`StepError::NonFinite`] where L is not defined at the guess or at
+/// an iterate, [`StepError::NotConverged`].
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Relativistic};
@@ -37,7 +41,7 @@ pub fn legendre_inverse<const N: usize>(
     for _ in 0..ITERATION_LIMIT {
         let mut change = momenta - state.p;
         let mut w = mass_matrix(lagrangian, t, &x);
-        // To the round-off of its terms: where W is ill conditioned the velocity is determined no better.
+        // The residual is compared with the round-off of its terms: an ill-conditioned W determines the velocity no better.
         let of = |i: usize| (0..N).map(|j| (w[(i, j)] * x.v[j]).abs()).sum::<f64>() + state.p[i].abs();
         let terms: SVector<f64, N> = SVector::from_fn(|i, _| of(i));
         let held = change.iter().zip(&terms).all(|(off, term)| off.abs() <= 2.0 * N as f64 * f64::EPSILON * term);
@@ -54,14 +58,15 @@ pub fn legendre_inverse<const N: usize>(
         let round_off = f64::EPSILON * scale;
         let stalls = size >= 0.5 * before;
         stalled += u32::from(stalls);
-        // The rounding of a gradient whose terms cancel does not show in its size: with half of the digits, it is what is left.
+        // Where the terms of the gradient cancel, its size does not show its round-off: a stalled iteration is accepted at
+        // half of the digits.
         let left = stalled >= STALLED && size <= f64::EPSILON.sqrt() * scale;
         if last_correction(size, before, round_off) || (stalls && (held || size <= 64.0 * round_off || left)) {
             return Ok(x);
         }
         before = size;
         momenta = lagrangian.gradient(t, &x).y;
-        // A whole correction may leave the domain of L, as beyond the speed of light.
+        // A full correction may leave the domain of L, for example beyond the speed of light.
         for _ in 0..f64::MANTISSA_DIGITS {
             if max_abs_or_nan(momenta.iter().copied()).is_finite() {
                 break;
@@ -79,8 +84,8 @@ mod tests {
     use super::*;
     use contact_geom::{legendre, systems::Relativistic};
 
-    /// From rest, though the first correction is beyond the speed of light: to the rounding of the velocity, which W carries into
-    /// the momentum, and that of the gradient, a difference of terms of size one.
+    /// Starting from rest, where the first correction may exceed the speed of light. The tolerance allows for the round-off
+    /// of the velocity, which W carries into the momentum, and for that of the gradient, a difference of terms of size one.
     #[test]
     fn from_rest_to_any_momentum() {
         let system = Relativistic::default();
@@ -93,7 +98,7 @@ mod tests {
         }
     }
 
-    /// Where the terms of the gradient cancel, its rounding is what is left of the momentum.
+    /// Where the terms of the gradient cancel, its round-off limits the residual of the momentum.
     #[test]
     fn a_gradient_whose_terms_cancel() {
         let system = contact_geom::WithoutClosedDerivatives(Relativistic::default());
@@ -104,7 +109,7 @@ mod tests {
         }
     }
 
-    /// Where L is not defined at the guess, that is said.
+    /// A guess at which L is not defined is reported as such.
     #[test]
     fn a_guess_outside_the_domain() {
         let found = legendre_inverse(&Relativistic::default(), 0.0, &PhasePoint::new([0.0], [1.0], 0.0), &[2.0].into());

@@ -14,8 +14,7 @@ impl<const N: usize> DiscretePath<N> {
     /// The path through these points.
     ///
     /// # Errors
-    /// [`InputError::Count`] for fewer than two points (no step), [`GeometryError::NonFinite`] where a coordinate is not
-    /// finite.
+    /// [`InputError::Count`] for fewer than two points, [`GeometryError::NonFinite`] where a coordinate is not finite.
     pub fn new(points: Vec<SVector<f64, N>>) -> Result<Self, InputError> {
         if points.len() < 2 {
             return Err(InputError::Count { what: "the number of points of the path", least: 2, found: points.len() });
@@ -38,7 +37,7 @@ impl<const N: usize> DiscretePath<N> {
         self.points.len() - 1
     }
 
-    /// The jets of `L_d` along the path, with the actions `z_k` that they belong to.
+    /// The jets of `L_d` along the path, each with the action `z_k` at which it is taken.
     fn jets(&self, ld: &impl DiscreteLagrangian<N>, t0: f64, z0: f64) -> Result<Vec<(f64, DiscreteJet<N>)>, StepError> {
         let mut z = z0;
         let mut jets = Vec::with_capacity(self.steps());
@@ -60,7 +59,7 @@ impl<const N: usize> DiscretePath<N> {
         Ok(z)
     }
 
-    /// The differential of the discrete action at this path, one covector a point, by the paper's formula:
+    /// The differential of the discrete action at this path, one covector per point, by the formula of the paper:
     /// `sigma_N ... sigma_2 dZ_1/dq_0`, then `prod_{j >= k+2} sigma_j (D1 L_d(k) + sigma_{k+1} D2 L_d(k-1))`, then
     /// `dZ_N/dq_N`.
     ///
@@ -101,7 +100,7 @@ impl<const N: usize> DiscretePath<N> {
     }
 }
 
-/// The discrete action `A_d(q_d, z_0) = z_N` of points over any scalar, so that it can be differentiated as a whole.
+/// The discrete action `A_d(q_d, z_0) = z_N`, generic over the scalar type so that it can be differentiated.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.

@@ -1,10 +1,10 @@
-//! The paper's section 3 as residuals: each statement evaluated at a point of a discrete Lagrangian, relative to its terms'
-//! size.
+//! Section 3 of the paper as residuals: each statement is evaluated for a discrete Lagrangian at a point, relative to the
+//! size of its terms.
 //!
-//! A residual of a true statement is round-off times the conditions of the matrices involved; a test compares it with a
-//! tolerance, this module has none.
+//! The residual of a true statement is round-off times the condition numbers of the matrices involved. The tolerances
+//! belong to the tests that call this module.
 
-// In a check `f64::max` and `amax` would lose a NaN.
+// `f64::max` and `amax` ignore a NaN, which a check must report.
 #![deny(clippy::disallowed_methods)]
 
 use crate::{
@@ -43,9 +43,11 @@ pub const STATEMENTS: [Statement; 16] = [
     Statement::MidpointRule,
 ];
 
-/// The residual of a statement of section 3 for a discrete Lagrangian at a time and a point of Q x Q x R; `None` where the
-/// statement's hypotheses do not apply, as for symmetries where there is none, or where it is not one of
-/// [`STATEMENTS`]. [`Statement::Volume`] and [`Statement::ReebField`] are those of section 2 on Q x Q x R.
+/// The residual of a statement of section 3 for a discrete Lagrangian at a time and a point of Q x Q x R.
+///
+/// `None` where the hypotheses of the statement do not apply (a statement on symmetries without a symmetry), and for a
+/// statement that is not one of [`STATEMENTS`]. [`Statement::Volume`] and [`Statement::ReebField`] are those of section 2
+/// on Q x Q x R.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian and of its forms at a point where it is not regular.
@@ -106,7 +108,7 @@ fn jets<const N: usize>(
     move |x| Ok(ld.second_jet(t, x)?)
 }
 
-/// F-L_d or F+L_d as a map that can be differentiated, by automatic differentiation of the value alone.
+/// F-L_d or F+L_d as a differentiable map, by automatic differentiation of the value alone.
 struct Transform<'a, D> {
     ld: &'a D,
     t: f64,
@@ -125,7 +127,7 @@ impl<const N: usize, D: DiscreteLagrangian<N>> Smooth<N> for Transform<'_, D> {
     }
 }
 
-/// Darboux' form and its differential pulled back along a transform by their definition, `J^T eta` and `J^T d eta J`.
+/// The pullbacks of Darboux' form and of its differential along a transform by definition, `J^T eta` and `J^T d eta J`.
 fn pulled_back<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -145,7 +147,8 @@ fn form_residual<const N: usize>(
     Ok(relative(closed.eta(x)?, eta).max_or_nan((closed.d_eta(x)? - &d_eta).max_abs_or_nan() / d_eta.max_abs_or_nan()))
 }
 
-/// Statement 1 on Q x Q x R: the contact condition for eta+ and eta-, in closed form and by the volume.
+/// Statement 1 on Q x Q x R: the volume forms of eta+ and eta- do not vanish, and their closed form agrees with the generic
+/// one.
 fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
     let point = (*x).into();
     let of = |closed: f64, generic: f64| {
@@ -156,7 +159,8 @@ fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscreteP
         .max_or_nan(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
 }
 
-/// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, closed against generic and by definition.
+/// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, in closed form against the generic computation
+/// and by definition.
 fn reeb<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
     fn of<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         let (eta, reeb) = (form.eta(x)?, form.reeb(x)?);
@@ -176,14 +180,14 @@ fn reeb<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoi
     Ok(of(&EtaMinus(jets(ld, t)), &point)?.max_or_nan(of(&EtaPlus(jets(ld, t)), &point)?))
 }
 
-/// A path of so many steps near the points of `x`, no faster than they are: not a solution.
+/// A path with this number of steps near the points of `x`, with velocities of the same size; it is not a solution.
 fn wiggly_path<const N: usize>(x: &DiscretePoint<N>, steps: usize) -> Result<DiscretePath<N>, GeometryError> {
     let stride = x.q1 - x.q0;
     let points = (0..=steps).map(|k| x.q0 + stride * (0.6 * (1.3 * k as f64).sin() + 0.2 * k as f64)).collect();
     DiscretePath::new(points).map_err(|_| GeometryError::Undefined { what: "the path" })
 }
 
-/// The differential of A_d by duals through the whole recursion, a direction at a time.
+/// The differential of A_d by dual numbers through the whole recursion, with the directions of one point at a time.
 fn differentiated<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -246,11 +250,11 @@ fn two_steps<const N: usize>(
     Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, max_or_nan))
 }
 
-/// Statement 15: a path is critical for A_d with fixed ends exactly if it solves the discrete Herglotz equations.
+/// Statement 15: a path is critical for A_d with fixed ends if and only if it solves the discrete Herglotz equations.
 ///
-/// Both directions: along the discrete flow the interior part of dA_d, differentiated independently, vanishes; and on a
-/// path that is no solution it is the residual of the equations times the product of the later sigma_d, none of which
-/// vanishes.
+/// Both directions are checked. Along the discrete flow the interior part of dA_d, differentiated independently, vanishes;
+/// on a path that is not a solution it is the residual of the equations times the product of the later sigma_d, none of
+/// which vanishes.
 fn principle<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -264,7 +268,7 @@ fn principle<const N: usize>(
     }
     let solution = DiscretePath::new(points).map_err(|_| GeometryError::Undefined { what: "the path" })?;
     let size = ld.jet(t, x)?.d1.max_abs_or_nan().max_or_nan(ld.jet(t, x)?.d2.max_abs_or_nan());
-    // A rounded point of the path changes its neighbours' residuals by D12 times the rounding.
+    // Round-off in a point of the path changes the residuals at its neighbours by D12 times that round-off.
     let second = ld.second_jet(t, x)?;
     let largest = solution.points().iter().map(MaxAbsOrNan::max_abs_or_nan).fold(0.0, max_or_nan);
     let size_of_solution = size.max_or_nan(second.d12.max_abs_or_nan() * largest);
@@ -291,7 +295,7 @@ fn principle<const N: usize>(
     Ok(worst)
 }
 
-/// Statement 17: F+L_d is a local diffeomorphism exactly if F-L_d is: eta+ = sigma_d eta- makes
+/// Statement 17: F+L_d is a local diffeomorphism if and only if F-L_d is, since `eta+ = sigma_d eta-` implies
 /// `det T F+L_d = sigma_d^(n+1) det T F-L_d`.
 fn both_local_diffeomorphisms<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
@@ -305,7 +309,7 @@ fn both_local_diffeomorphisms<const N: usize>(
     Ok(if minus == 0.0 || plus == 0.0 { f64::INFINITY } else { (plus - predicted).abs() / predicted.abs() })
 }
 
-/// Statement 18: `F+L_d (q0, q1, z0) = F-L_d (q1, q2, z1)` exactly for solutions of the discrete Herglotz equations.
+/// Statement 18: `F+L_d (q0, q1, z0) = F-L_d (q1, q2, z1)` if and only if the discrete Herglotz equations hold.
 fn momentum_matching<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -314,11 +318,11 @@ fn momentum_matching<const N: usize>(
     let h = ld.step_size();
     let next = discrete_flow(ld, t, x)?;
     let (plus, minus) = (legendre_plus(ld, t, x)?, legendre_minus(ld, t + h, &next)?);
-    // q2 is rounded, and p1 depends on it by W/h.
+    // p1 depends on the round-off of q2 through W/h.
     let slope = ld.second_jet(t + h, &next)?.d12.max_abs_or_nan();
     let size = ChartVector::from(plus).max_abs_or_nan().max_or_nan(slope * next.q1.max_abs_or_nan());
     let matching = ChartVector::from(plus).minus(minus.into()).max_abs_or_nan() / size;
-    // Away from the solution the mismatch of the momenta is the residual divided by sigma.
+    // Away from a solution the difference of the momenta is the residual of the equations divided by sigma_d.
     let mut off = next;
     off.q1 += (next.q1 - next.q0) * 0.1;
     let path =
@@ -330,7 +334,7 @@ fn momentum_matching<const N: usize>(
     Ok(if distinguishes { matching.max_or_nan(equations) } else { f64::INFINITY })
 }
 
-/// Statement 19: the flow exists where F-L_d is a local diffeomorphism: its solve and the inverses return the point.
+/// Statement 19: the flow exists where F-L_d is a local diffeomorphism; the inverses of F-L_d and F+L_d return the point.
 fn flow_exists<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -353,7 +357,7 @@ fn three_expressions<const N: usize>(
     let by = |expression| hamiltonian_flow(ld, t, &state, &guess, expression);
     let direct = by(HamiltonianFlow::Direct)?;
     let step = ld.forward(t, &state, &guess, &mut crate::solve::Solver::default())?;
-    // p is recovered from rounded positions, of which it depends by W/h.
+    // The momentum is computed from rounded positions, on which it depends through W/h.
     let size = ChartVector::from(direct)
         .max_abs_or_nan()
         .max_or_nan(ld.second_jet(t, x)?.d12.max_abs_or_nan() * x.q1.max_abs_or_nan());
@@ -363,8 +367,8 @@ fn three_expressions<const N: usize>(
         .max_or_nan(distance(step.end)))
 }
 
-/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form; the jets that they are made of, and the
-/// linearised transforms, are those of the value.
+/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form. Their jets and the linearised transforms
+/// agree with automatic differentiation of the value.
 fn contact_forms<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -413,7 +417,7 @@ fn forms_are_related<const N: usize>(
     let point = (*x).into();
     let (minus, plus) = (EtaMinus(jets(ld, t)), EtaPlus(jets(ld, t)));
     let sigma = ld.jet(t, x)?.sigma();
-    // Both forms by their definition, so that the identity is not one of formulas.
+    // Both forms are computed by definition, so that the identity is not built into the closed formulas.
     let (by_plus, by_minus) = (pulled_back(ld, t, x, true)?.0, pulled_back(ld, t, x, false)?.0);
     let proportional = relative(by_plus, by_minus.scale(sigma));
     let image = discrete_flow(ld, t, x)?;
@@ -426,7 +430,7 @@ fn forms_are_related<const N: usize>(
     Ok(proportional.max_or_nan(related).max_or_nan(relative(plus.eta(&point)?, minus.eta(&point)?.scale(sigma))))
 }
 
-/// A covector pulled back along a Jacobian.
+/// The pullback of a covector along a Jacobian.
 fn pull<const N: usize>(jacobian: &DMatrix<f64>, covector: &ChartVector<N>) -> ChartVector<N> {
     let image = jacobian.tr_mul(&covector.to_vector());
     ChartVector::from_fn(|i| image[i])
@@ -443,7 +447,7 @@ fn discrete_flow_is_conformal<const N: usize>(
     let jacobian = discrete_flow_jacobian(ld, t, x, &image)?;
     let (sigma, sigma_after) = (ld.jet(t, x)?.sigma(), ld.jet(t + h, &image)?.sigma());
     let (from, to) = ((*x).into(), image.into());
-    // Relative to the terms of the pullback, which may cancel.
+    // The residual is relative to the terms of the pullback, since these may cancel.
     let of = |before: ChartVector<N>, after: ChartVector<N>, sigma: f64| {
         let size = (after.max_abs_or_nan() * jacobian.max_abs_or_nan()).max_or_nan(before.max_abs_or_nan());
         pull(&jacobian, &after).minus(before.scale(sigma)).max_abs_or_nan() / size
@@ -476,7 +480,7 @@ impl<const N: usize> Smooth<N> for Diagonal<'_, N> {
     }
 }
 
-/// Statement 26: the lifted action is by contactomorphisms of eta+ and eta-, and `J_d o Phi_d = sigma_d J_d`.
+/// Statement 26: the lifted action preserves eta+ and eta-, and `J_d o Phi_d = sigma_d J_d`.
 fn momentum_is_dissipated<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     group: &Symmetry<N>,
@@ -497,7 +501,7 @@ fn momentum_is_dissipated<const N: usize>(
     let h = ld.step_size();
     let image = discrete_flow(ld, t, x)?;
     let (before, after) = (discrete_momentum(ld, group, t, x)?, discrete_momentum(ld, group, t + h, &image)?);
-    // p1 from rounded positions: W/h times their rounding, times the generator.
+    // p1 is computed from rounded positions: its error is W/h times their round-off, and J_d multiplies it by the generator.
     let xi = group.generator(&image.q0).max_abs_or_nan();
     let size =
         before.abs().max_or_nan(xi * ld.second_jet(t + h, &image)?.d12.max_abs_or_nan() * image.q1.max_abs_or_nan());
@@ -505,7 +509,7 @@ fn momentum_is_dissipated<const N: usize>(
     Ok(contact.max_or_nan(sign).max_or_nan((after - ld.jet(t, x)?.sigma() * before).abs() / size))
 }
 
-/// Statement 39, its second half: sigma_d is positive for these steps; zero or infinite.
+/// The second half of statement 39, that `sigma_d` is positive: 0 where it holds, infinity where it does not.
 fn sigma_is_positive<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,

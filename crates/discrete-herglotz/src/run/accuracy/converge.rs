@@ -64,9 +64,9 @@ impl From<Ended> for InputError {
 /// The times at which trial runs are compared.
 #[derive(Clone, Copy)]
 pub(crate) enum Compared {
-    /// At the ends of steps next to tenths of the span.
+    /// At the ends of the steps that contain the tenths of the span.
     Steps,
-    /// At tenths of the span, which divide the numbers of steps.
+    /// At tenths of the span, which are ends of steps of every run.
     Tenths,
     /// At tenths of the span; the runs are in the transformed time of the Lagrangian.
     Times,

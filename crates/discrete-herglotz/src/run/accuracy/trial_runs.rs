@@ -277,7 +277,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
     }
 
-    /// Computes the motion by Gauss collocation with steps that are divided where their defect exceeds that of the
+    /// Computes the motion by Gauss collocation with steps that are divided where their defect exceeds the bound of the
     /// integrator.
     pub fn divided(
         &mut self,

@@ -1,4 +1,4 @@
-//! The drift of a provably dissipated energy.
+//! The drift of the energy of an autonomous system.
 
 use crate::numbers::state_words::saved;
 use contact_geom::numbers::max_or_nan;
@@ -13,9 +13,9 @@ const LEAST: f64 = 0.01;
 /// checked from this n on.
 const FIRST: f64 = 16.0;
 
-/// The drift of the energy of an autonomous system along a run. The motion satisfies `dH/dt = L_z H`, so that `H /
-/// sigma` is constant, with the conformal factor sigma. The drift is compared with the kinetic energy: the larger of
-/// its mean over the checks so far, scaled by the conformal factor, and its value at the last check.
+/// The drift of the energy of an autonomous system along a run. The motion satisfies `dH/dt = L_z H`, so that `H/sigma`
+/// is constant, with the conformal factor sigma. The drift is compared with the kinetic energy: the larger of its mean
+/// over the checks so far, scaled by the conformal factor, and its value at the last check.
 ///
 /// If the drag is strong within a step, H is a small difference of L and `L_z z`, whose errors are of their own size
 /// times the drag of a step; these are added to the kinetic energy.

@@ -18,7 +18,8 @@ use claims::ClaimMonitor;
 use contact_geom::{Defect, Lagrangian, PhasePoint};
 use energy::EnergyMonitor;
 
-/// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the run.
+/// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the
+/// run.
 const PROBES: usize = 1 << 14;
 
 /// The number of steps by which a run may pass the end found by its trial runs, which is known up to the errors of
@@ -64,8 +65,10 @@ pub(crate) struct Checks<'r, 'p, L, const N: usize> {
     /// Whether steps are compared with two halves: those of few stages at powers of two, all where they are suspect.
     halves: bool,
     suspects: bool,
-    /// Whether the stepper's own findings count. Trial runs have compared the steps of other methods with a reference whose defect was sampled;
-    /// and a transient within a step of a motion that is proved to be linear leaves no error but that of the order.
+    /// Whether unresolved steps that the stepper reports count. For a requested accuracy they count only for
+    /// collocation, since trial runs have compared the steps of other methods with a reference whose defect was
+    /// sampled; and not for a motion that is proved to be linear, in which a transient within a step causes no error
+    /// beyond that of the order.
     of_stepper: bool,
     claims: Option<ClaimMonitor<N>>,
     energy: Option<EnergyMonitor<N>>,
@@ -73,8 +76,8 @@ pub(crate) struct Checks<'r, 'p, L, const N: usize> {
 }
 
 impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
-    /// The checks that a run of these steps needs: whether `sigma_d` is the same in all of them, and after how many an observer is expected
-    /// to end the run.
+    /// The checks of a run with these steps: `constant_rate` says whether `sigma_d` is the same in all of them, and
+    /// `ends_after` after how many of them an observer is expected to end the run.
     pub fn of(steps: &'r Discretization<'p, L, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
         let given = steps.error.is_none();
         let suspects = given && !steps.info.in_transformed_time;

@@ -11,8 +11,8 @@ use contact_geom::{
 /// The cause in the [`Status`](crate::Status) of a run that ends because the motion has come to rest.
 pub(crate) const REST: &str = "rest";
 
-/// Positions and momenta below this are at rest. Numbers smaller than it by some ten powers of ten lose digits in products, so that an error
-/// relative to the motion is no longer defined.
+/// Positions and momenta below this are at rest. Numbers smaller than it by some ten powers of ten lose digits in
+/// products, so that an error relative to the motion is no longer defined.
 const SMALLEST: f64 = 1e-280;
 
 /// The largest rate of the action at rest, in units of its round-off.
@@ -34,8 +34,8 @@ pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Pr
     still && free && slope.z < 0.0 && h.vv.cholesky().is_some() && (-h.qq).cholesky().is_some()
 }
 
-/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`SMALLEST`], and its action, where that is
-/// requested, is constant.
+/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`SMALLEST`], and its
+/// action, if it is requested, is constant.
 pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     needs: OutputRequest,

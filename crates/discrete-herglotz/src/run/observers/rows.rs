@@ -133,7 +133,8 @@ impl<'f, const N: usize> Rows<'f, N> {
         Rows { velocity: true, ..self }
     }
 
-    /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`, and the columns' own.
+    /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`,
+    /// and those of the columns.
     pub fn header(&self) -> Vec<String> {
         let of =
             |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));

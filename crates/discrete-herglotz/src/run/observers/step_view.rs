@@ -40,7 +40,8 @@ pub struct StepView<'r, const N: usize> {
     pub t: f64,
     /// The state `(q, p, z)`; z is the initial action if the action was not requested.
     pub state: PhasePoint<N>,
-    /// `sigma_d` of the last step, the factor by which it contracts the contact form and every momentum of a symmetry; 1 at the start.
+    /// `sigma_d` of the last step, the factor by which it scales the contact form and every momentum of a symmetry; 1
+    /// at the start.
     pub sigma: f64,
     /// The logarithm of the conformal factor of the motion since the start, if it was requested.
     pub log_factor: Option<f64>,
