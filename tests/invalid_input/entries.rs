@@ -11,6 +11,12 @@ pub fn of_crate(name: &str) -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
     let lib = fs::read_to_string(root.join("lib.rs")).unwrap();
     let of_the_crate = exported(&lib);
+    // A type of one public module may have functions in another.
+    let folders: Vec<String> =
+        lib.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).map(str::to_owned).collect();
+    let of_folders = folders.iter().filter_map(|folder| fs::read_to_string(root.join(folder).join("mod.rs")).ok());
+    let of_folders: Vec<String> = of_folders.collect();
+    let of_folders: BTreeSet<&str> = of_folders.iter().flat_map(|text| exported(text)).collect();
     let mut entries = BTreeSet::new();
     for file in sources(&root) {
         let relative = file.strip_prefix(&root).unwrap().with_extension("");
@@ -23,12 +29,13 @@ pub fn of_crate(name: &str) -> BTreeSet<String> {
         let mut parts = relative.iter().filter_map(|part| part.to_str()).filter(|part| *part != "mod");
         let (folder, inner) = (parts.next().unwrap_or_default(), parts.next());
         let own = inner.map(|_| fs::read_to_string(root.join(folder).join("mod.rs")).unwrap());
-        // A public module, or a module of a private folder that the crate re-exports.
-        let handed_on = inner.zip(own.as_deref()).filter(|(m, own)| declares(own, m) && of_the_crate.contains(m));
+        // A public module, or a public module of a folder that is public or whose module the crate re-exports.
+        let is_reached = |m: &str| of_the_crate.contains(m) || declares(&lib, folder);
+        let handed_on = inner.zip(own.as_deref()).filter(|(m, own)| declares(own, m) && is_reached(m));
         let module = handed_on.map(|(m, _)| m).or(Some(folder).filter(|m| declares(&lib, m)));
         // All of a public module, but of a folder only what its `mod.rs` exports.
         let exported = match (module, own.as_deref()) {
-            (Some(m), Some(own)) if m == folder => Some(exported(own)),
+            (Some(m), Some(_)) if m == folder => Some(of_folders.union(&of_the_crate).copied().collect()),
             (Some(_), _) => None,
             (None, _) => Some(of_the_crate.clone()),
         };
@@ -42,9 +49,9 @@ fn declares(file: &str, module: &str) -> bool {
     file.lines().any(|line| line.strip_prefix("pub mod ").and_then(|m| m.strip_suffix(';')) == Some(module))
 }
 
-/// The names after `pub use`.
+/// The names after `pub use`, also within a module of the file.
 fn exported(lib: &str) -> BTreeSet<&str> {
-    let uses = lib.split("\npub use ").skip(1).filter_map(|u| u.split(';').next());
+    let uses = lib.split("pub use ").skip(1).filter_map(|u| u.split(';').next());
     uses.flat_map(|u| u.split(|c: char| !c.is_alphanumeric() && c != '_')).filter(|name| !name.is_empty()).collect()
 }
 

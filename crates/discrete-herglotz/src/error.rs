@@ -1,12 +1,12 @@
-//! Bad input, and what goes wrong along a motion.
+//! Errors of the input and of the steps, and the status of a run.
 
 use contact_geom::GeometryError;
 use thiserror::Error;
 
-/// Bad input, found before the first step.
+/// Invalid input, detected before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum InputError {
-    /// The step is 0 or not finite, or negative where something else tells the direction, as the end of a run does.
+    /// The step is 0 or not finite, or negative where the direction is given otherwise, as by the end of a run.
     #[error(
         "the step h = {h} must be a finite number and not 0; and positive where the end of the run tells its direction"
     )]
@@ -20,10 +20,10 @@ pub enum InputError {
         /// The span that was passed.
         span: f64,
     },
-    /// A wanted error is not a positive finite number.
+    /// A requested error is not a positive finite number.
     #[error("the wanted relative error is {wanted}; it must be positive and finite")]
     Tolerance {
-        /// The error that was asked for.
+        /// The requested error.
         wanted: f64,
     },
     /// A scale of a coordinate is not a positive finite number.
@@ -34,44 +34,44 @@ pub enum InputError {
         /// The scale that was passed.
         scale: f64,
     },
-    /// A wanted accuracy is not reached.
+    /// A requested accuracy is not reached.
     #[error("the wanted relative error {wanted:e} is not {}: {cause}", how_near(*wanted, *reached))]
     Accuracy {
-        /// The error that was asked for.
+        /// The requested error.
         wanted: f64,
-        /// The smallest distance of trial runs; infinite where none were compared. Below the wanted error where something else than their
-        /// distance stands in the way.
+        /// The smallest difference between trial runs; infinite where none were compared. It is below the requested
+        /// error where the accuracy fails for another reason than this difference.
         reached: f64,
-        /// What stands in the way.
+        /// The reason.
         cause: SelectionFailure,
     },
-    /// There are too many of something to be counted, kept, or to be told apart.
+    /// A number is too large to be counted or stored, or its items are too close to be distinguished.
     #[error("{what} = {found:e}; at most {most:e} are possible: {remedy}")]
     TooMany {
         /// What is counted.
         what: &'static str,
-        /// The number that was asked for.
+        /// The requested number.
         found: f64,
-        /// The largest possible.
+        /// The largest possible number.
         most: f64,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// A run has neither steps nor an accuracy for which they are chosen.
+    /// A run has neither steps nor an accuracy from which they are chosen.
     #[error("the run has no steps; give them by `steps`, or ask for an `accuracy`")]
     NoSteps,
-    /// A run with given steps names no integrator.
+    /// A run with given steps has no integrator.
     #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
     NoIntegrator,
-    /// The trial runs of a plan were ended from outside.
+    /// The trial runs of a plan were interrupted.
     #[error("the trial runs were interrupted before a step was found; run it again, or give a step")]
     Interrupted,
-    /// A run is resumed that is not the one which was interrupted.
+    /// The resumed run differs from the interrupted one.
     #[error(
         "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
     )]
     AnotherRun,
-    /// A run is to be saved whose stepper does not know how.
+    /// A checkpoint was requested for a run whose stepper does not implement saving.
     #[error(
         "the integrator's stepper cannot be saved; leave the checkpoint out, or give it `Stepper::save` and `restore`"
     )]
@@ -89,14 +89,14 @@ pub enum InputError {
     /// The Lagrangian has no finite value or derivative at the start.
     #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
     Undefined,
-    /// A collocation method has no such number of stages.
+    /// The number of stages of a collocation method is out of range.
     #[error("{found} stages; contact Gauss collocation has from 1 to 16")]
     Stages {
         /// The number of stages that was passed.
         found: usize,
     },
-    /// A time transformation stands still, runs backward or is not defined at the start.
-    #[error("the rate dt/dtau dt/dtau is {rate} at the start; it must be positive and finite")]
+    /// The rate of a time transformation is zero, negative or not defined at the start.
+    #[error("the rate dt/dtau is {rate} at the start; it must be positive and finite")]
     TimeTransformation {
         /// The rate at the start.
         rate: f64,
@@ -114,7 +114,7 @@ pub enum InputError {
         /// The count that was passed.
         found: usize,
     },
-    /// The path from which a search starts has another number of steps than the problem.
+    /// A path has another number of steps than the problem.
     #[error("the path has {found} steps where the problem has {expected}; pass {expected} + 1 points")]
     PathLength {
         /// The number of steps of the problem.
@@ -122,7 +122,7 @@ pub enum InputError {
         /// The number of steps of the path.
         found: usize,
     },
-    /// A coordinate, a slice or a matrix of the geometry is bad.
+    /// An error of the geometry: an invalid coordinate, slice or matrix.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// The conformal factor is not positive at the start.
@@ -134,18 +134,18 @@ pub enum InputError {
         /// The value of sigma_d.
         sigma: f64,
     },
-    /// The two points of the start coincide and the discrete Lagrangian is not regular there.
+    /// The two initial points coincide, and the discrete Lagrangian is not regular there.
     #[error(
         "q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points"
     )]
     EqualPoints,
-    /// A method is only for Lagrangians of a form that this one does not claim to have.
+    /// The method requires a form of the Lagrangian that this one does not claim to have.
     #[error("the Lagrangian does not claim to be {claim}; claim it in `structure` if it is, or take another method")]
     Unclaimed {
         /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
         claim: &'static str,
     },
-    /// A claim on the Lagrangian's form does not hold.
+    /// A claim on the form of the Lagrangian is false.
     #[error(
         "the Lagrangian claims to be {claim}, and is not: a derivative that should vanish has the relative size {size:e}"
     )]
@@ -155,23 +155,23 @@ pub enum InputError {
         /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
         size: f64,
     },
-    /// A Lagrangian has switching functions, and does not say so.
+    /// A Lagrangian has switching functions that its `HINTS` do not state.
     #[error(
         "the Lagrangian has `switching_functions`; state them by `const HINTS: Hints = Hints {{ switching_functions: true, ..Hints::NONE }}`"
     )]
     SwitchingUnstated,
-    /// A method rests on a hypothesis that this Lagrangian does not satisfy.
+    /// The Lagrangian does not satisfy a hypothesis of the method.
     #[error("the method needs {hypothesis}; take another method or another Lagrangian")]
     Hypothesis {
-        /// The hypothesis, in the field's terms.
+        /// The hypothesis.
         hypothesis: &'static str,
     },
-    /// The first step cannot be solved.
+    /// The first step fails.
     #[error("no first step from this start: {0}")]
     FirstStep(StepError),
 }
 
-/// What is said of an accuracy that was not reached, by the distance of the trial runs.
+/// The part of the message for an accuracy that was not reached, depending on the difference between the trial runs.
 fn how_near(wanted: f64, reached: f64) -> String {
     if !reached.is_finite() {
         "reached, and no two trial runs could be compared".to_owned()
@@ -183,7 +183,7 @@ fn how_near(wanted: f64, reached: f64) -> String {
 }
 
 impl InputError {
-    /// Of a first step that cannot be taken.
+    /// The input error for a first step that fails.
     pub(crate) fn first_step(cause: StepError) -> Self {
         match cause {
             StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
@@ -192,7 +192,7 @@ impl InputError {
     }
 }
 
-/// Why a step could not be taken: for no fault of the input.
+/// The cause of a step that failed with valid input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum StepError {
     /// Newton's method did not reach round-off.
@@ -200,13 +200,13 @@ pub enum StepError {
     NotConverged {
         /// The largest component of the last residual, a momentum.
         residual: f64,
-        /// The iterations made.
+        /// The number of iterations.
         iterations: u32,
     },
     /// The derivative of F-L_d (or F+L_d) is singular.
     #[error("the discrete Lagrangian is not regular here (pivot {pivot:e}); take a smaller step")]
     Singular {
-        /// The pivot that vanished.
+        /// The vanishing pivot.
         pivot: f64,
     },
     /// sigma_d = 1 + Dz L_d is not positive.
@@ -215,7 +215,8 @@ pub enum StepError {
         /// The value of sigma_d.
         sigma: f64,
     },
-    /// A stage of a collocation step has an integrating factor that is not positive: the step is not conformally contact.
+    /// The integrating factor of a stage of a collocation step is not positive, so that the step is not conformally
+    /// contact.
     #[error(
         "the integrating factor of a stage is {rho}, where it must be positive: the step is too long for the rate L_z of the \
          conformal factor; take a smaller step or more stages"
@@ -224,19 +225,19 @@ pub enum StepError {
         /// The smallest factor of a stage, 1 at the start of the step.
         rho: f64,
     },
-    /// The exact motion of a step is not defined up to the step's end.
+    /// The exact motion is not defined up to the end of the step.
     #[error("the motion is defined only until t = {t}; take a smaller step")]
     OutsideDomain {
         /// The time until which it is defined.
         t: f64,
     },
-    /// The two points of a step are conjugate along the exact motion, and do not determine it.
+    /// The two points of a step are conjugate along the exact motion, so that they do not determine it.
     #[error("the points of the step are conjugate (singular value {smallest:e}); take another step")]
     ConjugatePoint {
         /// The smallest singular value of the derivative of the end position in the initial velocity, a time.
         smallest: f64,
     },
-    /// A step is divided as long as its parts do not resolve the motion, and not even the shortest does, or they are too many.
+    /// The subdivision of a step fails: the shortest part does not resolve the motion, or there are too many parts.
     #[error(
         "the step cannot be divided into parts that resolve the motion near t = {t}: the defect of its curve there is that of \
          round-off, or of a kink that the Lagrangian does not tell; allow a larger one, take shorter steps, or end the run before"
@@ -245,7 +246,7 @@ pub enum StepError {
         /// The time.
         t: f64,
     },
-    /// The Lagrangian switches without end within a step.
+    /// The Lagrangian switches too often within a step.
     #[error(
         "the Lagrangian switches at its kinks or jumps without end near t = {t}: the motion is held on a surface from both sides, or \
          crosses it ever faster; smooth the kink, or end the run before"
@@ -254,8 +255,8 @@ pub enum StepError {
         /// The time that is reached.
         t: f64,
     },
-    /// The Lagrangian jumps across a surface that depends on the velocity or on the action, where the corner conditions do not say how a motion
-    /// goes on.
+    /// The Lagrangian jumps across a surface that depends on the velocity or on the action, or that the motion only
+    /// touches; there the corner conditions do not determine how the motion continues.
     #[error(
         "the Lagrangian jumps at t = {t} across a surface that depends on the velocity or on z, or that the motion only touches, where \
          the principle does not say how the motion goes on; smooth the jump, or end the run before"
@@ -264,7 +265,7 @@ pub enum StepError {
         /// The time of the jump.
         t: f64,
     },
-    /// A coordinate or a derivative is infinite or not a number.
+    /// A coordinate or a derivative is infinite or NaN.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
     /// The function of an event is not finite.
@@ -273,7 +274,7 @@ pub enum StepError {
         /// The time.
         t: f64,
     },
-    /// A formula branches on the value of a number, of which vector lanes have several.
+    /// A formula branches on a value that differs between SIMD lanes.
     #[error(
         "the Lagrangian or the time transformation asks for one value (`re`, `extent`, `==`) of lanes that differ; \
          choose by `if_less`, `max`, `min`, `abs` or `signum`"
@@ -287,58 +288,60 @@ impl From<StepError> for GeometryError {
     }
 }
 
-/// What keeps a wanted accuracy from being reached.
+/// The reason why a requested accuracy is not reached.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum SelectionFailure {
-    /// Round-off: shorter steps do not better the result.
+    /// Round-off: shorter steps do not improve the result.
     #[error("round-off of the motion is larger; ask for less")]
     RoundOff,
-    /// Runs with different steps separate like those of different starts.
+    /// The motion is chaotic: runs with different steps separate like those from different initial states.
     #[error(
         "the motion is chaotic, and round-off grows beyond the wanted error after t = {t}; end the run there, or ask for less"
     )]
     Chaos {
-        /// The last time of a tenth of the span at which runs agree.
+        /// The last time, in tenths of the span, at which runs agree.
         t: f64,
     },
-    /// Runs approach each other, but more slowly than a smooth motion lets them.
+    /// Runs converge more slowly than for a smooth motion.
     #[error("{}", how_runs_converge(*order))]
     Order {
-        /// The order that the last runs showed.
+        /// The observed order of the last runs.
         order: f64,
     },
-    /// Runs agree where they are compared, and between the nodes of their steps the motion does not solve its equations.
+    /// Runs agree where they are compared, but between the nodes of their steps the motion does not satisfy the
+    /// equations.
     #[error(
         "between the nodes of their steps the motion misses its equations by {defect:.1e} of its size, which shorter steps better only \
          with order {order:.1}: a kink, a jump or something narrow lies there; ask for less, or smooth the Lagrangian"
     )]
     Misfit {
-        /// The largest misfit of the finer run, relative to the largest momentum.
+        /// The largest defect of the finer run, relative to the largest momentum.
         defect: f64,
-        /// The order with which it falls.
+        /// The order with which it decreases.
         order: f64,
     },
-    /// Runs whose nodes coincide agree, and one with other nodes does not agree with them.
+    /// Runs whose nodes coincide agree with each other, but not with a run with other nodes.
     #[error(
         "a trial run with one step more {}: a kink, a jump or a pulse lies at the ends of their steps; end the span beside it, or smooth the \
          Lagrangian",
         how_far(*distance)
     )]
     Hidden {
-        /// The distance of the ends; infinite where the run with one step more comes to none.
+        /// The distance between the final states; infinite where the run with one more step does not resolve the
+        /// motion.
         distance: f64,
     },
-    /// A step cannot be taken however short it is.
+    /// A step fails however short it is.
     #[error(
         "the motion cannot be followed beyond t = {t}, however short the steps: end the span before it (the last attempt: {cause})"
     )]
     Halted {
         /// The time that is reached.
         t: f64,
-        /// Why the next step fails.
+        /// The cause of the last failure.
         cause: StepError,
     },
-    /// What is near some time is too fast or too narrow for the steps that can be tried.
+    /// Near a certain time the motion is too fast, or the force too narrow, for the steps that can be tried.
     #[error(
         "near t = {t} the motion is not resolved by any step that was tried: it is too fast or too narrow there; take a shorter span"
     )]
@@ -346,7 +349,7 @@ pub enum SelectionFailure {
         /// The time.
         t: f64,
     },
-    /// The trial runs would cost too much.
+    /// The trial runs would exceed their budget.
     #[error(
         "the budget of the trial runs is used up, since the steps that the motion needs are too many to be tried; take a method of higher \
          order, a shorter span, or give a step"
@@ -354,7 +357,7 @@ pub enum SelectionFailure {
     Budget,
 }
 
-/// What is said of a run that ends so far from others.
+/// The part of the message for a run whose final state has this distance from those of others.
 fn how_far(distance: f64) -> String {
     if distance.is_finite() {
         format!("ends {distance:.1e} away from them")
@@ -363,9 +366,9 @@ fn how_far(distance: f64) -> String {
     }
 }
 
-/// What is said of runs that converge with a low order, or not at all.
+/// The part of the message for runs that converge with a low order, or not at all.
 fn how_runs_converge(order: f64) -> String {
-    // As little as noise shows.
+    // An order below this is not distinguishable from noise.
     const NONE: f64 = 0.25;
     if order >= NONE {
         format!(
@@ -379,13 +382,13 @@ fn how_runs_converge(order: f64) -> String {
     }
 }
 
-/// A step whose ends do not fit each other by far more than the error of a step that resolves the motion: it may have crossed
-/// a pole, a wall or a centre of force without meeting it.
+/// A step whose defect is far larger than that of any step that resolves the motion. It may have crossed a pole, a wall
+/// or a centre of force without evaluating the force there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnresolvedStep {
     /// The first such step, counted from 0.
     pub step: usize,
-    /// The misfit, in units of the largest that a step which resolves its motion can have: above one.
+    /// The defect, in units of the largest defect of a step that resolves the motion; larger than one.
     pub defect: f64,
 }
 
@@ -394,12 +397,12 @@ impl std::fmt::Display for UnresolvedStep {
         let UnresolvedStep { step, defect } = self;
         write!(
             f,
-            "step {step} does not resolve the motion (misfit {defect:.1e}); what follows may be wrong: take a smaller step"
+            "step {step} does not resolve the motion (defect {defect:.1e}); what follows may be wrong: take a smaller step"
         )
     }
 }
 
-/// How a run ended. All that was recorded before is kept.
+/// How a run ended. The output recorded before the end is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Status {
     /// All steps were taken.
@@ -410,10 +413,10 @@ pub enum Status {
         step: usize,
         /// The time, within the last step or at its end.
         t: f64,
-        /// Which observer.
+        /// The observer that ended the run.
         by: &'static str,
     },
-    /// A claim of the Lagrangian's structure was found false at a state of the run: all that was computed may be wrong.
+    /// A claim on the structure of the Lagrangian is false at a state of the run; all results may be wrong.
     FalseClaim {
         /// The number of steps taken.
         step: usize,
@@ -422,13 +425,13 @@ pub enum Status {
         /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
         size: f64,
     },
-    /// A step could not be taken; the state is that before it.
+    /// A step failed; the state is that before it.
     Failed {
         /// The number of the step that failed, counted from 0.
         step: usize,
         /// The time that was reached.
         t: f64,
-        /// Why.
+        /// The cause.
         cause: StepError,
     },
 }
@@ -453,7 +456,7 @@ pub(crate) fn first(a: Option<UnresolvedStep>, b: Option<UnresolvedStep>) -> Opt
     a.into_iter().chain(b).min_by_key(|s| s.step)
 }
 
-/// The error of a step of an integrator that cannot be started.
+/// The step error for a stepper that cannot be constructed.
 pub(crate) fn step_error(error: InputError) -> StepError {
     match error {
         InputError::FirstStep(cause) => cause,
@@ -466,8 +469,9 @@ pub(crate) fn step_error(error: InputError) -> StepError {
 mod tests {
     use super::*;
 
-    /// An estimate below what was asked for is no reason by itself: the sentence says that something else is in the way, and what. One that was not made
-    /// is not told, and runs that do not converge have no order.
+    /// The messages for an accuracy that is not reached. If the difference between trial runs is below the requested
+    /// error, the message gives the other reason. A difference that was not computed is not mentioned, nor is the order
+    /// of runs that do not converge.
     #[test]
     fn an_accuracy_says_what_was_not_reached() {
         let said =

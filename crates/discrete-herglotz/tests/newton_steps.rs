@@ -1,10 +1,12 @@
-//! Steps that are solved by Newton's method on all stages at once, with the feature `faer` or without: `.ci/run` runs both.
+//! Tests of steps that are solved by Newton's method on all stages at once. `.ci/run` runs them with and without the
+//! feature `faer`.
 
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, numbers::max_abs_or_nan};
 use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss, solve::Solver};
 
-/// Eight steps of order 24 by Newton's method on the stages meet the closed form, to the rounding of eight sums.
+/// Eight steps of order 24 by Newton's method on the stages agree with the closed form up to the round-off of eight
+/// sums.
 #[test]
 fn newton_steps_of_gauss_collocation() {
     let damped = HarmonicOscillator { gamma: -0.5 };
@@ -21,7 +23,7 @@ fn newton_steps_of_gauss_collocation() {
     assert!(off <= 8.0 * 4.0 * f64::EPSILON, "{off:e}");
 }
 
-/// A momentum that vanishes has no size of its own to be found to: a motion from rest, between its points.
+/// The points of a motion from rest determine its vanishing initial momentum up to the round-off of the positions.
 #[test]
 fn points_of_a_motion_that_starts_at_rest_tell_it() {
     let damped = HarmonicOscillator { gamma: -0.1 };
@@ -32,7 +34,7 @@ fn points_of_a_motion_that_starts_at_rest_tell_it() {
             let ld = Gauss::new::<1>(&damped, stages, h).unwrap();
             let end = ld.forward(0.0, &start, &x.v, &mut Solver::default()).unwrap().end;
             let jet = ld.jet(0.0, &DiscretePoint { q0: x.q, q1: end.q, z0: x.z }).unwrap();
-            // p0 = -D1 / sigma_d; its condition is that of a velocity from two positions.
+            // p0 = -D1 / sigma_d; its round-off is that of a velocity computed from two positions.
             assert!(jet.d1[0].abs() <= 16.0 * f64::EPSILON / h, "{stages} stages, h = {h}: {}", jet.d1[0]);
         }
     }

@@ -1,6 +1,7 @@
-//! Ensembles in shards: merged in any order they have the bits of one run, and checkpoints with gaps are gone on from.
+//! Tests of ensembles in shards: merged in any order they are bitwise equal to one run, and a checkpoint with missing
+//! shards can be resumed.
 
-// What a test cannot go on without is a failure of it.
+// In a test a failing `unwrap` is a test failure.
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::VelocityPoint;
@@ -13,7 +14,7 @@ use discrete_herglotz::{
 const PENDULUM: Pendulum = Pendulum { gamma: -0.1 };
 const UNTIL: Until = Until::Time(2.0);
 
-/// Six shards, the last not full; a member of the third cannot begin.
+/// The number of members: six shards, the last one not full. A member of the third shard has an invalid initial state.
 const COUNT: usize = 2000;
 
 fn ensemble(steps: usize) -> Ensemble<'static, Pendulum, 1> {
@@ -24,14 +25,14 @@ fn ensemble(steps: usize) -> Ensemble<'static, Pendulum, 1> {
     Ensemble::new(&PENDULUM, 0.0, COUNT, start).by(SplittingScheme::STRANG).steps(Steps::Count(steps)).threads(2)
 }
 
-/// All members in words, and how they ended.
+/// All members as text, and the tally.
 fn plain(of: &Ensemble<'_, Pendulum, 1>) -> (Vec<String>, Tally) {
     let mut all = Vec::new();
     let tally = of.run(UNTIL, |member| all.push(format!("{member:?}"))).unwrap();
     (all, tally)
 }
 
-/// The same from shards that come in some order.
+/// The same from shards that are added in the given order.
 fn merged(of: &Ensemble<'_, Pendulum, 1>, order: &[usize]) -> (Vec<String>, Tally) {
     let (sharded, mut all) = (of.in_shards(UNTIL).unwrap(), Vec::new());
     let mut merge = of.merge(&sharded).unwrap();
@@ -50,11 +51,11 @@ fn shards_in_any_order_are_one_run() {
     let of = ensemble(20);
     let expected = plain(&of);
     assert_eq!((expected.1.members, expected.1.failed, expected.1.first_failed), (COUNT, 1, Some(900)));
-    // The last has each shard twice.
+    // The last order has repeated shards.
     for order in [[0, 1, 2, 3, 4, 5].as_slice(), &[5, 4, 3, 2, 1, 0], &[2, 2, 0, 5, 0, 1, 4, 3, 3, 1]] {
         assert_eq!(merged(&of, order), expected, "{order:?}");
     }
-    // What waits for the first shard is not handed on.
+    // Shards are not handed on before the first one is complete.
     let (all, tally) = merged(&of, &[1, 2, 3, 4, 5]);
     assert!(all.is_empty() && tally.members == 0);
 }
@@ -71,25 +72,25 @@ fn a_checkpoint_with_gaps_is_gone_on_from() {
         merged(&of, shards)
     };
     for there in [[4, 1].as_slice(), &[5, 0, 3], &[3, 2, 1, 5, 4]] {
-        // One process goes on, and several do.
+        // Resumed by one process, and by several.
         begin_anew(there);
         assert_eq!(plain(&of), expected, "{there:?}");
         assert_eq!(plain(&of), expected, "{there:?}, from a whole file");
         begin_anew(there);
         let missing: Vec<usize> = (0..6).rev().filter(|shard| !there.contains(shard)).collect();
         assert_eq!(merged(&of, &missing), expected, "{there:?}");
-        // What was cut off is done again.
+        // A truncated shard is computed again.
         begin_anew(there);
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
         assert_eq!(plain(&of), expected, "{there:?}, cut off");
     }
-    // What comes twice is kept once.
+    // A shard that is added twice is stored once.
     begin_anew(&[4, 1]);
     let once = std::fs::read(&path).unwrap();
     begin_anew(&[4, 4, 1, 4]);
     assert!(std::fs::read(&path).unwrap() == once);
-    // A bit of a shard's number.
+    // A flipped bit in the number of a shard is detected.
     begin_anew(&[4]);
     let mut bytes = std::fs::read(&path).unwrap();
     bytes[40] ^= 64;
@@ -107,7 +108,7 @@ fn what_is_no_shard_is_refused() {
     let good = sharded.compute(5);
     let mut no_such_shard = good.clone();
     no_such_shard[0] = 6;
-    // A full shard under the number of the last, which is not.
+    // A full shard with the number of the last one, which is not full.
     let mut too_long = sharded.compute(1);
     too_long[0] = 5;
     let mut longer = good.clone();
@@ -123,7 +124,7 @@ fn what_is_no_shard_is_refused() {
     assert!(merge.has(5) && !merge.has(4) && !merge.is_complete());
 }
 
-/// Results that wait need memory, but in a checkpoint.
+/// Results that wait to be merged occupy memory, unless there is a checkpoint.
 #[test]
 fn the_window_is_bounded_without_a_checkpoint() {
     let of = ensemble(2);

@@ -24,8 +24,8 @@ pub const TESTS: &[InputTest] = &[InputTest {
         "CriticalPath::is_found",
         "CriticalPath::action",
         "CriticalPath::path",
-        "continuation",
-        "branch",
+        "boundary::continuation",
+        "boundary::branch",
     ],
     run: paths,
 }];

@@ -27,7 +27,7 @@ pub const TESTS: &[InputTest] = &[
             "Ensemble::observe",
             "ObservedEnsemble::run",
             "Problem::ensemble",
-            "Integrator::in_lanes",
+            "Integrator::batch_kernel",
         ],
         run: ensembles,
     },

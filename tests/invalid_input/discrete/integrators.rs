@@ -16,9 +16,9 @@ use std::ops::ControlFlow;
 pub const TESTS: &[InputTest] = &[
     InputTest {
         entries: &[
-            "Discretisation::check",
-            "Discretisation::discretise",
-            "Discretisation::info",
+            "DiscretizationMethod::check",
+            "DiscretizationMethod::discretise",
+            "DiscretizationMethod::info",
             "CustomMethod::symmetric",
         ],
         run: discretisations,
@@ -28,7 +28,7 @@ pub const TESTS: &[InputTest] = &[
             "Integrator::check",
             "Integrator::info",
             "Integrator::stepper",
-            "Composed::new",
+            "CompositionMethod::new",
             "Stepper::work_summary",
             "Stepper::has_constant_rate",
             "PlanEntry::computed",

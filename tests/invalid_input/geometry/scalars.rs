@@ -11,7 +11,7 @@ use contact_geom::{
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
-        entries: &["max_or_nan", "largest", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
+        entries: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
         run: maxima,
     },
     InputTest {
@@ -36,11 +36,11 @@ pub const TESTS: &[InputTest] = &[
     InputTest {
         entries: &[
             "$Dual::constant",
-            "Module::null",
-            "Module::each",
-            "Module::join",
-            "Module::scaled",
-            "Module::combined",
+            "TangentVector::null",
+            "TangentVector::each",
+            "TangentVector::join",
+            "TangentVector::scaled",
+            "TangentVector::combined",
         ],
         run: differentials,
     },

@@ -1,4 +1,5 @@
-//! The discrete Herglotz equations along a path: their residuals, and Newton's correction from one sweep through the path and back.
+//! The discrete Herglotz equations along a path: their residuals, and Newton's correction by block elimination and back
+//! substitution.
 
 use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
 use super::end::Conditions;
@@ -13,18 +14,18 @@ pub(super) struct Nodes<const N: usize> {
     pub z: Vec<f64>,
 }
 
-/// What is left of the equations at a point: `dq_k + next dq_{k+1} = rhs`, with one more term on the left where the [`BlockElimination`] has
-/// one of this point.
+/// The eliminated equations at a point, `dq_k + next dq_{k+1} = rhs`, with further terms on the left where the
+/// [`BlockElimination`] stores some for this point.
 #[derive(Clone, Copy)]
 pub(super) struct Eliminated<const N: usize> {
     pub next: SMatrix<f64, N, N>,
     pub rhs: SVector<f64, N>,
 }
 
-/// What a step does to the momentum at its end.
+/// The momentum at the end of a step, with the derivative in the action.
 #[derive(Clone, Copy)]
 pub(super) struct Carry<const N: usize> {
-    /// `D2 L_d`, the momentum there.
+    /// `D2 L_d`, the momentum at the end of the step.
     pub p: SVector<f64, N>,
     /// `Dz L_d`.
     pub dz: f64,
@@ -39,39 +40,39 @@ impl<const N: usize> Carry<N> {
     }
 }
 
-/// The workspace of a sweep, of a length proportional to that of the path.
+/// The workspace of a block elimination, of a length proportional to that of the path.
 pub(super) struct BlockElimination<const N: usize> {
     pub points: Vec<Eliminated<N>>,
-    /// The matrices of `dq_{k+2}`, of the points k where rows were exchanged with the next point's.
+    /// The matrices of `dq_{k+2}`, for the points k at which rows were exchanged with those of the next point.
     pub after: Vec<(usize, SMatrix<f64, N, N>)>,
-    /// The matrices of `dq_0`, of a periodic path.
+    /// The matrices of `dq_0`, for a periodic path.
     first: Vec<SMatrix<f64, N, N>>,
-    /// The correction of the last unknown position, `q_0` of a periodic path.
+    /// The correction of the last unknown position, which is `q_0` for a periodic path.
     last: SVector<f64, N>,
-    /// The momenta of the path of the last sweep.
+    /// The momenta along the path of the last elimination.
     pub momenta: Vec<Carry<N>>,
-    /// Whether a second derivative of the discrete Lagrangian in the action has been seen not to vanish.
+    /// Whether a second derivative of the discrete Lagrangian in the action has been nonzero.
     pub coupled: bool,
 }
 
-/// What a path satisfies.
+/// Residuals and other measures of a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured<const N: usize> {
-    /// The largest residual of a discrete Herglotz equation or of an end's condition, a momentum.
+    /// The largest residual of a discrete Herglotz equation or of a boundary condition, a momentum.
     pub residual: f64,
     /// The largest residual relative to the size of the terms of its equation.
     pub relative: f64,
-    /// The sums of the squares of the residuals of each coordinate.
+    /// The sum of the squares of the residuals, for each coordinate.
     pub squares: SVector<f64, N>,
-    /// The largest size of the terms of each coordinate's equations.
+    /// The largest size of the terms of the equations, for each coordinate.
     pub sizes: SVector<f64, N>,
-    /// The logarithm of the product of the sigma_d, not a number where one is negative.
+    /// The logarithm of the product of the sigma_d; NaN where one is negative.
     pub log_factor: f64,
-    /// The product of the sigma_d whose logarithm is not yet in it.
+    /// The product of the sigma_d that are not yet included in `log_factor`.
     pub factors: f64,
     /// The first step with a sigma_d that is not positive, and its value.
     pub not_contact: Option<(usize, f64)>,
-    /// The smallest pivot of the last block relative to what it was before the elimination; 0 where a pivot vanishes.
+    /// The smallest pivot of the last block relative to its diagonal before the elimination; 0 where a pivot vanishes.
     pub regularity: f64,
 }
 
@@ -88,12 +89,13 @@ pub(super) struct Equations<'a, D, const N: usize> {
     pub conditions: &'a Conditions<N>,
     pub t0: f64,
     pub steps: usize,
-    /// What is added to the equation of the point at the start of each step; of none beyond its length.
+    /// A load that is added to the equation of the point at the start of each step; zero for the steps beyond its
+    /// length.
     pub load: &'a [SVector<f64, N>],
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
-    /// The momentum at the end of a path, with the actions set on the way.
+    /// The momentum at the end of a path. Sets the actions of the path.
     fn last_momentum(&self, x: &mut Nodes<N>) -> Result<SVector<f64, N>, Undefined> {
         let mut p = SVector::zeros();
         for k in 0..self.steps {
@@ -106,8 +108,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
         Ok(p)
     }
 
-    /// The second jet of a step, all of whose entries are finite. Compiled once, apart from the elimination: what the elimination
-    /// [without exchanges](Sweep::without_exchanges) gains by its own copy of it is rare here.
+    /// The second jet of a step, with finite entries. It is not inlined, unlike in the elimination
+    /// [without exchanges](BlockElimination::without_exchanges), because the elimination with exchanges is rare.
     #[inline(never)]
     pub fn jet(
         &self,
@@ -124,13 +126,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
         }
         let second = jet.d11.sum() + jet.d12.sum() + jet.d22.sum() + jet.d1z.sum() + jet.d2z.sum() + jet.dzz;
         let first = jet.first.value + jet.first.d1.sum() + jet.first.d2.sum() + jet.first.dz;
-        // A multiple by zero is zero unless an entry is infinite or not a number, or a sum overflows.
+        // The product with zero is zero unless an entry is infinite or NaN, or a sum overflows.
         if (first + second) * 0.0 == 0.0 { Ok(jet) } else { Err(Undefined { step: k, cause: StepError::NonFinite }) }
     }
 }
 
-/// The discrete Herglotz equation of a point, `H = D1 + sigma p` with `p = D2` of the step before (or a given momentum), and its
-/// derivatives in the point's own position and action and in the next position, those through p left out.
+/// The discrete Herglotz equation at a point, `H = D1 + sigma p` with `p = D2` of the previous step (or a given
+/// momentum), and its derivatives in the position and action of the point and in the next position, at fixed p.
 pub(super) struct HerglotzEquation<const N: usize> {
     value: SVector<f64, N>,
     /// The sizes of its terms.
@@ -147,7 +149,7 @@ impl<const N: usize> HerglotzEquation<N> {
         let next = jet.d12 + p * jet.d2z.transpose();
         HerglotzEquation {
             value: jet.first.d1 + p * sigma,
-            // The three positions of the equation are rounded, and move it by as much.
+            // Includes the effect of the round-off of the three positions in the equation.
             size: jet.first.d1.abs() + p.abs() * sigma.abs() + next.abs() * neighbour.abs() * 4.0,
             here: jet.d11 + p * jet.d1z.transpose(),
             action: jet.d1z + p * jet.dzz,
@@ -166,8 +168,8 @@ impl<const N: usize> HerglotzEquation<N> {
         }
     }
 
-    /// The linearised equation of point k+1 in the corrections of positions: those of both actions are expressed by them. `before`
-    /// is the jet of the step k, `sigma` the factor of p.
+    /// The linearised equation of point k+1 in the corrections of the positions, by which those of both actions are
+    /// expressed. `before` is the jet of step k, `sigma` the factor of p.
     #[inline(always)]
     fn rows<const PERIODIC: bool>(
         &self,
@@ -210,10 +212,11 @@ impl<const N: usize> Measured<N> {
         }
     }
 
-    /// Takes a residual in, with the sizes of its terms.
+    /// Includes a residual, given with the sizes of its terms.
     #[inline(always)]
     pub fn take(&mut self, value: &SVector<f64, N>, size: &SVector<f64, N>) {
-        // Few points exceed all before them: the rest is done for all coordinates at once, without a quotient. What is not a number does exceed.
+        // Few points exceed the maxima so far; for the others all coordinates are compared at once and without a
+        // division. A NaN counts as exceeding.
         let mut within = true;
         for i in 0..N {
             let off = value[i].abs();
@@ -240,7 +243,7 @@ impl<const N: usize> Measured<N> {
         if sigma < 0.0 {
             self.log_factor = f64::NAN;
         }
-        // The logarithm of many factors at once.
+        // One logarithm is taken for many factors.
         self.factors *= sigma;
         if !(1e-100..1e100).contains(&self.factors) {
             self.log_factor += self.factors.ln();
@@ -263,11 +266,11 @@ impl<const N: usize> BlockElimination<N> {
         }
     }
 
-    /// Sets the actions of a path by their recursion, measures it, and eliminates its linearised equations.
+    /// Sets the actions of a path by their recursion, measures its residuals, and eliminates its linearised equations.
     ///
-    /// The correction of an action is an affine function of those of positions, carried along, so that the blocks that are
-    /// factorised have N rows, not N + 1. Rows of neighbouring points are exchanged only where the elimination
-    /// [without](Self::without_exchanges) is not stable, and of periodic paths.
+    /// The correction of an action is an affine function of those of the positions, which is carried along, so that the
+    /// factorised blocks have N rows instead of N + 1. Rows of neighbouring points are exchanged only for periodic
+    /// paths, and where the elimination [without exchanges](Self::without_exchanges) is not stable.
     pub fn forward<D: DiscreteLagrangian<N>>(
         &mut self,
         of: &Equations<'_, D, N>,
@@ -281,13 +284,13 @@ impl<const N: usize> BlockElimination<N> {
         self.with_exchanges(of, x)
     }
 
-    /// The same, with rows of neighbouring points exchanged where that is more accurate.
+    /// The same with exchanges of rows between neighbouring points.
     fn with_exchanges<D: DiscreteLagrangian<N>>(
         &mut self,
         of: &Equations<'_, D, N>,
         x: &mut Nodes<N>,
     ) -> Result<Measured<N>, Undefined> {
-        // What a periodic path has more is compiled out of the others.
+        // `PERIODIC` is a constant, so that paths with given ends do not pay for the terms of periodic ones.
         if of.conditions.is_periodic() { self.forward_of::<D, true>(of, x) } else { self.forward_of::<D, false>(of, x) }
     }
 
@@ -307,7 +310,7 @@ impl<const N: usize> BlockElimination<N> {
             measured.take(&at.value, &at.size);
             panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
         }
-        // Of a periodic path the jet of the first step, and where the path is regular to round-off so far.
+        // The jet of the first step, for a periodic path; and whether no pivot has vanished so far.
         let (opening, mut regular) = (now, true);
         let mut diagonal = SVector::<f64, N>::zeros();
         // The row of the action at point k; zero at the start, where the action is given.
@@ -327,21 +330,21 @@ impl<const N: usize> BlockElimination<N> {
                 // The momentum at the end of a periodic path is that of its start.
                 (None, None) if PERIODIC => {
                     let at = HerglotzEquation::new(&now.first.d2, &opening, &x.q[1]);
-                    // Its derivatives in the first two positions have waited since the start.
+                    // Its derivatives in the first two positions were stored at the start of the elimination.
                     let (here, next) = (SMatrix::zeros(), SMatrix::zeros());
                     Some((HerglotzEquation { here, next, action: SVector::zeros(), ..at }, opening.first.sigma()))
                 }
                 (None, None) => None,
             };
             let Some((at, sigma)) = bottom else {
-                // The last position is given: what is left is the equation of the point before.
+                // The last position is given, so that the last equation is that of the point before it.
                 break;
             };
             measured.take(&at.value, &at.size);
             panel.bottom = at.rows::<PERIODIC>(&now, sigma, &action, &panel.action);
             diagonal = panel.bottom.next.diagonal().abs();
             if k == 0 && start.is_none() {
-                // The first position is given, or is the last unknown of a periodic path.
+                // The first position is given, or it is the last unknown of a periodic path.
                 if PERIODIC {
                     let at = HerglotzEquation::new(&of.last_momentum(x)?, &opening, &SVector::zeros());
                     panel.open(at.here, at.next);
@@ -389,9 +392,10 @@ impl<const N: usize> BlockElimination<N> {
         self.points[k] = Eliminated { next, rhs };
     }
 
-    /// Solves for the last unknown position; the smallest pivot relative to the diagonal before the elimination.
+    /// Solves for the last unknown position. Returns the smallest pivot relative to the diagonal before the
+    /// elimination.
     pub fn finish(&mut self, here: &SMatrix<f64, N, N>, rhs: &SVector<f64, N>, diagonal: &SVector<f64, N>) -> f64 {
-        // In units in which the diagonal was 1, so that pivots can be compared.
+        // The block is scaled so that its diagonal before the elimination is 1, which makes the pivots comparable.
         let unit = diagonal.map(|size| if size > 0.0 { size.sqrt().recip() } else { 1.0 });
         let mut scaled = SMatrix::<f64, N, N>::from_fn(|i, j| here[(i, j)] * unit[i] * unit[j]);
         self.last = rhs.component_mul(&unit);
@@ -403,7 +407,8 @@ impl<const N: usize> BlockElimination<N> {
         regularity
     }
 
-    /// The path to which the corrections of the positions lead, from the last point back to the first.
+    /// Back substitution from the last point to the first: writes the corrected path, and returns the sizes of the
+    /// corrections.
     pub fn backward<D>(
         &self,
         of: &Equations<'_, D, N>,
@@ -438,7 +443,7 @@ impl<const N: usize> BlockElimination<N> {
                     dq -= by * closed;
                 }
             }
-            // Of a periodic path the first point is the last, but for the shift.
+            // The first point of a periodic path is the last one up to the shift.
             if k == 0 && of.conditions.is_periodic() {
                 dq = closed;
             }
@@ -450,7 +455,7 @@ impl<const N: usize> BlockElimination<N> {
     }
 }
 
-/// The sizes of corrections and of the path that is corrected.
+/// The sizes of the corrections and of the corrected path.
 pub(super) struct Extent<const N: usize> {
     /// The largest correction of each coordinate.
     pub change: SVector<f64, N>,
@@ -461,7 +466,7 @@ pub(super) struct Extent<const N: usize> {
 impl<const N: usize> Extent<N> {
     #[inline(always)]
     fn take(&mut self, q: &SVector<f64, N>, dq: &SVector<f64, N>) {
-        // A NaN is lost here, not in the equations of the path that is led to.
+        // A NaN is ignored here; it shows in the equations of the corrected path.
         for i in 0..N {
             let (off, size) = (dq[i].abs(), q[i].abs() + dq[i].abs());
             self.change[i] = if off > self.change[i] { off } else { self.change[i] };
@@ -469,7 +474,8 @@ impl<const N: usize> Extent<N> {
         }
     }
 
-    /// The largest part of its coordinate's size, along this path or the `first`, that a correction changes.
+    /// The largest correction of a coordinate relative to the size of that coordinate along this path or the `first`
+    /// one.
     pub fn relative(&self, first: &SVector<f64, N>) -> f64 {
         let size = self.positions.sup(first);
         (0..N).filter(|&i| self.change[i] != 0.0).fold(0.0, |worst, i| max_or_nan(worst, self.change[i] / size[i]))

@@ -1,4 +1,4 @@
-//! Continuation by pseudo-arclength: a branch of paths along a parameter, around its folds.
+//! Pseudo-arclength continuation: a branch of critical paths along a parameter, past its folds.
 
 use super::block_elimination::BlockElimination;
 use super::critical_path::CriticalPath;
@@ -8,15 +8,16 @@ use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
-/// The corrections that a point of a branch may take; with more its step is halved.
+/// The limit of corrections for a point of a branch; with more the step is halved.
 const CORRECTIONS: u32 = 8;
-/// The cosine of the angle between neighbouring tangents below which a step is halved: more is a corner, or another branch.
+/// The cosine of the angle between neighbouring tangents below which the step is halved. A larger angle indicates a
+/// corner or another branch.
 const STRAIGHT: f64 = 0.9;
-/// The part of the first step below which steps are not halved.
+/// The shortest step, relative to the first one.
 const SHORTEST: f64 = 1e-6;
 
-/// A point of a branch, or a direction: the positions of a path and a parameter. Their product is the mean over the points, so that it
-/// does not depend on the number of steps.
+/// A point of a branch, or a direction: the positions of a path and a parameter. The inner product of the positions is
+/// the mean over the points, so that it does not depend on the number of steps.
 #[derive(Clone)]
 struct Extended<const N: usize> {
     q: Vec<SVector<f64, N>>,
@@ -43,26 +44,29 @@ fn distance<const N: usize>(a: &[SVector<f64, N>], b: &[SVector<f64, N>]) -> f64
     square(a, b).sqrt()
 }
 
-/// Newton's correction at a path, and how it changes with the parameter: at a path of the branch its derivative in the parameter.
+/// Newton's correction at a path, and its derivative in the parameter, which at a path of the branch is the derivative
+/// of the branch.
 struct Corrections<const N: usize> {
     change: Vec<SVector<f64, N>>,
     slope: Vec<SVector<f64, N>>,
 }
 
-/// Follows the branch of critical paths that one of them lies on, along a parameter of the problem: of the Lagrangian, the ends or
-/// the step. The parameter may turn back: continuation is by the (pseudo-)arclength of the branch, Keller, "Numerical solution of
-/// bifurcation and nonlinear eigenvalue problems" (1977), so that a fold, where two paths meet and vanish, is passed like any other point.
+/// Follows a branch of critical paths along a parameter of the problem (of the Lagrangian, the ends or the step) by
+/// pseudo-arclength continuation: Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
+/// A fold, where two paths meet and vanish as the parameter changes, is passed like any other point.
 ///
-/// `problem` gives the problem of a parameter, all with the same number of steps. The branch starts at the path of `range[0]` that
-/// its problem's search finds, with the parameter going toward `range[1]` by about `step` at first. It ends where the parameter
-/// leaves the range, with a last path at that end of it (at `range[0]` again where the branch has turned back), after `most` paths, or
-/// where no path is found by ever smaller steps.
+/// `problem` returns the problem for a parameter; all have the same number of steps. The branch starts at the path that
+/// the search finds for `range[0]`, and the parameter first changes toward `range[1]` by about `step`. The branch ends
+/// where the parameter leaves the range, with a last path at that end of the range (at `range[0]` again after a fold),
+/// after `most` paths, or where no further path is found with ever smaller steps.
 ///
-/// The paths in the order of the branch, each with its parameter. All are found but where the first is not: then it is alone.
+/// Returns the paths in the order of the branch, each with its parameter. All of them are found, except that a first
+/// path that is not found is returned alone.
 ///
 /// # Errors
-/// [`GeometryError::NonFinite`] for a parameter that is not finite, [`InputError::Span`] for an empty range, [`InputError::Step`] unless the step is
-/// positive and finite, [`InputError::Count`] for `most < 2`, [`InputError::PathLength`] where the number of steps changes, and those of `problem`.
+/// [`GeometryError::NonFinite`] for a range that is not finite, [`InputError::Span`] for an empty range,
+/// [`InputError::Step`] unless the step is positive and finite, [`InputError::Count`] for `most < 2`,
+/// [`InputError::PathLength`] where the number of steps changes, and those of `problem`.
 ///
 /// ```
 /// use contact_geom::{Lagrangian, Scalar, nalgebra::SVector};
@@ -125,7 +129,7 @@ pub fn branch<D: DiscreteLagrangian<N>, const N: usize>(
         let inside = (next.parameter - range[0]) * (range[1] - next.parameter) >= 0.0;
         let (mut parameter, mut start) = (next.parameter, next.clone());
         if !inside {
-            // The path at the end of the range lies between this point and the one before.
+            // The path at the end of the range lies between this point and the previous one.
             parameter = if (next.parameter - range[0]) * span < 0.0 { range[0] } else { range[1] };
             let beyond = (next.parameter - parameter) / (next.parameter - at.parameter);
             start.add(&next, -beyond);
@@ -146,11 +150,11 @@ pub fn branch<D: DiscreteLagrangian<N>, const N: usize>(
     Ok(paths)
 }
 
-/// What follows a branch.
+/// Data for following a branch.
 struct Follower<F> {
     problem: F,
     steps: usize,
-    /// The difference of the parameter by which derivatives in it are found.
+    /// The increment of the parameter for difference quotients.
     difference: f64,
 }
 
@@ -198,7 +202,7 @@ impl<F> Follower<F> {
         }
         let mut change = nodes.q.clone();
         sweep.backward(&equations, &nodes.q, &mut change);
-        // With what moves the given ends.
+        // The difference from the given path includes the motion of the prescribed ends.
         for (to, q) in change.iter_mut().zip(q) {
             *to -= q;
         }
@@ -220,7 +224,7 @@ impl<F> Follower<F> {
         Ok(Some(Corrections { change, slope }))
     }
 
-    /// The unit tangent of the branch at a point of it, in the sense of the one before.
+    /// The unit tangent of the branch at a point, oriented like the previous tangent.
     fn tangent<D: DiscreteLagrangian<N>, const N: usize>(
         &self,
         at: &Extended<N>,
@@ -241,8 +245,8 @@ impl<F> Follower<F> {
         Ok(Some(Extended { q, parameter: factor }))
     }
 
-    /// The point of the branch whose difference from `at` has the component `length` along the tangent, and the tangent there; `None`
-    /// where it is not found.
+    /// The point of the branch whose difference from `at` has the component `length` along the tangent, and the tangent
+    /// there; `None` where it is not found.
     fn next<D: DiscreteLagrangian<N>, const N: usize>(
         &mut self,
         at: &Extended<N>,
@@ -256,8 +260,8 @@ impl<F> Follower<F> {
         x.add(tangent, length);
         for _ in 0..CORRECTIONS {
             let Some(Corrections { change, slope }) = self.corrections(&x)? else { return Ok(None) };
-            // Of the corrections `change + slope dparameter` the one orthogonal to the tangent: `slope` is off by terms of the first order
-            // in `change`, which the product with `dparameter` makes of second order.
+            // The correction `change + slope dparameter` that is orthogonal to the tangent. The error of `slope` is of
+            // first order in `change`, and its product with `dparameter` of second order.
             let change = Extended { q: change, parameter: 0.0 };
             let slope = Extended { q: slope, parameter: 1.0 };
             let along = -tangent.dot(&change) / tangent.dot(&slope);

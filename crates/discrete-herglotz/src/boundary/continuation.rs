@@ -1,19 +1,20 @@
-//! Continuation: a path from that of a problem nearby.
+//! Natural continuation: each path is the initial guess for the next problem.
 
 use super::critical_path::CriticalPath;
 use super::problem::BoundaryPath;
 use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::nalgebra::SVector;
 
-/// Solves problems one after another, each from the path of the one before: continuation in a parameter of the Lagrangian, in the
-/// step, the number of steps or the ends, whatever changes along the sequence. The first starts as it is told to. Where the paths end in
-/// a fold, [`branch`](crate::boundary::branch) goes around it.
+/// Solves a sequence of problems, each from the path of the previous one: continuation in a parameter of the
+/// Lagrangian, in the step, the number of steps or the ends. The first problem starts from its own initial path. For
+/// paths that end in a fold see [`branch`](crate::boundary::branch).
 ///
-/// The paths that were found, in the order of the problems; the last one has another status where the search ended without
-/// a path, and the problems after it are not tried.
+/// Returns the paths that were found, in the order of the problems. Where a search fails, its path is the last one,
+/// with another status, and the remaining problems are not solved.
 ///
 /// # Errors
-/// [`InputError`] where a problem cannot start from the path before it, which no finite one causes.
+/// [`InputError`] where a problem cannot start from the previous path, which happens only for a path that is not
+/// finite.
 ///
 /// ```
 /// use contact_geom::systems::Pendulum;
@@ -44,7 +45,7 @@ pub fn continuation<D: DiscreteLagrangian<N>, const N: usize>(
     Ok(paths)
 }
 
-/// A path with another number of steps, at the same fractions of its span; linear between its points.
+/// A path interpolated linearly to another number of steps.
 fn resampled<const N: usize>(points: &[SVector<f64, N>], steps: usize) -> Vec<SVector<f64, N>> {
     let from = points.len() - 1;
     let at = |k: usize| {

@@ -1,4 +1,4 @@
-//! A path that was found, and how the search for it ended.
+//! The result of a search for a critical path.
 
 use super::block_elimination::{Measured, Nodes};
 use super::judge::Judgement;
@@ -8,13 +8,13 @@ use contact_geom::nalgebra::SVector;
 /// How the search for a critical path ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathStatus {
-    /// The path satisfies the discrete Herglotz equations to round-off; whether it is near a motion its
-    /// [unresolved step](CriticalPath::unresolved) tells.
+    /// The path satisfies the discrete Herglotz equations to round-off. An [unresolved step](CriticalPath::unresolved)
+    /// indicates that it may not approximate a motion.
     Found,
-    /// The iterations were used up.
+    /// The search did not converge within the limit of iterations.
     NotConverged,
-    /// No correction lessens the residual: there may be no critical path near, as beyond a fold, where two paths have met and vanished;
-    /// [`branch`](crate::boundary::branch) finds it.
+    /// No correction reduces the residual. There may be no critical path nearby, as beyond a fold, where two paths have
+    /// met and vanished; [`branch`](crate::boundary::branch) locates folds.
     Stalled,
     /// The ends are conjugate along the path, to round-off: the linearised equations have no unique solution.
     Conjugate {
@@ -25,7 +25,7 @@ pub enum PathStatus {
     Undefined {
         /// The step, counted from 0.
         step: usize,
-        /// Why.
+        /// The reason.
         cause: StepError,
     },
     /// The path satisfies the equations, but is not conformally contact: a `sigma_d` is not positive.
@@ -60,7 +60,8 @@ impl std::fmt::Display for PathStatus {
     }
 }
 
-/// The last path of a search, with its status; a critical path of the discrete action where that is [`PathStatus::Found`].
+/// The last path of a search, with its status; it is a critical path of the discrete action if that is
+/// [`PathStatus::Found`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CriticalPath<const N: usize> {
     /// How the search ended.
@@ -69,25 +70,28 @@ pub struct CriticalPath<const N: usize> {
     pub points: Vec<SVector<f64, N>>,
     /// The actions `z_0, ..., z_N`.
     pub actions: Vec<f64>,
-    /// The largest residual of a discrete Herglotz equation or of an end's condition, a momentum; infinite where the path is not
-    /// defined.
+    /// The largest residual of a discrete Herglotz equation or of a boundary condition, a momentum; infinite where the
+    /// path is not defined.
     pub residual: f64,
     /// The largest residual relative to the size of the terms of its equation.
     pub relative_residual: f64,
-    /// `ln(sigma_1 ... sigma_N)`, the logarithm of the conformal factor of the whole path; not a number unless all are positive.
+    /// `ln(sigma_1 ... sigma_N)`, the logarithm of the conformal factor of the whole path; not finite unless all are
+    /// positive.
     pub log_factor: f64,
-    /// The smallest pivot of the last block of the linearised equations, relative to its size before the elimination: the reciprocal of it is how
-    /// much the last unknown position is magnified. 0 where a pivot vanishes or nothing was measured.
+    /// The smallest pivot of the last block of the linearised equations, relative to its size before the elimination.
+    /// Its reciprocal is the amplification of errors in the last unknown position. 0 where a pivot vanishes or nothing
+    /// was measured.
     pub regularity: f64,
-    /// By how much what the steps leave out moves the path, to first order and in units of its range: by the inverse of the last Jacobian, so that it
-    /// is of order one where the ends are conjugate to within the error of the steps. Of found paths, by a discrete Lagrangian of
+    /// The first-order estimate of the effect of the local truncation error on the path, in units of the range of the
+    /// path. It uses the inverse of the last Jacobian, so that it is of order one where the ends are conjugate to
+    /// within the error of the steps. Available for found paths of a discrete Lagrangian of
     /// [order](crate::DiscreteLagrangian::order) one or two.
     pub error_estimate: Option<f64>,
-    /// The first step that cannot have resolved the motion, as of a run of the same discrete Lagrangian; or else the one where the error
-    /// estimate is largest, if that is above a quarter. The path may then be far from every motion: it may have crossed a centre of force
-    /// without meeting it, or its ends be conjugate. Of found paths only.
+    /// The first unresolved step, as in a run with the same discrete Lagrangian; otherwise the step with the largest
+    /// error estimate, if that exceeds a quarter. Such a path may be far from every motion: it may cross a centre of
+    /// force between its points, or its ends may be conjugate. Only for found paths.
     pub unresolved: Option<UnresolvedStep>,
-    /// The corrections that were made, from all starts.
+    /// The number of corrections, from all initial paths.
     pub iterations: u32,
 }
 
@@ -105,12 +109,12 @@ impl<const N: usize> CriticalPath<N> {
     /// The path in Q.
     ///
     /// # Errors
-    /// [`InputError`](crate::InputError) where a point is not finite, which no found path has.
+    /// [`InputError`](crate::InputError) where a point is not finite, which does not occur for a found path.
     pub fn path(&self) -> Result<DiscretePath<N>, crate::InputError> {
         DiscretePath::new(self.points.clone())
     }
 
-    /// The last path of a search, nothing of it measured.
+    /// The last path of a search, before it is measured.
     pub(super) fn ended(status: PathStatus, nodes: Nodes<N>, iterations: u32) -> Self {
         CriticalPath {
             status,

@@ -1,25 +1,26 @@
-//! Deflation: what keeps a search away from paths that are known.
+//! Deflation, which keeps a search away from known paths.
 
 use contact_geom::nalgebra::SVector;
 
-/// The factor `M = prod_i (1 + l^2 / d_i^2)` by which the residuals of a path are multiplied, `d_i` its distance (root mean square
-/// over the points) from the known path i, `l` a length: residuals of known paths no longer vanish, those of others do.
+/// The factor `M = prod_i (1 + l^2 / d_i^2)` by which the residuals of a path are multiplied, where `d_i` is its
+/// distance (root mean square over the points) from the known path i, and `l` a length. The deflated residual vanishes
+/// at the other critical paths, and does not at the known ones.
 ///
-/// Farrell, Birkisson and Funke, "Deflation techniques for finding distinct solutions of nonlinear partial differential equations",
-/// SIAM J. Sci. Comput. 37 (2015).
+/// Farrell, Birkisson and Funke, "Deflation techniques for finding distinct solutions of nonlinear partial differential
+/// equations", SIAM J. Sci. Comput. 37 (2015).
 pub(super) struct Deflation<'a, const N: usize> {
     pub known: &'a [Vec<SVector<f64, N>>],
     pub length: f64,
 }
 
 impl<const N: usize> Deflation<'_, N> {
-    /// `M` of a path.
+    /// The factor `M` of a path.
     pub fn factor(&self, q: &[SVector<f64, N>]) -> f64 {
         self.known.iter().map(|known| 1.0 + self.length.powi(2) / square(q, known)).product()
     }
 
-    /// `M`, and the multiple of Newton's correction, which leads to a path, that is the correction of the residuals times M: by the formula of Sherman and
-    /// Morrison it is along the same line.
+    /// The factor `M` of a path, and the multiple of Newton's correction (to the path `to`) that is the correction for
+    /// the deflated residual. By the Sherman-Morrison formula both corrections have the same direction.
     pub fn of(&self, q: &[SVector<f64, N>], to: &[SVector<f64, N>]) -> (f64, f64) {
         let mut slope = 0.0;
         for known in self.known {
@@ -30,7 +31,7 @@ impl<const N: usize> Deflation<'_, N> {
             slope -= self.length.powi(2) * by / (distance * (distance + self.length.powi(2)));
         }
         let stretch = 1.0 / (1.0 - slope);
-        // At the one point of the line where the formula has a pole any multiple serves, the line search shortens it.
+        // At the pole of the formula any multiple is suitable, since the line search shortens it.
         (self.factor(q), if stretch.is_finite() { stretch } else { 1.0 })
     }
 }

@@ -3,13 +3,13 @@
 use contact_geom::DiscreteJet;
 use contact_geom::nalgebra::{SMatrix, SVector};
 
-/// How much larger a pivot of the next point's equations must be than one of this point's to be taken. Growth stays below
-/// this, and away from conjugate points no row is exchanged between points, so that the elimination costs no more than
-/// without pivoting.
+/// The threshold of pivoting: a pivot from the equations of the next point is chosen if it exceeds that of this point
+/// by this factor. It bounds the growth, and away from conjugate points no row is exchanged between points, so that the
+/// elimination costs no more than without pivoting.
 const THRESHOLD: f64 = 16.0;
 
-/// N equations in the corrections of the positions of three consecutive points, and of the first point of a periodic path:
-/// `here dq_k + next dq_{k+1} + after dq_{k+2} + first dq_0 = rhs`.
+/// N equations in the corrections of the positions of three consecutive points, and of the first point for a periodic
+/// path: `here dq_k + next dq_{k+1} + after dq_{k+2} + first dq_0 = rhs`.
 #[derive(Clone, Copy)]
 pub(super) struct BlockRows<const N: usize> {
     pub here: SMatrix<f64, N, N>,
@@ -19,7 +19,7 @@ pub(super) struct BlockRows<const N: usize> {
     pub rhs: SVector<f64, N>,
 }
 
-/// The correction of the action at a point by those of positions:
+/// The correction of the action at a point in terms of those of the positions:
 /// `dz + here . dq_k + next . dq_{k+1} + after . dq_{k+2} + first . dq_0 = rhs`.
 #[derive(Clone, Copy)]
 pub(super) struct ActionRow<const N: usize> {
@@ -43,7 +43,7 @@ impl<const N: usize> ActionRow<N> {
         ActionRow { here: zero, next: zero, after: zero, first: zero, rhs: 0.0 }
     }
 
-    /// The row of the next action, `dz_{k+1} = sigma dz_k + D1 . dq_k + D2 . dq_{k+1}`, from that of this one.
+    /// The row of the next action, `dz_{k+1} = sigma dz_k + D1 . dq_k + D2 . dq_{k+1}`, from this row.
     #[inline(always)]
     pub fn recursion(&self, jet: &DiscreteJet<N>) -> Self {
         let sigma = jet.sigma();
@@ -57,13 +57,13 @@ impl<const N: usize> ActionRow<N> {
     }
 }
 
-/// All equations that hold the correction of one point.
+/// All equations that contain the correction of one point.
 pub(super) struct Panel<const N: usize> {
-    /// What is left of the equations of the point.
+    /// The equations of the point after the elimination of the previous ones.
     pub top: BlockRows<N>,
     /// The discrete Herglotz equation of the next point.
     pub bottom: BlockRows<N>,
-    /// The recursion of the next point's action.
+    /// The recursion of the action at the next point.
     pub action: ActionRow<N>,
     /// The equation that closes a periodic path.
     pub closing: Option<BlockRows<N>>,
@@ -71,7 +71,7 @@ pub(super) struct Panel<const N: usize> {
     pub inverses: SVector<f64, N>,
 }
 
-/// A pivot vanishes or is not finite.
+/// The error for a pivot that vanishes or is not finite.
 pub(super) struct NoPivot;
 
 impl<const N: usize> Panel<N> {
@@ -81,7 +81,7 @@ impl<const N: usize> Panel<N> {
         Panel { top: BlockRows::zero(), bottom: BlockRows::zero(), action: ActionRow::zero(), closing, inverses }
     }
 
-    /// Goes on to the next point.
+    /// Moves the panel to the next point.
     #[inline(always)]
     pub fn advance<const PERIODIC: bool>(&mut self) {
         let (top, bottom) = (&mut self.top, &self.bottom);
@@ -96,8 +96,8 @@ impl<const N: usize> Panel<N> {
         }
     }
 
-    /// Takes the first position of a periodic path for the unknown that is eliminated last. The derivatives of the first point's equation, in
-    /// its own position and in the next, wait for [`close`](Self::close).
+    /// Makes the first position of a periodic path the unknown that is eliminated last. The derivatives of the equation
+    /// of the first point, in its own position and in the next, are stored until [`close`](Self::close).
     pub fn open(&mut self, here: SMatrix<f64, N, N>, next: SMatrix<f64, N, N>) {
         self.bottom.first += self.bottom.here;
         self.action.first += self.action.here;
@@ -105,7 +105,8 @@ impl<const N: usize> Panel<N> {
         self.closing = Some(BlockRows { next, first: here, ..BlockRows::zero() });
     }
 
-    /// At the last step of a periodic path: the last position is the first, and the equation that waited joins.
+    /// Closes a periodic path at its last step: identifies the last position with the first, and adds the stored
+    /// equation.
     pub fn close(&mut self) {
         if let Some(rows) = self.closing.take() {
             self.bottom.here += rows.here;
@@ -118,9 +119,9 @@ impl<const N: usize> Panel<N> {
         self.top.first = SMatrix::zeros();
     }
 
-    /// Eliminates `dq_k`, with pivots from both points' equations: the block of one point alone may be singular where the path
-    /// is regular, which is so where the path's beginning ends at a conjugate point. Afterwards `top` is triangular in `here`.
-    /// Tells whether rows of both points were exchanged, without which `top.after` vanishes.
+    /// Eliminates `dq_k`, with pivots from the equations of both points: the block of one point may be singular
+    /// although the path is regular, namely where it is conjugate to the start. Afterwards `here` of `top` is upper
+    /// triangular. Returns whether rows of both points were exchanged; otherwise `top.after` vanishes.
     #[inline(always)]
     pub fn eliminate<const PERIODIC: bool>(&mut self) -> Result<bool, NoPivot> {
         let mut crossed = false;
@@ -184,7 +185,7 @@ impl<const N: usize> Panel<N> {
         Ok(crossed)
     }
 
-    /// Brings the pivot of column j to row j of `top`; tells whether it came from `bottom`.
+    /// Moves the pivot of column j to row j of `top`. Returns whether it came from `bottom`.
     #[inline(always)]
     fn choose_pivot(&mut self, j: usize) -> Result<bool, NoPivot> {
         let (mut row, mut best) = (j, self.top.here[(j, j)].abs());
@@ -236,14 +237,14 @@ fn exchange<const N: usize>(a: &mut BlockRows<N>, i: usize, b: &mut BlockRows<N>
     std::mem::swap(&mut a.rhs[i], &mut b.rhs[j]);
 }
 
-/// Solves `u x = b` for each column of b, by the upper triangle of u and the inverses of its diagonal.
+/// Solves `u x = b` for each column of b, from the upper triangle of u and the inverses of its diagonal.
 #[inline(always)]
 pub(super) fn back_substitute<const N: usize, const C: usize>(
     u: &SMatrix<f64, N, N>,
     inverses: &SVector<f64, N>,
     b: &mut SMatrix<f64, N, C>,
 ) {
-    // Column by column in registers: rows of b would be read before they are written.
+    // Column by column, so that each column stays in registers.
     for c in 0..C {
         let mut x = b.column(c).into_owned();
         for j in (0..N).rev() {

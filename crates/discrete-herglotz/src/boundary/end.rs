@@ -1,4 +1,4 @@
-//! What is given at an end of a path.
+//! Boundary conditions of a path.
 
 use contact_geom::nalgebra::SVector;
 
@@ -7,10 +7,10 @@ use contact_geom::nalgebra::SVector;
 pub enum End<const N: usize> {
     /// The position is given.
     Position(SVector<f64, N>),
-    /// The momentum is given: at the start `p_0` of F-L_d, so that `D1 L_d(q_0, q_1, z_0) + sigma_d p_0 = 0`; at the end `p_N` of
-    /// F+L_d, `D2 L_d(q_{N-1}, q_N, z_{N-1}) = p_N`.
+    /// The momentum is given: at the start `p_0` of F-L_d, so that `D1 L_d(q_0, q_1, z_0) + sigma_d p_0 = 0`; at the
+    /// end `p_N` of F+L_d, `D2 L_d(q_{N-1}, q_N, z_{N-1}) = p_N`.
     Momentum(SVector<f64, N>),
-    /// The position is free, and the action is critical in it: the natural boundary condition, a momentum that vanishes.
+    /// The position is free, and the action is critical in it: the natural boundary condition, a vanishing momentum.
     Free,
 }
 
@@ -33,12 +33,12 @@ impl<const N: usize> End<N> {
     }
 }
 
-/// The conditions that a path satisfies beside the discrete Herglotz equations of its interior points.
+/// The boundary conditions of a path, in addition to the discrete Herglotz equations at its interior points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Conditions<const N: usize> {
     /// One condition at each end.
     Ends(End<N>, End<N>),
-    /// `q_N = q_0 + shift` and `p_N = p_0`; the action is shifted by what it is.
+    /// `q_N = q_0 + shift` and `p_N = p_0`; the action is not periodic.
     Periodic(SVector<f64, N>),
 }
 

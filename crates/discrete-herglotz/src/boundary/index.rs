@@ -5,13 +5,15 @@ use super::end::Conditions;
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 
-/// The numbers of negative and of vanishing directions of the second variation.
+/// The numbers of negative and of vanishing directions of the second variation; `None` for a periodic path, and where a
+/// `sigma_d` is not positive.
 ///
-/// At a critical path the Hessian of `A_d` in the positions that are not given is block tridiagonal: the action at a point depends
-/// on positions before the last one only to second order. Divided by the product of the sigma_d after point k, its blocks are
-/// `K_k = D11 + p D1z^T + D1z p^T + p p^T Dzz + sigma D22'` and `F_k = D12 + p D2z^T` (p and D22' of the step before, the others of the
-/// step after point k), the one below `sigma_{k+1} F_k^T`. With `S_{k+1} = K_{k+1} - sigma_{k+1} F_k^T S_k^-1 F_k` its inertia is the
-/// sum of those of the symmetric matrices `S_k` (Haynsworth), whose determinants change their sign at conjugate points.
+/// At a critical path the Hessian of `A_d` in the free positions is block tridiagonal, because the action at a point
+/// depends on the positions before the last one only to second order. Divided by the product of the sigma_d after point
+/// k, its blocks are `K_k = D11 + p D1z^T + D1z p^T + p p^T Dzz + sigma D22'` and `F_k = D12 + p D2z^T` (p and D22' of
+/// the step before point k, the others of the step after it); the block below is `sigma_{k+1} F_k^T`. With
+/// `S_{k+1} = K_{k+1} - sigma_{k+1} F_k^T S_k^-1 F_k`, the inertia is the sum of those of the symmetric matrices `S_k`
+/// (Haynsworth), whose determinants change their sign at conjugate points.
 pub(super) fn inertia<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     x: &Nodes<N>,
@@ -20,7 +22,7 @@ pub(super) fn inertia<D: DiscreteLagrangian<N>, const N: usize>(
         return Ok(None);
     };
     let steps = of.steps;
-    // The momentum before the point, the second derivative D22 of the step before, the matrix carried along.
+    // The momentum and the second derivative D22 of the previous step, and the matrix `F_k^T S_k^-1 F_k`.
     let (mut p, mut d22, mut carried) =
         (start.momentum(), SMatrix::<f64, N, N>::zeros(), SMatrix::<f64, N, N>::zeros());
     let (mut negative, mut vanishing) = (0, 0);
@@ -45,7 +47,8 @@ pub(super) fn inertia<D: DiscreteLagrangian<N>, const N: usize>(
             let schur = block - carried * sigma;
             let (less, none, inverse) = inverted(&schur, scale);
             negative += less;
-            // A pivot that vanishes on the way is no direction of the whole: the next one is large and of the other sign.
+            // A vanishing eigenvalue before the last block is not a vanishing direction of the Hessian: the next block
+            // then has a large one of the opposite sign.
             let last = k == steps || (k + 1 == steps && end.position().is_some());
             vanishing += if last { none } else { 0 };
             carried = next.transpose() * inverse * next;
@@ -57,8 +60,8 @@ pub(super) fn inertia<D: DiscreteLagrangian<N>, const N: usize>(
     Ok(Some((negative, vanishing)))
 }
 
-/// The numbers of negative and of vanishing eigenvalues of a symmetric matrix, and its inverse, a vanishing eigenvalue replaced by
-/// the round-off of the terms that the matrix is the difference of.
+/// The numbers of negative and of vanishing eigenvalues of a symmetric matrix, and its inverse. A vanishing eigenvalue
+/// is replaced by the round-off of the terms whose difference the matrix is.
 fn inverted<const N: usize>(matrix: &SMatrix<f64, N, N>, scale: f64) -> (usize, usize, SMatrix<f64, N, N>) {
     let eigen = DMatrix::from_fn(N, N, |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)])).symmetric_eigen();
     let round_off = 4.0 * f64::EPSILON * scale;

@@ -1,4 +1,5 @@
-//! Whether a found path is a motion: its steps resolve it, and what they leave out does not move it by as much as it moves.
+//! Checks whether a found path approximates a motion: its steps resolve it, and the effect of their truncation error is
+//! small compared with its range.
 
 use super::block_elimination::{BlockElimination, Carry, Equations, Nodes};
 use crate::resolution::monitor::{ROUNDED, at_rest, rounding};
@@ -9,25 +10,29 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// The part of its range by which the steps may move a path that they resolve.
+/// The bound for the error estimate of a resolved path, relative to its range.
 const LARGEST_CORRECTION: f64 = 0.25;
 
-/// What a second-order rule leaves out of the equation of a point, in third differences of the momenta: `h^3 p'''/12` by the trapezoidal rule and
-/// kicks and drifts, of an oscillator, and twice as much by the midpoint rule.
+/// The coefficient of the truncation error of a second-order rule in the equation of a point, in third differences of
+/// the momenta. For an oscillator the error is `h^3 p'''/12` for the trapezoidal rule and the Strang splitting, and
+/// twice as much for the midpoint rule.
 const DEFECT: f64 = 1.0 / 6.0;
 
-/// What was seen of a path.
+/// The result of the checks of a path.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Judgement {
-    /// The first step that cannot have resolved the motion.
+    /// The first unresolved step.
     pub unresolved: Option<UnresolvedStep>,
-    /// By how much the steps move the path, in units of its range; `None` where it is not known what they leave out.
+    /// The effect of the truncation error on the path, in units of its range; `None` where the truncation error is
+    /// unknown.
     pub error_estimate: Option<f64>,
 }
 
-/// Judges a path that satisfies its equations, of which the last sweep was. The velocities of its steps are looked at as those of a run; and the
-/// correction is found that the leading term of the error of the steps makes, by the equations linearised there: it is as large as the path where
-/// the ends are conjugate to within that error, though the factorisation sees nothing of it. `to` is workspace.
+/// Checks a path that satisfies its equations, directly after its last elimination.
+///
+/// The velocities of its steps are checked as in a run. In addition, the linearised equations give the correction of
+/// the path by the leading term of the truncation error. It is as large as the path where the ends are conjugate to
+/// within that error, which the pivots of the factorisation do not show. `to` is workspace.
 pub(super) fn judge<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     sweep: &mut BlockElimination<N>,
@@ -41,7 +46,7 @@ pub(super) fn judge<D: DiscreteLagrangian<N>, const N: usize>(
     Judgement { unresolved: turn.or(of_ends), error_estimate: moved.map(|(part, _)| part) }
 }
 
-/// The first step that does not resolve the motion by the velocities of four in sequence.
+/// The first step that does not resolve the motion, by the velocities of four consecutive steps.
 fn look<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     momenta: &[Carry<N>],
@@ -72,14 +77,15 @@ fn look<D: DiscreteLagrangian<N>, const N: usize>(
     None
 }
 
-/// The largest part of its range by which the steps move a coordinate, and the step where; infinite where the equations have no solution.
+/// The largest effect of the truncation error on a coordinate, relative to its range, and the step where it occurs;
+/// infinite where the linearised equations are singular.
 fn moved<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     sweep: &mut BlockElimination<N>,
     x: &mut Nodes<N>,
     to: &mut [SVector<f64, N>],
 ) -> Option<(f64, usize)> {
-    // A third difference has four momenta.
+    // A third difference needs four momenta.
     let momenta = sweep.momenta.as_slice();
     let last = momenta.len().checked_sub(4)?;
     let order = of.ld.order().filter(|order| *order <= 2)?;
@@ -87,7 +93,7 @@ fn moved<D: DiscreteLagrangian<N>, const N: usize>(
         let i = k.saturating_sub(2).min(last);
         let p = |j: usize| momenta[i + j].p;
         let third = (p(3) - p(0) + (p(1) - p(2)) * 3.0) * DEFECT;
-        // A rule of order one takes z, or the momentum that the drag acts on, at the start of a step.
+        // A rule of order one evaluates z, or the momentum on which the drag acts, at the start of a step.
         let Carry { p: here, dz: drag, .. } = momenta[k.saturating_sub(1)];
         let change = momenta[k.max(1)].p - momenta[k.max(1) - 1].p;
         if order == 1 { third + (change + here * drag) * (0.5 * drag) } else { third }
@@ -108,7 +114,7 @@ fn moved<D: DiscreteLagrangian<N>, const N: usize>(
         (high - low, max_or_nan(max_abs_or_nan(low.iter().copied()), max_abs_or_nan(high.iter().copied())));
     let mut worst = (0.0, 0);
     for (k, (to, q)) in to.iter().zip(&x.q).enumerate() {
-        // A coordinate that stays where it is has no range but its rounding.
+        // The range of a constant coordinate is round-off.
         let parts = (0..N).filter(|&i| range[i] > ROUNDED * size).map(|i| (to[i] - q[i]).abs() / range[i]);
         let part = parts.fold(0.0, max_or_nan);
         if part.is_nan() || part > worst.0 {

@@ -7,23 +7,24 @@ use super::judge::{Judgement, judge};
 use crate::{DiscreteLagrangian, solve::last_correction};
 use contact_geom::nalgebra::SVector;
 
-/// The corrections that a search may make.
+/// The limit of corrections in a search.
 const LIMIT: u32 = 200;
-/// The halvings of one correction, beyond which the residual does not fall along it.
+/// The limit of halvings of one correction; after these the residual does not decrease along it.
 const HALVINGS: u32 = 12;
-/// How often a search goes on from where the residual does not fall, by a whole correction: local minima of the residual that are no
-/// critical paths are common.
+/// The limit of full corrections that are taken although the residual does not decrease, since local minima of the
+/// residual that are not critical paths are common.
 const LEAPS: u32 = 12;
-/// What the relative residual of a path at round-off may be: rounded positions leave some units in the last place of the terms,
-/// and a discrete Lagrangian that is found by an iteration some more.
+/// The bound for the relative residual of a path at round-off: the round-off of the positions contributes some units in
+/// the last place of the terms, and a discrete Lagrangian that is computed by an iteration some more.
 const ROUND_OFF: f64 = 1024.0 * f64::EPSILON;
 
-/// The sum of squares that corrections lessen, each coordinate's in units of its largest terms.
+/// The merit function of the line search: the sum of the squares of the residuals, for each coordinate in units of its
+/// largest terms.
 fn merit<const N: usize>(at: &Measured<N>, sizes: &SVector<f64, N>) -> f64 {
     (0..N).filter(|&i| at.squares[i] != 0.0).map(|i| at.squares[i] / sizes[i].powi(2)).sum()
 }
 
-/// Makes the way to a path this part of what it was.
+/// Multiplies the difference between two paths by a factor.
 fn shorten<const N: usize>(from: &[SVector<f64, N>], to: &mut [SVector<f64, N>], part: f64) {
     if part != 1.0 {
         for (to, from) in to.iter_mut().zip(from) {
@@ -32,11 +33,12 @@ fn shorten<const N: usize>(from: &[SVector<f64, N>], to: &mut [SVector<f64, N>],
     }
 }
 
-/// Searches from a path, away from known ones.
+/// Searches for a critical path from an initial one, away from known ones.
 ///
-/// A correction is halved until the sum of the squares of the residuals falls. The search ends where the next correction,
-/// predicted from the last two, is below round-off, or where corrections stagnate with residuals at round-off. Without
-/// a path it ends with the one of the least residual where it first no longer fell.
+/// A correction is halved until the sum of the squares of the residuals decreases. The search succeeds where the next
+/// correction, predicted from the last two, is below round-off, or where corrections stagnate with residuals at
+/// round-off. If it fails, the result is the path with the smallest residual among those at which the line search
+/// failed.
 pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     mut x: Nodes<N>,
@@ -51,7 +53,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
     };
     let least = 16.0 * of.steps as f64 * f64::EPSILON;
     let mut before = f64::INFINITY;
-    // The path with the least residual before the leaps.
+    // The path with the smallest residual among those at which the line search failed.
     let mut best: Option<(Nodes<N>, Measured<N>)> = None;
     let mut leaps = 0;
     for iterations in 1..=LIMIT {
@@ -83,7 +85,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
                 if best.as_ref().is_none_or(|(_, best)| at.residual < best.residual) {
                     best = Some((x.clone(), at));
                 }
-                // The whole correction again.
+                // Take the full correction without a line search.
                 shorten(&x.q, &mut trial.q, f64::from(1 << HALVINGS));
                 (part, halvings, leap) = (1.0, 0, true);
                 leaps += 1;

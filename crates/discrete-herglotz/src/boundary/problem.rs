@@ -10,13 +10,13 @@ use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
-/// The discrete Herglotz principle as a boundary-value problem: find the path `q_0, ..., q_N` that is critical for the discrete
-/// action `z_N`, where `z_{k+1} = z_k + L_d(q_k, q_{k+1}, z_k)`; paper, section 3.
+/// The discrete Herglotz principle as a boundary-value problem: find the path `q_0, ..., q_N` that is critical for the
+/// discrete action `z_N`, where `z_{k+1} = z_k + L_d(q_k, q_{k+1}, z_k)`; paper, section 3.
 ///
-/// The unknowns are all positions and actions at once. They satisfy the recursion of the action and, at the interior points, the
-/// discrete Herglotz equations `D1 L_d(q_k, q_{k+1}, z_k) + sigma_d D2 L_d(q_{k-1}, q_k, z_{k-1}) = 0`; at each end what an
-/// [`End`] says. Newton's method with a line search solves them, each linear system by block elimination at a cost proportional to
-/// the number of steps.
+/// The unknowns are all positions and actions. They satisfy the recursion of the action, the discrete Herglotz
+/// equations `D1 L_d(q_k, q_{k+1}, z_k) + sigma_d D2 L_d(q_{k-1}, q_k, z_{k-1}) = 0` at the interior points, and the
+/// condition of an [`End`] at each end. They are found by Newton's method with a line search; the linear systems are
+/// solved by block elimination at a cost proportional to the number of steps.
 ///
 /// ```
 /// use contact_geom::systems::Pendulum;
@@ -42,7 +42,7 @@ pub struct BoundaryPath<D, const N: usize> {
     length: f64,
 }
 
-/// The starts beside known paths that a search tries.
+/// The limit of initial paths next to known ones in a search.
 const RESTARTS: usize = 8;
 
 fn finite<const N: usize>(what: &'static str, x: &SVector<f64, N>) -> Result<(), InputError> {
@@ -69,8 +69,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Self::with(ld, steps, Conditions::Ends(start, end))
     }
 
-    /// The problem of a periodic path, in which no position is given: `q_N = q_0 + shift`, as by whole turns of an angle, and
-    /// `p_N = p_0`. The action is shifted by what it is along the path; where forces depend on it, only position and momentum close.
+    /// The problem of a periodic path without given positions: `q_N = q_0 + shift` (for example by full turns of an
+    /// angle) and `p_N = p_0`. The action is not periodic, so that the state repeats in position and momentum only.
     ///
     /// # Errors
     /// Like those of [`new`](Self::new).
@@ -90,7 +90,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { ld, steps, conditions, t0: 0.0, z0: 0.0, from: None, known: Vec::new(), length: 1.0 })
     }
 
-    /// The time and the action of the start.
+    /// The same with this initial time and action.
     ///
     /// # Errors
     /// [`GeometryError::NonFinite`].
@@ -99,7 +99,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { t0, z0, ..self })
     }
 
-    /// The path from which the search starts, in place of the straight line. Its ends are moved to where they are given.
+    /// The same with an initial path for the search in place of the straight line. Its ends are moved to the given
+    /// positions.
     ///
     /// # Errors
     /// [`InputError::PathLength`] unless it has as many steps as the problem.
@@ -110,12 +111,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { from: Some(path), ..self })
     }
 
-    /// Keeps the search away from known paths, so that it finds another, if it finds one: by deflation, within about `length` (a
-    /// root mean square of coordinates) of each. A search that starts at a known path starts beside it, by an arc of this height.
+    /// The same with deflation of known paths, so that the search finds a different one if it succeeds. Deflation acts
+    /// within about `length` (a root mean square of coordinates) of each. An initial path that coincides with a known
+    /// one is shifted by an arc of this height.
     ///
     /// # Errors
-    /// [`InputError::PathLength`] unless each has as many steps as the problem, [`InputError::Tolerance`] unless the length is
-    /// positive and finite.
+    /// [`InputError::PathLength`] unless each has as many steps as the problem, [`InputError::Tolerance`] unless the
+    /// length is positive and finite.
     pub fn avoiding(self, known: &[&CriticalPath<N>], length: f64) -> Result<Self, InputError> {
         if let Some(path) = known.iter().find(|path| path.points.len() != self.steps + 1) {
             let found = path.points.len().saturating_sub(1);
@@ -127,9 +129,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { known: known.iter().map(|path| path.points.clone()).collect(), length, ..self })
     }
 
-    /// Searches for a critical path; the status says how that ended.
+    /// Searches for a critical path; the status of the result tells whether it was found.
     ///
-    /// Away from known paths it searches from its start, and where that finds none from starts on both sides of the known ones.
+    /// With deflation, a search that fails from its initial path is repeated from paths on both sides of the known
+    /// ones.
     pub fn search(&self) -> CriticalPath<N> {
         let deflation = Deflation { known: &self.known, length: self.length };
         let from = |q| search(&self.equations(), self.nodes(q), &deflation);
@@ -149,7 +152,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         CriticalPath { iterations, ..first }
     }
 
-    /// The positions of a path, with the action of the start.
+    /// The nodes of a path, with all actions set to the initial one.
     pub(super) fn nodes(&self, q: Vec<SVector<f64, N>>) -> Nodes<N> {
         Nodes { q, z: vec![self.z0; self.steps + 1] }
     }
@@ -159,18 +162,21 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         self.steps
     }
 
-    /// The index of a critical path of this problem: the number of negative directions of the second variation of the action.
+    /// The index of a critical path of this problem: the number of negative directions of the second variation of the
+    /// action.
     ///
-    /// That is the number of negative eigenvalues of the Hessian of `A_d` (minus `p_N . q_N` where that momentum is given) in the
-    /// positions that are not given. Where `p_0` is given, the action at the start moves along: `dz_0 = p_0 . dq_0`, so that the path
-    /// is critical in `q_0` as well. For `h > 0` and W positive definite it is 0 on short paths between given ends and grows by the
-    /// multiplicity of each conjugate point that the path meets: the index theorem of Morse, for which see Milnor, "Morse theory"
-    /// (1963). `None` where it is not defined: for a periodic path, which is not critical for the action of all its points, where a
-    /// sigma_d is not positive, and where the second variation is degenerate.
+    /// This is the number of negative eigenvalues of the Hessian of `A_d` (minus `p_N . q_N` where that momentum is
+    /// given) in the free positions. Where `p_0` is given, the initial action varies by `dz_0 = p_0 . dq_0`, so that
+    /// the path is critical in `q_0` as well. For `h > 0` and W positive definite the index is 0 for short paths
+    /// between given ends, and it grows by the multiplicity of each conjugate point on the path, by the Morse index
+    /// theorem: Milnor, "Morse theory" (1963).
+    ///
+    /// `None` where the index is not defined: for a periodic path, which is not critical for the action in all its
+    /// points, where a sigma_d is not positive, and where the second variation is degenerate.
     ///
     /// # Errors
-    /// [`InputError::PathLength`] unless the path has as many steps as the problem, [`InputError::Undefined`] where the discrete
-    /// Lagrangian is not defined along it.
+    /// [`InputError::PathLength`] unless the path has as many steps as the problem, [`InputError::Undefined`] where the
+    /// discrete Lagrangian is not defined along it.
     pub fn index(&self, path: &CriticalPath<N>) -> Result<Option<usize>, InputError> {
         if path.points.len() != self.steps + 1 || path.actions.len() != self.steps + 1 {
             let found = path.points.len().min(path.actions.len()).saturating_sub(1);
@@ -185,7 +191,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps, load: &[] }
     }
 
-    /// The path from which the search starts: not a known one, from which nothing leads away.
+    /// The initial path of the search, shifted by an arc if it coincides with a known path, where the deflated residual
+    /// is singular.
     fn start(&self) -> Vec<SVector<f64, N>> {
         let points = match &self.from {
             Some(path) => self.moved(path.points().to_vec()),
@@ -198,7 +205,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         }
     }
 
-    /// The heights of arcs to both sides: in all coordinates together, and in each.
+    /// The heights of arcs on both sides: in all coordinates together, and in each coordinate alone.
     fn arcs(&self) -> impl Iterator<Item = SVector<f64, N>> {
         let together = SVector::from_element(self.length);
         let alone =
@@ -206,7 +213,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         std::iter::once(together).chain(alone).flat_map(|arc| [arc, -arc])
     }
 
-    /// A path with an arc beside it that leaves the ends where they are.
+    /// A path shifted by a sine arc with fixed ends.
     fn beside(&self, points: &[SVector<f64, N>], arc: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
         let at = |k: usize| {
             let inside = k > 0 && k < self.steps;
@@ -215,7 +222,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         points.iter().enumerate().map(|(k, q)| q + arc * at(k)).collect()
     }
 
-    /// A path with its ends moved to where they are given.
+    /// A path with its ends moved to the given positions.
     pub(super) fn moved(&self, mut points: Vec<SVector<f64, N>>) -> Vec<SVector<f64, N>> {
         let (first, mut last) = self.given();
         if let (Some(q), Some(given)) = (points.first_mut(), first) {
@@ -247,20 +254,20 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
             Conditions::Ends(..) => last.unwrap_or(from),
         };
         let at = |k: usize| k as f64 / self.steps as f64;
-        // Of this form the ends are exact.
+        // In this form the ends are exact.
         (0..=self.steps).map(|k| from * (1.0 - at(k)) + to * at(k)).collect()
     }
 }
 
-/// Refuses a path whose search needs more memory than there is: what is available, where the system tells, and what the allocator
-/// gives.
+/// Returns an error for a path whose search needs more memory than is available, according to the operating system
+/// where it reports this, and to a trial allocation.
 fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), InputError> {
-    // Positions of the path, of the correction, of the trial, of the best so far and of the start; momenta and loads of the path that is judged;
-    // actions; the eliminated blocks.
+    // Positions of the path, the correction, the trial path, the best path and the initial path; momenta and loads of
+    // the checks; actions; the eliminated blocks.
     let blocks = if periodic { 2 } else { 1 };
     let reals = 7 * N + 5 + N + blocks * N * N;
     let bytes = reals.saturating_mul(size_of::<f64>());
-    // Not worth a question to the system.
+    // Short paths need no query of the system.
     if steps <= (1 << 26) / bytes {
         return Ok(());
     }
@@ -272,7 +279,8 @@ fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), Inpu
     Ok(())
 }
 
-/// The bytes that the system can give without swapping; what an address can count where it does not tell.
+/// The memory in bytes that is available without swapping; the size of the address space where the system does not
+/// report it.
 fn available_memory() -> usize {
     let told = || {
         let text = std::fs::read_to_string("/proc/meminfo").ok()?;

@@ -1,17 +1,19 @@
-//! Block elimination without exchanges of rows: the block Thomas algorithm, for paths whose beginnings end away from conjugate points.
+//! Block elimination without exchanges of rows between points: the block Thomas algorithm, for paths whose points are
+//! not close to conjugate points of the start.
 
 use super::block_elimination::{BlockElimination, Carry, Eliminated, Equations, Measured, Nodes, Undefined};
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, SecondDiscreteJet};
 
-/// The least part of its diagonal entry before the elimination that a pivot may be: so much is lost of the digits of a correction,
-/// never of the equations that the path is measured by.
+/// The smallest admissible pivot, relative to its diagonal entry before the elimination. This bounds the loss of digits
+/// in a correction; the residuals that measure the path are not affected.
 const LEAST_PIVOT: f64 = 1.0 / 8192.0;
-/// The regularity of the last block above which digits lost on the way cannot hide that the ends are conjugate.
+/// The smallest regularity of the last block at which the loss of digits in the elimination cannot hide that the ends
+/// are conjugate.
 const REGULAR: f64 = 1e-6;
 
-/// Why a path needs another route.
+/// The reason why a path needs the general elimination.
 enum PivotFailure {
     /// Second derivatives of the discrete Lagrangian in the action do not vanish.
     Coupled,
@@ -19,14 +21,15 @@ enum PivotFailure {
     Pivot,
 }
 
-/// What the equations up to a point leave to those of the next, the corrections of all positions before it eliminated.
+/// The momentum and the action at a point as affine functions of its correction, after the elimination of all previous
+/// positions.
 struct Carried<const N: usize> {
-    /// `D2 L_d` of the step before, the momentum at the point.
+    /// `D2 L_d` of the previous step, the momentum at the point.
     p: SVector<f64, N>,
     /// `dp = schur dq + rhs`.
     schur: SMatrix<f64, N, N>,
     rhs: SVector<f64, N>,
-    /// The diagonal of `D22` of the step before: what `schur` was before the elimination.
+    /// The diagonal of `D22` of the previous step, which is that of `schur` before the elimination.
     diagonal: SVector<f64, N>,
     /// `dz = slope . dq + change`.
     slope: SVector<f64, N>,
@@ -34,12 +37,12 @@ struct Carried<const N: usize> {
 }
 
 impl<const N: usize> BlockElimination<N> {
-    /// Like [`forward`](Sweep::forward), where the path is regular enough for it; `None` elsewhere.
+    /// Like [`forward`](BlockElimination::forward), for a path that is sufficiently regular; `None` otherwise.
     ///
-    /// With `dq_k = r_k - X_k dq_{k+1}` of the points before, the momentum at point k varies by `S dq_k + s`, where
-    /// `S = D22 - D12^T X` and `s = D12^T r` of the step before, and the action by `a . dq_k + c`: the discrete Herglotz equation
-    /// `D1 + sigma p = 0` has the blocks `D11 + sigma S` and `D12`, and some of rank one where second derivatives in the action
-    /// do not vanish. Where they do no action is corrected.
+    /// With `dq_k = r_k - X_k dq_{k+1}` at the previous points, the momentum at point k varies by `S dq_k + s`, where
+    /// `S = D22 - D12^T X` and `s = D12^T r` of the previous step, and the action by `a . dq_k + c`. The discrete
+    /// Herglotz equation `D1 + sigma p = 0` then has the blocks `D11 + sigma S` and `D12`, with terms of rank one where
+    /// second derivatives in the action do not vanish. Where they vanish, the correction of the action is not needed.
     #[inline(always)]
     pub fn without_exchanges<D: DiscreteLagrangian<N>>(
         &mut self,
@@ -102,7 +105,7 @@ impl<const N: usize> BlockElimination<N> {
                     next += p * jet.d2z.transpose();
                     rhs -= by_action * carried.change;
                 }
-                // The three positions of the equation are rounded, and move it by as much.
+                // The effect of the round-off of the three positions in the equation.
                 let rounding = magnitudes(&next, q1) * 4.0;
                 measured.take(&value, &(jet.first.d1.abs() + p.abs() * sigma.abs() + rounding));
                 let diagonal = (jet.d11.diagonal() + carried.diagonal * sigma).abs();
@@ -146,24 +149,24 @@ impl<const N: usize> BlockElimination<N> {
             }
         }
         measured.log_factor += measured.factors.ln();
-        // What is not finite, or small, is looked at more closely.
+        // Paths with non-finite values or a small regularity are left to the general elimination.
         let sound = measured.squares.sum().is_finite() && x.z[of.steps].is_finite() && measured.regularity >= REGULAR;
         Ok(if sound { Ok(measured) } else { Err(PivotFailure::Pivot) })
     }
 }
 
-/// Whether a second derivative in the action does not vanish, or is not a number.
+/// Whether a second derivative in the action is nonzero or NaN.
 #[inline(always)]
 fn is_coupled<const N: usize>(jet: &SecondDiscreteJet<N>) -> bool {
     let mut size = jet.dzz.abs();
     for i in 0..N {
         size += jet.d1z[i].abs() + jet.d2z[i].abs();
     }
-    // Not `size > 0.0`: that would let a NaN pass.
+    // The comparison is written so that it holds for a NaN.
     size != 0.0
 }
 
-/// `|m| |x|`, entry by entry.
+/// `|m| |x|` with absolute values of the entries.
 #[inline(always)]
 fn magnitudes<const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<f64, N>) -> SVector<f64, N> {
     let mut sum = SVector::zeros();
@@ -176,8 +179,8 @@ fn magnitudes<const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<f64, N>) -> SV
     sum
 }
 
-/// Multiplies `next` and `rhs` by the inverse of a block, by the elimination of Gauss and Jordan with pivots on the diagonal; false
-/// where one of them is too small, or not finite.
+/// Multiplies `next` and `rhs` by the inverse of a block, by Gauss-Jordan elimination with pivots on the diagonal.
+/// Returns `false` where a pivot is too small or not finite.
 #[inline(always)]
 fn reduce<const N: usize>(
     block: &mut SMatrix<f64, N, N>,
@@ -192,7 +195,7 @@ fn reduce<const N: usize>(
         sound &= size >= LEAST_PIVOT * diagonal[j] && size > 0.0 && size < f64::INFINITY;
         let inverse = 1.0 / pivot;
         let others = SVector::<f64, N>::from_fn(|i, _| block[(i, j)]);
-        // Whole columns at a time: one entry that is written by itself would have its column waited for.
+        // Whole columns are written at a time: a separate write of one entry would delay the reads of its column.
         let reduced = |i: usize, x: f64, entry: f64| if i == j { entry } else { x - others[i] * entry };
         for c in j + 1..N {
             let entry = block[(j, c)] * inverse;

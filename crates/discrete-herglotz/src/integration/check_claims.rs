@@ -4,16 +4,16 @@ use crate::{InputError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
-/// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units of
-/// round-off, since the constants of a Lagrangian are rounded.
+/// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
+/// of round-off, since the constants of a Lagrangian are rounded.
 pub(crate) const PROBE: f64 = 1e-12;
 
-/// The structure that a Lagrangian claims, verified at an initial point and at a point near it, the second at a time near the
-/// initial time. Methods that skip work rely on it. A structure that is proved is not verified.
+/// The structure that a Lagrangian claims, verified at an initial point and at a point near it, the second at a time
+/// near the initial time. Methods that skip work rely on it. A structure that is proved is not verified.
 ///
 /// # Errors
-/// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at neither
-/// point.
+/// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at
+/// neither point.
 pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
@@ -25,7 +25,8 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
     }
-    // At the start derivatives may vanish by symmetry, as at an equilibrium, or for a cosine at t = 0; near it they do not.
+    // At the start derivatives may vanish by symmetry, as at an equilibrium, or for a cosine at t = 0; near it they do
+    // not.
     let aside = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
     let beside = VelocityPoint {
         q: start.q.map_with_location(|i, _, q| aside(q, i)),
@@ -42,8 +43,8 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None` where L
-/// is not defined, or where the inverse Legendre transformation fails.
+/// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None`
+/// where L is not defined, or where the inverse Legendre transformation fails.
 pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
@@ -58,8 +59,8 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     structure.defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
 }
 
-/// Verifies the claims at an initial point at this number of times in a span. A false claim on the time dependence shows at
-/// all but special times.
+/// Verifies the claims at an initial point at this number of times in a span. A false claim on the time dependence
+/// shows at all but special times.
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.

@@ -8,15 +8,17 @@ use std::sync::OnceLock;
 /// The number of Legendre polynomials that the integrals of the highest degree need.
 pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
 
-/// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0 to h
+/// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0
+/// to h
 ///
-/// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`, `p(tau) = (p0 + int rho L_q) / rho(tau)`,
+/// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`,
+/// `p(tau) = (p0 + int rho L_q) / rho(tau)`,
 ///
 /// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
 ///
-/// At its ends it equals the states of the run, of order 2s, to round-off; between them its order is s. The curve of a run is
-/// therefore continuous, and its velocity jumps by `O(h^s)` between steps. Where the action is not requested and z decouples,
-/// z keeps its initial value.
+/// At its ends it equals the states of the run, of order 2s, to round-off; between them its order is s. The curve of a
+/// run is therefore continuous, and its velocity jumps by `O(h^s)` between steps. Where the action is not requested and
+/// z decouples, z keeps its initial value.
 #[derive(Clone, Copy, Debug)]
 pub struct DenseStep<const N: usize> {
     s: usize,
@@ -51,7 +53,8 @@ impl<const N: usize> DenseStep<N> {
         self.at_fraction((t - self.t) / self.h)
     }
 
-    /// The velocity `dq/dt` of the curve at a time: the polynomial of degree `s - 1` through the velocities of the stages.
+    /// The velocity `dq/dt` of the curve at a time: the polynomial of degree `s - 1` through the velocities of the
+    /// stages.
     pub fn velocity(&self, t: f64) -> SVector<f64, N> {
         let p = polynomials(self.s, (t - self.t) / self.h);
         SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
@@ -146,8 +149,8 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
 /// The largest number of states between the parts of a step.
 const BETWEEN_PARTS: usize = MAX_STAGES + 1;
 
-/// The integrals of the Legendre polynomials to the ends of the first s + 1 of the s + 2 parts of a step: `[k][i]` is the
-/// integral of `P_k` to the end of part i.
+/// The integrals of the Legendre polynomials to the ends of the first s + 1 of the s + 2 parts of a step: `[k][i]` is
+/// the integral of `P_k` to the end of part i.
 fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
     static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
         [const { OnceLock::new() }; MAX_STAGES];

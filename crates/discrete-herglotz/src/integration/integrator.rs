@@ -16,8 +16,8 @@ pub struct MethodInfo {
     pub explicit: bool,
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the exact flow.
     pub exact_rate: bool,
-    /// Whether its steps have equal length in the transformed time of the Lagrangian; the last one ends at the end of the
-    /// span.
+    /// Whether its steps have equal length in the transformed time of the Lagrangian; the last one ends at the end of
+    /// the span.
     pub in_transformed_time: bool,
     /// The number of stages, for contact Gauss collocation.
     pub collocation: Option<usize>,
@@ -33,8 +33,8 @@ pub struct MethodInfo {
 }
 
 impl MethodInfo {
-    /// The properties of an implicit method that is not known to be symmetric: the defaults for a discrete Lagrangian in N
-    /// coordinates.
+    /// The properties of an implicit method that is not known to be symmetric: the defaults for a discrete Lagrangian
+    /// in N coordinates.
     pub fn of_discrete<const N: usize>(name: impl Into<Cow<'static, str>>, order: u32) -> Self {
         MethodInfo {
             name: name.into(),
@@ -58,13 +58,13 @@ impl MethodInfo {
 pub struct StepperOptions {
     /// Whether the action is computed even where it does not act back on the motion.
     pub action: bool,
-    /// Whether the stepper checks that its steps resolve the motion, if the check takes time; see [`Stepper::unresolved`] and
-    /// [`Stepper::suspect_interval`].
+    /// Whether the stepper checks that its steps resolve the motion, if the check takes time; see
+    /// [`Stepper::unresolved`] and [`Stepper::suspect_interval`].
     pub watched: bool,
 }
 
-/// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of this
-/// crate, the exact flow, and those of a user.
+/// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of
+/// this crate, the exact flow, and those of a user.
 ///
 /// For a [`DiscreteLagrangian`](crate::DiscreteLagrangian), [`CustomMethod`](crate::CustomMethod) is an implementation.
 pub trait Integrator<'a, L, const N: usize> {
@@ -77,7 +77,8 @@ pub trait Integrator<'a, L, const N: usize> {
     /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], [`InputError::Stages`].
     fn check(&self, lagrangian: &L) -> Result<(), InputError>;
 
-    /// A stepper at the initial state of a problem, with steps of length h, which are negative for a run backward in time.
+    /// A stepper at the initial state of a problem, with steps of length h, which are negative for a run backward in
+    /// time.
     ///
     /// # Errors
     /// [`InputError`] where the problem does not satisfy the hypotheses of the method, or the first step fails.
@@ -88,8 +89,8 @@ pub trait Integrator<'a, L, const N: usize> {
         wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 
-    /// The kernel with which an [`Ensemble`](crate::Ensemble) takes these steps for many motions at once; `None` where each
-    /// member has its own stepper.
+    /// The kernel with which an [`Ensemble`](crate::Ensemble) takes these steps for many motions at once; `None` where
+    /// each member has its own stepper.
     fn batch_kernel(&self) -> Option<BatchKernel> {
         None
     }

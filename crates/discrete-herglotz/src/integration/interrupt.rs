@@ -8,13 +8,14 @@ pub const INTERRUPTION: &str = "an interruption";
 /// The number of steps between two queries: some hundred microseconds of short steps.
 pub(crate) const BETWEEN: usize = 256;
 
-/// A predicate that is queried periodically during a computation and ends it when it becomes true, for example after Ctrl-C.
+/// A predicate that is queried periodically during a computation and ends it when it becomes true, for example after
+/// Ctrl-C.
 #[derive(Clone, Copy)]
 pub struct Interrupt<'a>(&'a (dyn Fn() -> bool + Sync));
 
 impl<'a> Interrupt<'a> {
-    /// An interrupt that ends the computation once this returns true. It is queried every few hundred steps, on the threads
-    /// of the runs.
+    /// An interrupt that ends the computation once this returns true. It is queried every few hundred steps, on the
+    /// threads of the runs.
     pub fn when(is_wanted: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Interrupt(is_wanted)
     }

@@ -1,5 +1,5 @@
-//! The problem, the integrator with its properties, its stepper, the table of splitting schemes, dense output, interruption
-//! and the entries of a plan.
+//! The problem, the integrator with its properties, its stepper, the table of splitting schemes, dense output,
+//! interruption and the entries of a plan.
 
 pub(crate) mod check_claims;
 pub(crate) mod dense_step;

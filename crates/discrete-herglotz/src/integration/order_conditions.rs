@@ -2,7 +2,8 @@
 
 use super::SplittingScheme;
 
-/// A sum with the sum of the absolute values of its terms, which bounds the effect of the round-off of the coefficients.
+/// A sum with the sum of the absolute values of its terms, which bounds the effect of the round-off of the
+/// coefficients.
 #[derive(Clone, Copy)]
 struct Sized {
     value: f64,
@@ -17,8 +18,8 @@ fn in_roundings(found: Sized, exact: f64) -> f64 {
 /// The tolerance of the residuals in units of round-off: products of up to `order` coefficients and their sums.
 const ROUNDINGS: f64 = 4.0;
 
-/// The coefficients of the words of one length in the letters A and B of `prod exp(k_i B) exp(d_i A)`, as an element of the
-/// free associative algebra: `words[n][w]` for the word of length `n` whose letters are the bits of `w`.
+/// The coefficients of the words of one length in the letters A and B of `prod exp(k_i B) exp(d_i A)`, as an element of
+/// the free associative algebra: `words[n][w]` for the word of length `n` whose letters are the bits of `w`.
 fn words(scheme: &SplittingScheme, length: usize) -> Vec<Vec<Sized>> {
     let zero = Sized { value: 0.0, size: 0.0 };
     let mut words: Vec<Vec<Sized>> = (0..=length).map(|n| vec![zero; 1 << n]).collect();
@@ -56,15 +57,16 @@ fn word_residual(words: &[Vec<Sized>], length: usize) -> f64 {
     words[length].iter().map(|&found| in_roundings(found, exact)).fold(0.0, f64::max)
 }
 
-/// A Nyström tree of order `n`: its elementary weight at each kick, and the factor of `s^(n - 1)` in that of the exact flow.
+/// A Nyström tree of order `n`: its elementary weight at each kick, and the factor of `s^(n - 1)` in that of the exact
+/// flow.
 struct Tree {
     weight: Vec<Sized>,
     exact: f64,
     order: usize,
 }
 
-/// The largest residual, in units of round-off, of the conditions of this order for `y'' = f(y)`: for the velocity, of the
-/// trees of this order, and for the position, of the trees of one order less.
+/// The largest residual, in units of round-off, of the conditions of this order for `y'' = f(y)`: for the velocity, of
+/// the trees of this order, and for the position, of the trees of one order less.
 ///
 /// The kicks and their times define a Nyström method: `v1 = v0 + h sum k_i f_i`, and
 /// `Y_i = y0 + c_i h v0 + h^2 sum_j k_j (c_i - c_j) f_j`.

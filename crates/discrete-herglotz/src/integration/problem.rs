@@ -16,8 +16,8 @@ use contact_geom::{
 pub enum Start<const N: usize> {
     /// A point `(q, v, z)` of TQ x R.
     Velocity(VelocityPoint<N>),
-    /// A point `(q, p, z)` of T\*Q x R, with a guess of its velocity, which is needed where several velocities have the same
-    /// momentum.
+    /// A point `(q, p, z)` of T\*Q x R, with a guess of its velocity, which is needed where several velocities have the
+    /// same momentum.
     Momentum(PhasePoint<N>, SVector<f64, N>),
 }
 
@@ -72,8 +72,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The problem of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
     ///
     /// # Errors
-    /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not defined, a
-    /// singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
+    /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not
+    /// defined, a singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
     pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
         check_time(t0)?;
         if N == 0 {
@@ -98,8 +98,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.
     ///
     /// # Errors
-    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the discrete
-    /// Lagrangian is not regular at the point, [`InputError::EqualPoints`] where it is not regular because `q0 = q1`.
+    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the
+    /// discrete Lagrangian is not regular at the point, [`InputError::EqualPoints`] where it is not regular because
+    /// `q0 = q1`.
     pub fn from_points(
         lagrangian: &'a L,
         ld: &impl DiscreteLagrangian<N>,

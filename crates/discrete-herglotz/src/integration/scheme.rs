@@ -5,12 +5,13 @@
 
 use HalfSequence::{Composition, Nystrom};
 
-/// A symmetric splitting of a flow into kicks and drifts: `kick k_0, drift d_1, kick k_1, ..., drift d_n, kick k_n`, each a
-/// fraction of the step.
+/// A symmetric splitting of a flow into kicks and drifts: `kick k_0, drift d_1, kick k_1, ..., drift d_n, kick k_n`,
+/// each a fraction of the step.
 ///
 /// A composition is `S_(g_1 h) ... S_(g_s h)` of the Strang splitting, or of any symmetric map of order 2. A
-/// Runge-Kutta-Nyström splitting satisfies fewer order conditions and has smaller errors, but its order holds only where the
-/// commutator `[B, [B, [B, A]]]` vanishes: where the velocity enters A at most quadratically and B not at all.
+/// Runge-Kutta-Nyström splitting satisfies fewer order conditions and has smaller errors, but its order holds only
+/// where the commutator `[B, [B, [B, A]]]` vanishes: where the velocity enters A at most quadratically and B not at
+/// all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplittingScheme {
     name: &'static str,
@@ -63,7 +64,8 @@ impl SplittingScheme {
         coefficients: Composition(&[0.414_490_771_794_375_74, 0.414_490_771_794_375_74, -0.657_963_087_177_502_9]),
     };
 
-    /// Order 4 in five stages with a smaller error than the two above: McLachlan, SIAM J. Sci. Comput. 16 (1995) 151-168.
+    /// Order 4 in five stages with a smaller error than the two above: McLachlan, SIAM J. Sci. Comput. 16 (1995)
+    /// 151-168.
     pub const MCLACHLAN_4: Self = SplittingScheme {
         name: "mclachlan_4",
         order: 4,
@@ -205,8 +207,8 @@ impl SplittingScheme {
         ]),
     };
 
-    /// The Runge-Kutta-Nyström splitting of order 4 in six stages, `SRKN_6^b`: Blanes and Moan, J. Comput. Appl. Math. 142
-    /// (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order conditions.
+    /// The Runge-Kutta-Nyström splitting of order 4 in six stages, `SRKN_6^b`: Blanes and Moan, J. Comput. Appl. Math.
+    /// 142 (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order conditions.
     pub const BLANES_MOAN_4: Self = SplittingScheme {
         name: "blanes_moan_4",
         order: 4,
@@ -224,8 +226,9 @@ impl SplittingScheme {
         },
     };
 
-    /// The Runge-Kutta-Nyström splitting of order 6 in eleven stages, `SRKN_11^b`: Blanes and Moan, J. Comput. Appl. Math.
-    /// 142 (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order conditions.
+    /// The Runge-Kutta-Nyström splitting of order 6 in eleven stages, `SRKN_11^b`: Blanes and Moan, J. Comput. Appl.
+    /// Math. 142 (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order
+    /// conditions.
     pub const BLANES_MOAN_6: Self = SplittingScheme {
         name: "blanes_moan_6",
         order: 6,
@@ -252,8 +255,9 @@ impl SplittingScheme {
         },
     };
 
-    /// The Runge-Kutta-Nyström splitting of order 6 in fourteen stages, `SRKN_14^a`: Blanes and Moan, J. Comput. Appl. Math.
-    /// 142 (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order conditions.
+    /// The Runge-Kutta-Nyström splitting of order 6 in fourteen stages, `SRKN_14^a`: Blanes and Moan, J. Comput. Appl.
+    /// Math. 142 (2002) 313-330. The published fifteen digits are completed to the nearest solution of the order
+    /// conditions.
     pub const BLANES_MOAN_6_LONG: Self = SplittingScheme {
         name: "blanes_moan_6_long",
         order: 6,

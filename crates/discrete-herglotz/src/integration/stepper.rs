@@ -5,11 +5,12 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use thiserror::Error;
 
-/// A method applied to one motion: the current state, the workspace, and the data carried from one step to the next (initial
-/// guesses, compensation terms, a kick shared by two steps).
+/// A method applied to one motion: the current state, the workspace, and the data carried from one step to the next
+/// (initial guesses, compensation terms, a kick shared by two steps).
 ///
 /// A run advances a stepper. [`Flow`](crate::rules::Flow) is the stepper of a
-/// [`DiscreteLagrangian`](crate::DiscreteLagrangian); methods that carry more than a guess of the velocity have their own.
+/// [`DiscreteLagrangian`](crate::DiscreteLagrangian); methods that carry more than a guess of the velocity have their
+/// own.
 pub trait Stepper<const N: usize> {
     /// Takes `steps` steps without observation between them.
     ///
@@ -17,8 +18,8 @@ pub trait Stepper<const N: usize> {
     /// [`StepFailure`] where a step fails: the state is then that before the failed step.
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure>;
 
-    /// Takes `steps` steps, or fewer if a method in transformed time reaches the time `t_end` before; returns their number.
-    /// Methods with steps of constant length ignore `t_end`.
+    /// Takes `steps` steps, or fewer if a method in transformed time reaches the time `t_end` before; returns their
+    /// number. Methods with steps of constant length ignore `t_end`.
     ///
     /// # Errors
     /// As [`advance`](Self::advance).
@@ -39,19 +40,20 @@ pub trait Stepper<const N: usize> {
     /// The number of evaluations of forces, or of gradients of L, since the start: one per point of R x TQ x R.
     fn evaluations(&self) -> u64;
 
-    /// The dense output of the last step, for a method that provides it; `None` before the first step and after a failed one.
+    /// The dense output of the last step, for a method that provides it; `None` before the first step and after a
+    /// failed one.
     fn dense(&self) -> Option<DenseStep<N>> {
         None
     }
 
-    /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where several
-    /// velocities have the same momentum. `None` before the first step, and where the velocity is unique.
+    /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where
+    /// several velocities have the same momentum. `None` before the first step, and where the velocity is unique.
     fn last_velocity(&self) -> Option<SVector<f64, N>> {
         None
     }
 
-    /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state. This
-    /// affects only the number of iterations.
+    /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state.
+    /// This affects only the number of iterations.
     fn guess(&mut self, _longer: &DenseStep<N>) {}
 
     /// Whether `sigma_d` is known in advance to be the same in all steps.
@@ -69,8 +71,8 @@ pub trait Stepper<const N: usize> {
         None
     }
 
-    /// Restores the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they are
-    /// not valid.
+    /// Restores the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they
+    /// are not valid.
     fn restore(&mut self, _words: &[u64]) -> bool {
         false
     }
@@ -96,8 +98,8 @@ pub struct StepFailure {
     pub cause: StepError,
 }
 
-/// An interval of steps along which the second difference of the velocity is twice as large as in all steps before. For a
-/// smooth force this is harmless, but the force may jump there, or vary on a scale shorter than the steps. A
+/// An interval of steps along which the second difference of the velocity is twice as large as in all steps before. For
+/// a smooth force this is harmless, but the force may jump there, or vary on a scale shorter than the steps. A
 /// [`Run`](crate::Run) examines the interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SuspectInterval<const N: usize> {

@@ -10,14 +10,14 @@ use contact_geom::{
 
 /// Monitor of the steps of a run: the first step that cannot have resolved the motion, and the latest suspect interval.
 ///
-/// The defect of a step is the sum of two consecutive second differences of the velocity with opposite directions, in units
-/// of the largest of the velocities. An oscillation of frequency omega has such differences where its velocity vanishes, and
-/// the defect exceeds one for steps longer than a sixth of a period. A step past a pole of the force, or through a pulse, has
-/// them as the force rises and falls. A velocity that only grows, from rest and at any rate, has second differences in one
-/// direction.
+/// The defect of a step is the sum of two consecutive second differences of the velocity with opposite directions, in
+/// units of the largest of the velocities. An oscillation of frequency omega has such differences where its velocity
+/// vanishes, and the defect exceeds one for steps longer than a sixth of a period. A step past a pole of the force, or
+/// through a pulse, has them as the force rises and falls. A velocity that only grows, from rest and at any rate, has
+/// second differences in one direction.
 ///
-/// A single second difference is a weaker indication: it is `(omega h)^2` times the velocity, and a jump of the force also
-/// causes one. One that is larger than all before therefore yields a [`SuspectInterval`], which the run examines.
+/// A single second difference is a weaker indication: it is `(omega h)^2` times the velocity, and a jump of the force
+/// also causes one. One that is larger than all before therefore yields a [`SuspectInterval`], which the run examines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ResolutionMonitor<const N: usize> {
     pub first: Option<UnresolvedStep>,
@@ -28,15 +28,15 @@ pub(crate) struct ResolutionMonitor<const N: usize> {
     pub floor: f64,
 }
 
-/// The threshold for the first suspect interval: a second difference of the velocity, in units of the velocity. A smooth
-/// oscillation reaches it with 28 steps per period.
+/// The threshold for the first suspect interval: a second difference of the velocity, in units of the velocity. A
+/// smooth oscillation reaches it with 28 steps per period.
 const SHARP: f64 = 0.05;
 
 /// A change of position below this fraction of the position is round-off.
 pub(crate) const ROUNDED: f64 = 1e-10;
 
-/// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of the
-/// initial position, so that it also holds where the motion has come to rest near the origin.
+/// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of
+/// the initial position, so that it also holds where the motion has come to rest near the origin.
 pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
     let reach = max_or_nan(size(q), size(v) * h.abs());
     if reach.is_finite() { ROUNDED * reach } else { 0.0 }
@@ -59,8 +59,8 @@ impl<const N: usize> ResolutionMonitor<N> {
         }
     }
 
-    /// Records a suspect interval with this sharpness. The next one needs a second difference twice as large, which bounds
-    /// their number.
+    /// Records a suspect interval with this sharpness. The next one needs a second difference twice as large, which
+    /// bounds their number.
     #[cold]
     #[inline(never)]
     pub fn doubt(&mut self, sharpness: f64, doubt: SuspectInterval<N>) {
@@ -74,8 +74,9 @@ pub(crate) fn size<const N: usize>(x: &SVector<f64, N>) -> f64 {
     max_abs_or_nan(x.iter().copied())
 }
 
-/// The sharpness of a change of the velocity within a time h: the square of its second difference, in units of the velocity.
-/// `None` where it does not exceed the sharpest so far, and where it changes the position q by no more than round-off.
+/// The sharpness of a change of the velocity within a time h: the square of its second difference, in units of the
+/// velocity. `None` where it does not exceed the sharpest so far, and where it changes the position q by no more than
+/// round-off.
 #[inline(always)]
 pub(crate) fn sharper<const N: usize>(
     [turn, velocity, q]: [&SVector<f64, N>; 3],
@@ -93,8 +94,8 @@ fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64,
     moves.then(|| turn.dot(turn) / velocity.dot(velocity))
 }
 
-/// A bound for the round-off of the value of L, from the round-off of its terms and of its forces at a position. The forces
-/// are included because near an equilibrium at which terms cancel, the potential is small of second order in the
+/// A bound for the round-off of the value of L, from the round-off of its terms and of its forces at a position. The
+/// forces are included because near an equilibrium at which terms cancel, the potential is small of second order in the
 /// displacement.
 pub(crate) fn value_rounding<const N: usize>(of_terms: f64, of_force: &SVector<f64, N>, q: &SVector<f64, N>) -> f64 {
     of_terms + size(of_force) * size(q)
@@ -105,8 +106,8 @@ pub(crate) fn at_rest<const N: usize>(velocities: [&SVector<f64, N>; 4], h: f64,
     max_abs_or_nan(velocities.into_iter().flatten().copied()) * h.abs() <= floor
 }
 
-/// The defect of four consecutive velocities, at steps of length h, the last of them at the position q; `None` where it is
-/// at most one.
+/// The defect of four consecutive velocities, at steps of length h, the last of them at the position q; `None` where it
+/// is at most one.
 #[inline(always)]
 pub(crate) fn defect<const N: usize>(
     [first, second, third, fourth]: [&SVector<f64, N>; 4],
@@ -121,9 +122,9 @@ pub(crate) fn defect<const N: usize>(
 
 /// The defect of two second differences of opposite directions among three velocities; `None` where it is at most one.
 ///
-/// Differences that change q by less than 1/256 of its size are ignored: in a motion that has come to rest the velocities
-/// are round-off, and where velocity and force vanish together the substeps of a long scheme have such differences from
-/// their own errors.
+/// Differences that change q by less than 1/256 of its size are ignored: in a motion that has come to rest the
+/// velocities are round-off, and where velocity and force vanish together the substeps of a long scheme have such
+/// differences from their own errors.
 #[inline(never)]
 pub(crate) fn turning<const N: usize>(
     changes: [&SVector<f64, N>; 2],
@@ -137,11 +138,13 @@ pub(crate) fn turning<const N: usize>(
     (change > velocity && change * h.abs() > max_or_nan(LEAST * size(q), floor)).then(|| change / velocity)
 }
 
-/// The smallest relative change of position that counts in [`turning`], and in the comparison of a step with two half steps.
+/// The smallest relative change of position that counts in [`turning`], and in the comparison of a step with two half
+/// steps.
 pub(crate) const LEAST: f64 = 1.0 / 256.0;
 
-/// The defect of a rational conformal factor, which approximates an exponential: it exceeds one where a step contracts or
-/// expands by more than a factor of three. At `x = 1/2`, where `(1 + x)/(1 - x) = 3`, its relative error is about a tenth.
+/// The defect of a rational conformal factor, which approximates an exponential: it exceeds one where a step contracts
+/// or expands by more than a factor of three. At `x = 1/2`, where `(1 + x)/(1 - x) = 3`, its relative error is about a
+/// tenth.
 #[inline(always)]
 pub(crate) fn factor_defect(sigma: f64) -> Option<f64> {
     if (1.0 / 3.0..=3.0).contains(&sigma) { None } else { Some(sigma.ln().abs() / 3.0f64.ln()) }

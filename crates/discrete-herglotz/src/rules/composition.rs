@@ -13,13 +13,14 @@ use contact_geom::nalgebra::SVector;
 /// A symmetric composition `F_(g_s h) ... F_(g_1 h)` of higher order of the flow of a symmetric discrete Lagrangian of
 /// order 2, with its current state.
 ///
-/// The substeps `g_i` of a [`SplittingScheme`] sum to 1 and satisfy the order conditions of the scheme, so that a rule of
-/// the user is raised to the order of the scheme; Yoshida, Phys. Lett. A 150 (1990). Some substeps are negative: for a
-/// symmetric rule the step with `-h` is the inverse of the step with `h`, which is
+/// The substeps `g_i` of a [`SplittingScheme`] sum to 1 and satisfy the order conditions of the scheme, so that a rule
+/// of the user is raised to the order of the scheme; Yoshida, Phys. Lett. A 150 (1990). Some substeps are negative: for
+/// a symmetric rule the step with `-h` is the inverse of the step with `h`, which is
 /// [`backward`](DiscreteLagrangian::backward).
 ///
-/// The hypotheses are order 2 and the symmetry `F_(-h) = F_h^(-1)`. They are not verified; without them the order of the
-/// scheme is not attained. Each substep is conformally contact, and `sigma_d` of the step is the product of the factors.
+/// The hypotheses are order 2 and the symmetry `F_(-h) = F_h^(-1)`. They are not verified; without them the order of
+/// the scheme is not attained. Each substep is conformally contact, and `sigma_d` of the step is the product of the
+/// factors.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::DoublePendulum};
@@ -177,8 +178,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
-    /// Checks whether a substep resolves the motion, by the conformal factor of its rule and by the second differences of
-    /// the mean velocities, scaled to the length of the substep. Differences are compared from the second step on.
+    /// Checks whether a substep resolves the motion, by the conformal factor of its rule and by the second differences
+    /// of the mean velocities, scaled to the length of the substep. Differences are compared from the second step on.
     #[inline(always)]
     fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &DiscreteStep<N>, sharpest: &mut f64) {
         let now = &next.velocity;

@@ -47,8 +47,8 @@ pub struct Flow<D, const N: usize> {
     t0: f64,
     k: usize,
     state: PhasePoint<N>,
-    /// The mean velocities of the last steps, the latest first; the initial guess of Newton's method is extrapolated from
-    /// them.
+    /// The mean velocities of the last steps, the latest first; the initial guess of Newton's method is extrapolated
+    /// from them.
     velocities: [SVector<f64, N>; 3],
     solver: Solver<N>,
     /// `sigma_d` of the last step.
@@ -63,14 +63,14 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// A flow of a discrete Lagrangian, or of a reference to one, from the state `(q, p, z)` at time `t0`.
     ///
     /// # Errors
-    /// [`InputError`] where the state is not finite, `sigma_d <= 0`, the discrete Lagrangian is not regular there, or the
-    /// first step cannot be solved.
+    /// [`InputError`] where the state is not finite, `sigma_d <= 0`, the discrete Lagrangian is not regular there, or
+    /// the first step cannot be solved.
     pub fn new(ld: D, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
         Self::with_guess(ld, t0, state, SVector::zeros())
     }
 
-    /// Like [`new`](Self::new), with an initial guess of the velocity for the first step; needed where several velocities
-    /// have the same momentum.
+    /// Like [`new`](Self::new), with an initial guess of the velocity for the first step; needed where several
+    /// velocities have the same momentum.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -90,8 +90,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// A flow from two positions `q0, q1` and the action `z0`: the state at `t0` is `F-L_d (q0, q1, z0)`.
     ///
     /// # Errors
-    /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
-    /// point; [`InputError::EqualPoints`] where it is not regular because `q0 = q1`.
+    /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at
+    /// the point; [`InputError::EqualPoints`] where it is not regular because `q0 = q1`.
     pub fn from_points(ld: D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
         check_time(t0)?;
         let state = start_of(&ld, t0, &x)?;
@@ -162,8 +162,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         Ok(step)
     }
 
-    /// Records the defect of a step. The velocities of a motion at rest are round-off, so that only the conformal factor
-    /// counts there.
+    /// Records the defect of a step. The velocities of a motion at rest are round-off, so that only the conformal
+    /// factor counts there.
     #[cold]
     #[inline(never)]
     fn suspect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {

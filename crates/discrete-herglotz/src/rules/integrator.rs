@@ -8,8 +8,8 @@ use contact_geom::Lagrangian;
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
-/// A discretisation method: it constructs the discrete Lagrangian of a problem for a time step. [`CustomMethod`] makes one
-/// from a closure.
+/// A discretisation method: it constructs the discrete Lagrangian of a problem for a time step. [`CustomMethod`] makes
+/// one from a closure.
 pub trait DiscretizationMethod<'a, L, const N: usize> {
     /// The discrete Lagrangian.
     type DiscreteLagrangian: DiscreteLagrangian<N> + 'a;
@@ -32,8 +32,8 @@ pub trait DiscretizationMethod<'a, L, const N: usize> {
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError>;
 }
 
-/// Implements [`Integrator`] for a discretisation method. (A blanket implementation would overlap with implementations in
-/// other crates.)
+/// Implements [`Integrator`] for a discretisation method. (A blanket implementation would overlap with implementations
+/// in other crates.)
 macro_rules! integrates {
     (<$($parameter:ident: $bound:path),*> $rule:ty) => {
         impl<'a, L: Lagrangian<N> + 'a, $($parameter: $bound,)* const N: usize> Integrator<'a, L, N> for $rule
@@ -65,8 +65,8 @@ integrates!(<> Method);
 integrates!(<R: Rule> QuadratureMethod<R>);
 integrates!(<F: Sized> CustomMethod<F>);
 
-/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that uses it compiles only
-/// this rule.
+/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that uses it compiles
+/// only this rule.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadratureMethod<R>(PhantomData<R>);
 
@@ -109,8 +109,8 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
     }
 }
 
-/// A custom discrete Lagrangian as an integrator: a closure that constructs it for a time step, with a name and the order
-/// of its flow.
+/// A custom discrete Lagrangian as an integrator: a closure that constructs it for a time step, with a name and the
+/// order of its flow.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -131,7 +131,8 @@ pub struct CustomMethod<F> {
 }
 
 impl<F> CustomMethod<F> {
-    /// A method with a name, the order of its flow, and a closure that constructs the discrete Lagrangian for a time step.
+    /// A method with a name, the order of its flow, and a closure that constructs the discrete Lagrangian for a time
+    /// step.
     pub fn new(name: impl Into<Cow<'static, str>>, order: u32, make: F) -> Self {
         CustomMethod { name: name.into(), order, symmetric: false, make }
     }

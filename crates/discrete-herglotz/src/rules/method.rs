@@ -123,8 +123,8 @@ impl Method {
         self.known().symmetric
     }
 
-    /// Whether, for L that depends on z, the action at the end of a step is defined implicitly; otherwise it is an explicit
-    /// function of `(q0, q1, z0)`.
+    /// Whether, for L that depends on z, the action at the end of a step is defined implicitly; otherwise it is an
+    /// explicit function of `(q0, q1, z0)`.
     pub fn implicit_in_z(self) -> bool {
         self.known().implicit_in_z
     }
@@ -152,13 +152,13 @@ impl Method {
     /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`, which is
     /// negative for steps backward in time.
     ///
-    /// A method that requires a special form of the Lagrangian verifies it, and reads its constants, at the given time and
-    /// the position and action of the given state. Regularity is checked at the start of a run, as in
+    /// A method that requires a special form of the Lagrangian verifies it, and reads its constants, at the given time
+    /// and the position and action of the given state. Regularity is checked at the start of a run, as in
     /// [`Flow::new`](crate::rules::Flow::new).
     ///
     /// # Errors
-    /// [`InputError::Geometry`] where the time or the state is not finite, [`InputError::Step`] unless `h` is finite and
-    /// not 0, [`InputError::Dimension`] if `N = 0`, and those of [`Strang::new`].
+    /// [`InputError::Geometry`] where the time or the state is not finite, [`InputError::Step`] unless `h` is finite
+    /// and not 0, [`InputError::Dimension`] if `N = 0`, and those of [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,
         lagrangian: L,
@@ -181,8 +181,8 @@ impl Method {
 /// The discrete Lagrangian that a [`Method`] chosen at run time constructs from a Lagrangian.
 ///
 /// It is one type for all methods, so that code that is generic over discrete Lagrangians is compiled once for each
-/// Lagrangian instead of once for each method. [`Gauss`](crate::gauss::Gauss) is not included, because the derivatives of
-/// its value through the stages would be compiled into every program that uses this type.
+/// Lagrangian instead of once for each method. [`Gauss`](crate::gauss::Gauss) is not included, because the derivatives
+/// of its value through the stages would be compiled into every program that uses this type.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum AnyDiscreteLagrangian<L, const N: usize> {

@@ -1,7 +1,7 @@
 //! The nodes of quadrature rules.
 
-/// A node of a quadrature rule on `Q x Q x R^2`: L is taken at the time `t + a h`, the position `(1 - a) q0 + a q1`, the
-/// velocity `(q1 - q0)/h` and the action `(1 - b) z0 + b z1`.
+/// A node of a quadrature rule on `Q x Q x R^2`: L is taken at the time `t + a h`, the position `(1 - a) q0 + a q1`,
+/// the velocity `(q1 - q0)/h` and the action `(1 - b) z0 + b z1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
     /// The weight of the node; the weights sum to 1.

@@ -36,9 +36,9 @@ pub trait Rule: 'static {
 /// The discrete Lagrangian of a [`Rule`]: `L_d(q0, q1, z0) = z1 - z0`, where
 /// `z1 = z0 + S(q0, q1, z0, z1)` and `S = h sum_i w_i L(node i)`.
 ///
-/// `S` is a discrete Lagrangian on `Q x Q x R^2` in the sense of Vermeeren, Bravetti and Seri; solving for `z1` gives one
-/// on `Q x Q x R`. With the partial derivatives `S_1, S_2, S_z0, S_z1` of `S`,
-/// `sigma_d = (1 + S_z0)/(1 - S_z1)`, `p0 = -S_1/(1 + S_z0)` and `p1 = S_2/(1 - S_z1)`.
+/// `S` is a discrete Lagrangian on `Q x Q x R^2` in the sense of Vermeeren, Bravetti and Seri; solving for `z1` gives
+/// one on `Q x Q x R`. With the partial derivatives `S_1, S_2, S_z0, S_z1` of `S`, `sigma_d = (1 + S_z0)/(1 - S_z1)`,
+/// `p0 = -S_1/(1 + S_z0)` and `p1 = S_2/(1 - S_z1)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Quadrature<L, R> {
     lagrangian: L,
@@ -172,8 +172,8 @@ impl<L, R: Rule> Quadrature<L, R> {
     ///
     /// With left directions `l_i = (h (1-a) e_i, -e_i, h (1-b) p0_i)` at each node, the momentum equation is
     /// `r_i = p0_i + sum w dL[l_i] = 0`; its derivatives are `d2L[l_i, r_j]` along the right directions
-    /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested dual numbers carry only these
-    /// directions, in blocks.
+    /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested dual numbers carry only
+    /// these directions, in blocks.
     #[inline(always)]
     fn linearise<const N: usize, const ADJOINT: bool>(
         &self,
@@ -301,9 +301,9 @@ impl<L, R: Rule> Quadrature<L, R> {
     }
 }
 
-/// Bounds for the round-off of L in the residual of a step of length h and in its action, at a point in the middle of the
-/// step. Near an equilibrium the terms of the force cancel, and its round-off is that of these terms; the same holds for the
-/// potential.
+/// Bounds for the round-off of L in the residual of a step of length h and in its action, at a point in the middle of
+/// the step. Near an equilibrium the terms of the force cancel, and its round-off is that of these terms; the same
+/// holds for the potential.
 #[cold]
 #[inline(never)]
 fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
@@ -452,8 +452,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
     ) -> Result<DiscreteStep<N>, StepError> {
-        // Inlined, a step with one unknown stays in registers (58 against 81 ns for the pendulum). With more unknowns it
-        // spills, and a separate function is faster (162 against 209 ns for the double pendulum).
+        // Inlined, a step with one unknown stays in registers (58 against 81 ns for the pendulum). With more unknowns
+        // it spills, and a separate function is faster (162 against 209 ns for the double pendulum).
         if N == 1 {
             self.step::<N, false>(t, self.h, from, guess, solver)?.checked()
         } else {

@@ -30,7 +30,8 @@ pub(crate) struct Frame<'a, const N: usize> {
 }
 
 impl<const N: usize> Frame<'_, N> {
-    /// Adds the part of the sums with one block of left directions from `left` and one of right directions from `right`.
+    /// Adds the part of the sums with one block of left directions from `left` and one of right directions from
+    /// `right`.
     #[inline(always)]
     pub fn accumulate<U: Unknowns, const A: usize>(
         &self,

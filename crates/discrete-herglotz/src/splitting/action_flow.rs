@@ -42,8 +42,8 @@ pub trait ActionMap: Copy + std::fmt::Debug {
     /// `phi_s(z)`; NaN where the flow is not defined up to the time s.
     fn apply<T: Scalar>(&self, z: T) -> T;
 
-    /// The change `phi_s(z) - z`. An implementation should avoid the cancellation in this difference where the flow is slow,
-    /// because it affects the factor `phi_s'(z) - 1` of the momentum with the same sign in all steps.
+    /// The change `phi_s(z) - z`. An implementation should avoid the cancellation in this difference where the flow is
+    /// slow, because it affects the factor `phi_s'(z) - 1` of the momentum with the same sign in all steps.
     #[inline(always)]
     fn change<T: Scalar>(&self, z: T) -> T {
         self.apply(z) - z

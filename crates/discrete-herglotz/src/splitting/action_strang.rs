@@ -7,8 +7,8 @@ use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solv
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
-/// The substep `C B A B C` of [`ActionSplitting`](crate::splitting::ActionSplitting) as a discrete Lagrangian of order 2: with the flow
-/// `phi` of `f(z)` over half a step,
+/// The substep `C B A B C` of [`ActionSplitting`](crate::splitting::ActionSplitting) as a discrete Lagrangian of order
+/// 2: with the flow `phi` of `f(z)` over half a step,
 ///
 /// `z0 + L_d = phi(phi(z0) + (q1 - q0).M(q1 - q0)/(2h) - h/2 V(t, q0) - h/2 V(t + h, q1))`.
 ///
@@ -24,8 +24,8 @@ pub struct ActionStrang<L, F: ActionFlow, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
-    /// The splitting for a Lagrangian whose f is a polynomial of degree two, which is determined and verified at a time and
-    /// a state.
+    /// The splitting for a Lagrangian whose f is a polynomial of degree two, which is determined and verified at a time
+    /// and a state.
     ///
     /// # Errors
     /// Those of [`ActionSplitting::new`](crate::splitting::ActionSplitting::new) except [`InputError::FirstStep`].
@@ -53,8 +53,8 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
         Ok(ActionStrang { form, h, forth, back, rest: (state.z, flow.rate(state.z)) })
     }
 
-    /// One step of length h, of either sign, from the time `t`, with the map over `h/2`. Returns the final state, the mean
-    /// velocity and the conformal factor.
+    /// One step of length h, of either sign, from the time `t`, with the map over `h/2`. Returns the final state, the
+    /// mean velocity and the conformal factor.
     #[inline(always)]
     fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, map: &F::Map) -> (PhasePoint<N>, SVector<f64, N>, f64) {
         let (change, first) = with_slope(|z| map.change(z), from.z);

@@ -114,8 +114,8 @@ mod tests {
         }
     }
 
-    /// Steps evaluate a time-dependent rate without the gradient: once per node of each drift, and not for the empty drift at
-    /// the end of a step.
+    /// Steps evaluate a time-dependent rate without the gradient: once per node of each drift, and not for the empty
+    /// drift at the end of a step.
     #[test]
     fn a_rate_in_time_is_asked_for_alone() {
         let system = Counting::default();

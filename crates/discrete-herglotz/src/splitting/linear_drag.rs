@@ -13,18 +13,19 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + gamma(t) z`.
 ///
 /// For a constant gamma, the flow of the kinetic part with the drag over a time s is
-/// `q += (e^(gamma s) - 1)/gamma M^-1 p`, `p = e^(gamma s) p`; that of `-V` is the kick `p += s L_q`. Each flow is exact,
-/// including the action, and is a conformal contact map, with the factors `e^(gamma s)` and 1, so that every step has
-/// `sigma_d = e^(gamma h)`. The drag is combined with the kinetic part because this preserves the hypothesis of
-/// Runge-Kutta-Nyström schemes. Time advances with the drifts: a kick evaluates V at the time reached by the drifts before
-/// it.
+/// `q += (e^(gamma s) - 1)/gamma M^-1 p`, `p = e^(gamma s) p`; that of `-V` is the kick `p += s L_q`. Each flow is
+/// exact, including the action, and is a conformal contact map, with the factors `e^(gamma s)` and 1, so that every
+/// step has `sigma_d = e^(gamma h)`. The drag is combined with the kinetic part because this preserves the hypothesis
+/// of Runge-Kutta-Nyström schemes. Time advances with the drifts: a kick evaluates V at the time reached by the drifts
+/// before it.
 ///
-/// Where L does not claim that its rate is constant, the factor of a drift is `e^g` with the integral g of `L_z` over the
-/// drift. Both integrals are computed by a Gauss formula of order 12, and `sigma_d` is the product of these factors.
+/// Where L does not claim that its rate is constant, the factor of a drift is `e^g` with the integral g of `L_z` over
+/// the drift. Both integrals are computed by a Gauss formula of order 12, and `sigma_d` is the product of these
+/// factors.
 ///
-/// The steps are explicit, with [`stages`](SplittingScheme::stages) force evaluations each. The last kick (or drift) of a
-/// step and the first of the next are combined: the motion is stored before that kick, and the state is completed on a copy.
-/// The results therefore do not depend on what is observed nor on how many steps are taken at once.
+/// The steps are explicit, with [`stages`](SplittingScheme::stages) force evaluations each. The last kick (or drift) of
+/// a step and the first of the next are combined: the motion is stored before that kick, and the state is completed on
+/// a copy. The results therefore do not depend on what is observed nor on how many steps are taken at once.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
@@ -73,8 +74,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     /// A splitting from the state `(q, p, z)` at time `t0`, with the action.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
-    /// is not separable and affine in z; [`InputError::Geometry`] where the state is not finite or M singular;
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`]
+    /// where L is not separable and affine in z; [`InputError::Geometry`] where the state is not finite or M singular;
     /// [`InputError::FirstStep`] where V is not defined at the start.
     pub fn new(
         lagrangian: &'a L,
@@ -107,9 +108,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         Splitting { action: false, ..self }
     }
 
-    /// The same with compensated summation (Kahan): the round-off of each step is carried to the next, so that it does not
-    /// grow with the number of steps. It adds about 10% to the time for the pendulum, and pays off in long runs with errors
-    /// near round-off.
+    /// The same with compensated summation (Kahan): the round-off of each step is carried to the next, so that it does
+    /// not grow with the number of steps. It adds about 10% to the time for the pendulum, and pays off in long runs
+    /// with errors near round-off.
     pub fn compensated(self) -> Self {
         Splitting { compensated: true, ..self }
     }
@@ -129,8 +130,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
 }
 
 impl SubstepTable {
-    /// The stages of a scheme for steps of length h. For a time-dependent drag the drifts stored here are those from `t0`,
-    /// and each step computes its own.
+    /// The stages of a scheme for steps of length h. For a time-dependent drag the drifts stored here are those from
+    /// `t0`, and each step computes its own.
     pub(crate) fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
@@ -270,8 +271,8 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         Reached { motion: m, state: end.state(), seen }
     }
 
-    /// `sigma_d` of the step from the time t. It is computed on request, since for a time-dependent drag it costs as much as
-    /// the drifts.
+    /// `sigma_d` of the step from the time t. It is computed on request, since for a time-dependent drag it costs as
+    /// much as the drifts.
     fn sigma(&self, t: f64, h: f64) -> f64 {
         if let Drag::Constant(gamma) = self.drag {
             return (gamma * h).exp();
@@ -280,8 +281,8 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         stages.map(|stage| 1.0 + self.drift_of::<true>(t, stage).damping).product()
     }
 
-    /// The drift of a stage of the step from the time t. `TIMED` is a constant, because a branch on the drag in each stage
-    /// would cost a fifth of a Strang step.
+    /// The drift of a stage of the step from the time t. `TIMED` is a constant, because a branch on the drag in each
+    /// stage would cost a fifth of a Strang step.
     #[inline(always)]
     fn drift_of<const TIMED: bool>(&self, t: f64, stage: &Stage) -> Drift {
         if TIMED {

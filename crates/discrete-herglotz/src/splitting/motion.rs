@@ -76,8 +76,8 @@ impl<const N: usize> CompensatedState<N> {
         self.p.add::<COMPENSATED>(|i, _| s * force[i]);
     }
 
-    /// Checks the drift over the time s that starts with the given momentum and force and ends with the stored ones, by the
-    /// measures of a [`ResolutionMonitor`] for steps as long as the drift.
+    /// Checks the drift over the time s that starts with the given momentum and force and ends with the stored ones, by
+    /// the measures of a [`ResolutionMonitor`] for steps as long as the drift.
     #[inline(always)]
     pub(super) fn look<const DOUBTS: bool>(
         &mut self,
@@ -131,7 +131,8 @@ pub(super) struct SplittingRun<const N: usize> {
     /// The number of force evaluations per step.
     pub(super) forces: usize,
     pub(super) motion: CompensatedState<N>,
-    /// The state after the steps taken: the motion, completed by the part of the last step that is combined with the next.
+    /// The state after the steps taken: the motion, completed by the part of the last step that is combined with the
+    /// next.
     pub(super) state: PhasePoint<N>,
     pub(super) watch: ResolutionMonitor<N>,
 }
@@ -159,8 +160,8 @@ impl<const N: usize> SplittingRun<N> {
         DriftLooks { defect: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
     }
 
-    /// Takes steps in chunks. A chunk that ends with a non-finite value, or that contains the first unresolved step or a new
-    /// suspect interval, is repeated step by step in order to locate it.
+    /// Takes steps in chunks. A chunk that ends with a non-finite value, or that contains the first unresolved step or
+    /// a new suspect interval, is repeated step by step in order to locate it.
     pub(super) fn advance(
         &mut self,
         steps: usize,

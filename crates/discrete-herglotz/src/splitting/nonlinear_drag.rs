@@ -10,12 +10,13 @@ use crate::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + f(z)`, with three exact flows: the kinetic part `A`, the
-/// kick `B` of `-V`, and the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half
-/// its length; steps are compositions of it.
+/// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + f(z)`, with three exact flows: the kinetic part `A`,
+/// the kick `B` of `-V`, and the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A
+/// over half its length; steps are compositions of it.
 ///
-/// `sigma_d` is the product of the factors `phi'(z)` of C, exact for the step taken. The action is always computed, since it
-/// acts on the momentum. A substep has one force evaluation, and consecutive flows C of two substeps are combined.
+/// `sigma_d` is the product of the factors `phi'(z)` of C, exact for the step taken. The action is always computed,
+/// since it acts on the momentum. A substep has one force evaluation, and consecutive flows C of two substeps are
+/// combined.
 #[derive(Clone, Debug)]
 pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
     form: SeparableForm<&'a L, N>,
@@ -66,10 +67,10 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
     /// A splitting from the state `(q, p, z)` at time `t0`, with the given flow of f.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
-    /// is not separable; [`InputError::Hypothesis`] where `L_z` depends on time or is not `f'`, where the maps are not the
-    /// flow of f, and for a Runge-Kutta-Nyström scheme; [`InputError::Geometry`] where the state is not finite or M singular;
-    /// [`InputError::FirstStep`] where V is not defined at the start.
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`]
+    /// where L is not separable; [`InputError::Hypothesis`] where `L_z` depends on time or is not `f'`, where the maps
+    /// are not the flow of f, and for a Runge-Kutta-Nyström scheme; [`InputError::Geometry`] where the state is not
+    /// finite or M singular; [`InputError::FirstStep`] where V is not defined at the start.
     pub fn with_flow(
         lagrangian: &'a L,
         flow: &F,

@@ -24,8 +24,8 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
-    /// The same for a Lagrangian whose claims may already be verified (`check_claims`); the probes, which are skipped then,
-    /// cost as much as a hundred steps.
+    /// The same for a Lagrangian whose claims may already be verified (`check_claims`); the probes, which are skipped
+    /// then, cost as much as a hundred steps.
     pub(crate) fn read_of(
         lagrangian: L,
         h: f64,
@@ -68,7 +68,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if structure.autonomous || structure.has_constant_rate() {
             return Ok(());
         }
-        // Structure that is proved is complete: a drag that does not depend on time would be claimed.
+        // For a proved structure the claims alone decide.
         if const { L::HINTS.proved } {
             return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
         }
@@ -110,8 +110,9 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if finite { Ok((value, force)) } else { Err(InputError::FirstStep(StepError::NonFinite)) }
     }
 
-    /// Whether steps of this length from a state with this force change a position or a momentum by less than half of its
-    /// digits. Such changes vary so little from step to step that their round-off has the same sign and accumulates.
+    /// Whether steps of this length from a state with this force change a position or a momentum by less than half of
+    /// its digits. Such changes vary so little from step to step that their round-off has the same sign and
+    /// accumulates.
     pub(crate) fn has_tiny_steps(&self, h: f64, state: &PhasePoint<N>, force: &SVector<f64, N>) -> bool {
         let (v, a) = (self.velocity(&state.p), self.velocity(force));
         let is_tiny = |change: f64, number: f64| change < f64::EPSILON.sqrt() * number.abs();
@@ -196,8 +197,8 @@ mod tests {
         }
     }
 
-    /// A very small force accumulates correctly: from rest, next to a coordinate with large motion, and for a momentum with
-    /// small kicks; in single runs and in lanes.
+    /// A very small force accumulates correctly: from rest, next to a coordinate with large motion, and for a momentum
+    /// with small kicks; in single runs and in lanes.
     #[test]
     fn a_force_of_next_to_nothing_adds_up() {
         let (h, count) = (1e-3, 2000_u32);

@@ -12,10 +12,10 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 ///
 /// `L_d = e^(gamma h) ((q1 - q0).M(q1 - q0)/(2d) - h/2 V(t, q0)) - h/2 V(t + h, q1) + (e^(gamma h) - 1) z0`.
 ///
-/// Where gamma depends on time, `gamma h` stands for its integral over the step, and d for the integral of the exponential
-/// of that integral from the start. Hence `sigma_d = e^(gamma h)` at every point. The step is explicit, because the drift
-/// alone connects the positions, which determines the momentum between the kicks. The method is symmetric, and is the
-/// second-order member of [`SplittingScheme`](crate::SplittingScheme), whose stepper is
+/// Where gamma depends on time, `gamma h` stands for its integral over the step, and d for the integral of the
+/// exponential of that integral from the start. Hence `sigma_d = e^(gamma h)` at every point. The step is explicit,
+/// because the drift alone connects the positions, which determines the momentum between the kicks. The method is
+/// symmetric, and is the second-order member of [`SplittingScheme`](crate::SplittingScheme), whose stepper is
 /// [`Splitting`](crate::splitting::Splitting).
 ///
 /// ```
@@ -73,8 +73,8 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         q += v * drift.length;
         let (value, force) = self.form.kick(t + h, &q, 0.0);
         z += 0.5 * h * value;
-        // Both changes are added in one sum: rounded separately, a small drag would have round-off of the same sign in all
-        // steps.
+        // Both changes are added in one sum: rounded separately, a small drag would have round-off of the same sign in
+        // all steps.
         p += p * drift.damping + force * (0.5 * h);
         let velocity = v * (drift.length / h);
         let sigma = if forward { 1.0 + drift.damping } else { 1.0 / (1.0 + drift.damping) };

@@ -71,9 +71,9 @@ fn by_midpoint<const N: usize>(l: &impl Lagrangian<N>, start: PhasePoint<N>) -> 
     Ok(run(Composition::new(|h| Midpoint::new(l, h), &scheme, DURATION / steps as f64, 0.0, start)?, steps))
 }
 
-/// Asserts that the observed order of each scheme agrees with its order to 0.15: the slope of the error over the last four
-/// of a sequence of finer resolutions above round-off. The reference is a run with small steps, which agrees with another
-/// method.
+/// Asserts that the observed order of each scheme agrees with its order to 0.15: the slope of the error over the last
+/// four of a sequence of finer resolutions above round-off. The reference is a run with small steps, which agrees with
+/// another method.
 fn assert_orders<const N: usize, S: Stepper<N>>(
     name: &str,
     schemes: impl Iterator<Item = &'static SplittingScheme>,
@@ -163,8 +163,8 @@ fn steps_are_what_they_say() -> Outcome {
     Ok(())
 }
 
-/// The state after 700 steps (three chunks of a run) and `sigma_d` are bitwise the same whether the steps are taken at once,
-/// one by one or in unequal parts, with the states read in between.
+/// The state after 700 steps (three chunks of a run) and `sigma_d` are bitwise the same whether the steps are taken at
+/// once, one by one or in unequal parts, with the states read in between.
 fn assert_same_bits<const N: usize, S: Stepper<N>>(
     name: &str,
     start: impl Fn() -> Result<S, InputError>,
@@ -220,8 +220,8 @@ fn what_is_observed_changes_no_bit() -> Outcome {
     Ok(())
 }
 
-/// The conformal factor of a time-dependent drag is the exponential of its integral over each step; for the rate `-2/t` of
-/// Lane and Emden it is `(t/(t + h))^2`. The relative error of the quadrature is of the order of `(h/t)^13`.
+/// The conformal factor of a time-dependent drag is the exponential of its integral over each step; for the rate `-2/t`
+/// of Lane and Emden it is `(t/(t + h))^2`. The relative error of the quadrature is of the order of `(h/t)^13`.
 #[test]
 fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
     let (system, h, t0) = (LaneEmden::default(), 0.05, 1.0);
@@ -245,7 +245,8 @@ fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
     Ok(())
 }
 
-/// `sigma_d` of a nonlinear drag is the product of the factors of its steps, here the ratio of the momenta of a free motion.
+/// `sigma_d` of a nonlinear drag is the product of the factors of its steps, here the ratio of the momenta of a free
+/// motion.
 #[test]
 fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
     // Without forces the momentum changes only by the conformal factor.
@@ -271,8 +272,8 @@ fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
     Ok(())
 }
 
-/// In a uniform field without drag a step is exact up to round-off; with compensated summation so are a hundred thousand
-/// steps.
+/// In a uniform field without drag a step is exact up to round-off; with compensated summation so are a hundred
+/// thousand steps.
 #[test]
 fn compensated_sums_keep_the_floor() -> Outcome {
     #[derive(Clone)]
@@ -308,8 +309,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByValue
     }
 }
 
-/// The explicit steps of a discrete Lagrangian, forward and backward, agree with those derived from its value, and so does
-/// `sigma_d`.
+/// The explicit steps of a discrete Lagrangian, forward and backward, agree with those derived from its value, and so
+/// does `sigma_d`.
 fn assert_step_is_of_value<const N: usize>(ld: &impl DiscreteLagrangian<N>, start: PhasePoint<N>) -> Outcome {
     let (mut solver, t) = (Solver::default(), 0.7);
     let bad = InputError::FirstStep;

@@ -9,15 +9,15 @@ use contact_geom::{
     support::linear,
 };
 
-/// The distance from the surface at which L is evaluated on one side, relative to the position and to its change in a step:
-/// far larger than the round-off of a position, and small enough that continuous functions change little over it.
+/// The distance from the surface at which L is evaluated on one side, relative to the position and to its change in a
+/// step: far larger than the round-off of a position, and small enough that continuous functions change little over it.
 const BESIDE: f64 = 1e-9;
 
 /// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms.
 const ROUNDINGS: f64 = 256.0;
 
-/// The step, relative to the coordinates, of the differences for the normal of a surface. With differences of order six the
-/// error is the round-off of the function divided by this, 1e-13.
+/// The step, relative to the coordinates, of the differences for the normal of a surface. With differences of order six
+/// the error is the round-off of the function divided by this, 1e-13.
 const DIFFERENCE: f64 = 1e-3;
 
 /// The limit of Newton iterations for one number or one velocity.
@@ -34,8 +34,8 @@ pub(super) enum Corner<const N: usize> {
     Reflected(SVector<f64, N>),
 }
 
-/// The one-sided limit of L at a surface, extrapolated from three points on that side with an error of third order in their
-/// distance.
+/// The one-sided limit of L at a surface, extrapolated from three points on that side with an error of third order in
+/// their distance.
 struct OneSided<'a, L, const N: usize> {
     lagrangian: &'a L,
     t: f64,
@@ -93,7 +93,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
     }
 }
 
-/// The derivative of a switching function along a direction in time, position and velocity, by central differences of order six.
+/// The derivative of a switching function along a direction in time, position and velocity, by central differences of
+/// order six.
 fn slope<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     surfaces: &mut Surfaces,
@@ -109,12 +110,12 @@ fn slope<const N: usize>(
     (45.0 * differences[0] - 9.0 * differences[1] + differences[2]) / (60.0 * distance)
 }
 
-/// Solves the corner conditions at a zero of a switching function, for a motion that arrives from its current side; `reach`
-/// is a bound for the change of position in a step.
+/// Solves the corner conditions at a zero of a switching function, for a motion that arrives from its current side;
+/// `reach` is a bound for the change of position in a step.
 ///
 /// # Errors
-/// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion can
-/// neither cross the surface nor be reflected; those of the inverse Legendre transformation on either side.
+/// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion
+/// can neither cross the surface nor be reflected; those of the inverse Legendre transformation on either side.
 pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     surfaces: &mut Surfaces,
@@ -143,8 +144,8 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
         OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
     };
     if size == 0.0 {
-        // The surface does not depend on the position. If it depends on time alone, z and the momentum are continuous; if it
-        // depends on the velocity or z, both sides are compared along these.
+        // The surface does not depend on the position. If it depends on time alone, z and the momentum are continuous;
+        // if it depends on the velocity or z, both sides are compared along these.
         let depends = along_v != 0.0 || along_z != 0.0;
         return if depends && jumps_along(lagrangian, at, index, surfaces) {
             Err(StepError::JumpAlong { t: at.t })

@@ -7,10 +7,10 @@ use contact_geom::Lagrangian;
 
 /// Contact Gauss collocation with adaptive subdivision of its steps.
 ///
-/// A step is divided into parts where the defect of its curve in Herglotz' equations, between the nodes, exceeds a bound: a
-/// part is halved until its defect is within the bound, and the next part may be twice as long. Each part is conformally
-/// contact, and so is the step. Such steps attain an accuracy where a part of the motion, such as a close encounter, requires
-/// much shorter steps than the rest.
+/// A step is divided into parts where the defect of its curve in Herglotz' equations, between the nodes, exceeds a
+/// bound: a part is halved until its defect is within the bound, and the next part may be twice as long. Each part is
+/// conformally contact, and so is the step. Such steps attain an accuracy where a part of the motion, such as a close
+/// encounter, requires much shorter steps than the rest.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Kepler};

@@ -1,10 +1,10 @@
 //! Steps that end on the kinks and jumps of a Lagrangian, where one of its [switching
 //! functions](contact_geom::Lagrangian::switching_functions) changes its sign along the motion.
 //!
-//! Between two zeros L is smooth, so that each part of a step has the order of its integrator and is conformally contact. At
-//! a zero the position and z are continuous. Where L is continuous, so is the momentum. Where L jumps across a surface
-//! `g(t, q) = 0`, the corner conditions of Weierstrass and Erdmann hold, for Herglotz' principle as for Hamilton's:
-//! `p+ - p- = lambda g_q`, `E+ - E- = -lambda g_t`.
+//! Between two zeros L is smooth, so that each part of a step has the order of its integrator and is conformally
+//! contact. At a zero the position and z are continuous. Where L is continuous, so is the momentum. Where L jumps
+//! across a surface `g(t, q) = 0`, the corner conditions of Weierstrass and Erdmann hold, for Herglotz' principle as
+//! for Hamilton's: `p+ - p- = lambda g_q`, `E+ - E- = -lambda g_t`.
 
 mod corner;
 mod divided;

@@ -26,7 +26,7 @@ const MOST_PARTS: usize = 4096;
 /// The limit of sign changes at one point: a motion that is pushed to a surface from both sides has infinitely many.
 const MOST_AT_A_PLACE: usize = 16;
 
-/// The Newton iterations for a zero before bisection.
+/// The Newton iterations for a zero before it is bracketed.
 const NEWTON: usize = 8;
 
 /// A type that is, or holds, a stepper.
@@ -34,7 +34,8 @@ pub(crate) trait AsStepper<const N: usize> {
     fn stepper(&self) -> &(dyn Stepper<N> + '_);
     fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
 
-    /// The compensation terms of its sums, beyond the last digits of the state. [`add_rests`](Self::add_rests) restores them.
+    /// The compensation terms of its sums, beyond the last digits of the state. [`add_rests`](Self::add_rests) restores
+    /// them.
     fn rests(&self) -> StepStart<N> {
         StepStart::ZERO
     }
@@ -98,8 +99,9 @@ const HIGHEST: u32 = 2 * Gauss::<()>::STAGES as u32;
 
 /// The stepper of an integrator with steps that end on kinks and jumps.
 ///
-/// An integrator that evaluates L at the ends of its steps, or beyond, would mix both sides of a surface there. The parts of
-/// its steps, and its steps near a surface, are therefore taken by contact Gauss collocation of the same order.
+/// An integrator that evaluates L at the ends of its steps, or beyond, would mix both sides of a surface there. The
+/// parts of its steps, and its steps near a surface, are therefore taken by contact Gauss collocation of the same
+/// order.
 pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
     problem: &Problem<'a, L, N>,
@@ -120,8 +122,8 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     Ok(Box::new(SwitchingStepper::new(problem, h, reach, make)?))
 }
 
-/// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of parts
-/// that end on the zeros.
+/// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of
+/// parts that end on the zeros.
 ///
 /// `make` constructs a stepper for a problem and a step length; its last argument is whether the steps are such parts.
 pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
@@ -131,7 +133,8 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     h: f64,
     /// The number of steps taken.
     k: usize,
-    /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it (`before`).
+    /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it
+    /// (`before`).
     base: S,
     origin: TimedState<N>,
     before: usize,
@@ -260,7 +263,8 @@ where
                 return Ok(());
             }
         }
-        // Unresolved steps before this one are kept; a flag of this step is dropped, since it may be due to the surface.
+        // Unresolved steps before this one are kept; a flag of this step is dropped, since it may be due to the
+        // surface.
         let earlier = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
         self.unresolved = first(self.unresolved, earlier.filter(|s| s.step < self.k));
         self.spent += self.base.stepper().evaluations();

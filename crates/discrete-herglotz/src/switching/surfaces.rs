@@ -48,7 +48,8 @@ impl<const N: usize> TimedState<N> {
     }
 }
 
-/// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their velocities.
+/// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their
+/// velocities.
 pub(super) struct StepCurve<const N: usize> {
     pub from: TimedState<N>,
     pub to: TimedState<N>,
@@ -80,8 +81,8 @@ impl<const N: usize> StepCurve<N> {
     }
 }
 
-/// A sign change on the curve of a step: the index of the function, the fractions of the step between which it lies, and the
-/// approximate fraction `about`.
+/// A sign change on the curve of a step: the index of the function, the fractions of the step between which it lies,
+/// and the approximate fraction `about`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SignChange {
     pub index: usize,
@@ -130,8 +131,8 @@ impl Surfaces {
         }
     }
 
-    /// Whether a surface lies within the fraction `beside` of a step before its start or after its end, where the curve is
-    /// extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
+    /// Whether a surface lies within the fraction `beside` of a step before its start or after its end, where the curve
+    /// is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -148,7 +149,8 @@ impl Surfaces {
         })
     }
 
-    /// The first sign change along the curve of a step. A function without a side takes the sign of its first nonzero value.
+    /// The first sign change along the curve of a step. A function without a side takes the sign of its first nonzero
+    /// value.
     pub fn first_change<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,

@@ -36,8 +36,8 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// The defect of a step, in units of the largest defect of a step that resolves the motion; `None` where it is at
     /// most one, and where it is unknown, as by default: a discrete Lagrangian may be exact for long steps.
     ///
-    /// `velocities` are the mean velocities of the last four steps, the latest last; `to` and `sigma` are the final state
-    /// and the conformal factor of the latest step.
+    /// `velocities` are the mean velocities of the last four steps, the latest last; `to` and `sigma` are the final
+    /// state and the conformal factor of the latest step.
     #[inline(always)]
     fn defect(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
         None

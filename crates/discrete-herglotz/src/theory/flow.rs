@@ -58,8 +58,8 @@ pub enum HamiltonianFlow {
     ThroughMinus,
 }
 
-/// `Phi~_d`, from `(q0, p0, z0)` at time `t` to `(q1, p1, z1)` at `t + h`, by one of its expressions; paper, section 3.1.
-/// `guess` is an initial guess of the mean velocity.
+/// `Phi~_d`, from `(q0, p0, z0)` at time `t` to `(q1, p1, z1)` at `t + h`, by one of its expressions; paper, section
+/// 3.1. `guess` is an initial guess of the mean velocity.
 ///
 /// # Errors
 /// Those of a step.

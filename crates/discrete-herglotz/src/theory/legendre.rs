@@ -46,7 +46,8 @@ pub fn legendre_plus<const N: usize>(
     Ok(PhasePoint { q: x.q1, p: jet.d2, z: x.z0 + jet.value })
 }
 
-/// The inverse of F-L_d, by Newton's method from a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the state.
+/// The inverse of F-L_d, by Newton's method from a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the
+/// state.
 ///
 /// # Errors
 /// Those of a step; [`StepError::Singular`] where F-L_d is not a local diffeomorphism.
@@ -75,8 +76,8 @@ pub fn legendre_plus_inverse<const N: usize>(
     Ok(DiscretePoint { q0: step.end.q, q1: state.q, z0: step.end.z })
 }
 
-/// The regularity of a discrete Lagrangian at a point: it is regular where `sigma_d` does not vanish and F-L_d is a local
-/// diffeomorphism; paper, section 3.1.
+/// The regularity of a discrete Lagrangian at a point: it is regular where `sigma_d` does not vanish and F-L_d is a
+/// local diffeomorphism; paper, section 3.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiscreteRegularity {
     /// `sigma_d`.

@@ -11,15 +11,15 @@ use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::
 /// After this number of corrections that do not decrease, the remaining ones are taken for round-off.
 const STALLED: u32 = 8;
 
-/// The inverse Legendre transformation `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method from a
-/// guess of the velocity; the inverse of [`legendre`](contact_geom::legendre).
+/// The inverse Legendre transformation `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method
+/// from a guess of the velocity; the inverse of [`legendre`](contact_geom::legendre).
 ///
 /// The guess selects a solution where several velocities have the same momentum; where the velocity is unique, 0 is a
 /// suitable guess.
 ///
 /// # Errors
-/// [`StepError::Singular`] where `W = L_vv` is singular, [`StepError::NonFinite`] where L is not defined at the guess or at
-/// an iterate, [`StepError::NotConverged`].
+/// [`StepError::Singular`] where `W = L_vv` is singular, [`StepError::NonFinite`] where L is not defined at the guess
+/// or at an iterate, [`StepError::NotConverged`].
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Relativistic};
@@ -41,7 +41,8 @@ pub fn legendre_inverse<const N: usize>(
     for _ in 0..ITERATION_LIMIT {
         let mut change = momenta - state.p;
         let mut w = mass_matrix(lagrangian, t, &x);
-        // The residual is compared with the round-off of its terms: an ill-conditioned W determines the velocity no better.
+        // The residual is compared with the round-off of its terms: an ill-conditioned W determines the velocity no
+        // better.
         let of = |i: usize| (0..N).map(|j| (w[(i, j)] * x.v[j]).abs()).sum::<f64>() + state.p[i].abs();
         let terms: SVector<f64, N> = SVector::from_fn(|i, _| of(i));
         let held = change.iter().zip(&terms).all(|(off, term)| off.abs() <= 2.0 * N as f64 * f64::EPSILON * term);
@@ -58,8 +59,8 @@ pub fn legendre_inverse<const N: usize>(
         let round_off = f64::EPSILON * scale;
         let stalls = size >= 0.5 * before;
         stalled += u32::from(stalls);
-        // Where the terms of the gradient cancel, its size does not show its round-off: a stalled iteration is accepted at
-        // half of the digits.
+        // Where the terms of the gradient cancel, its size does not show its round-off: a stalled iteration is accepted
+        // at half of the digits.
         let left = stalled >= STALLED && size <= f64::EPSILON.sqrt() * scale;
         if last_correction(size, before, round_off) || (stalls && (held || size <= 64.0 * round_off || left)) {
             return Ok(x);
@@ -84,8 +85,9 @@ mod tests {
     use super::*;
     use contact_geom::{legendre, systems::Relativistic};
 
-    /// Starting from rest, where the first correction may exceed the speed of light. The tolerance allows for the round-off
-    /// of the velocity, which W carries into the momentum, and for that of the gradient, a difference of terms of size one.
+    /// Starting from rest, where the first correction may exceed the speed of light. The tolerance allows for the
+    /// round-off of the velocity, which W carries into the momentum, and for that of the gradient, a difference of
+    /// terms of size one.
     #[test]
     fn from_rest_to_any_momentum() {
         let system = Relativistic::default();

@@ -18,8 +18,8 @@ pub fn discrete_momentum<const N: usize>(
     Ok(group.momentum(&x.q0, &(-jet.d1 / jet.sigma())))
 }
 
-/// The defect of infinitesimal invariance of a discrete Lagrangian, `|D1 L_d xi(q0) + D2 L_d xi(q1)|`, relative to the sum
-/// of the absolute values of its terms; paper, section 3.2.
+/// The defect of infinitesimal invariance of a discrete Lagrangian, `|D1 L_d xi(q0) + D2 L_d xi(q1)|`, relative to the
+/// sum of the absolute values of its terms; paper, section 3.2.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.

@@ -1,5 +1,5 @@
-//! Section 3 of the paper as residuals: each statement is evaluated for a discrete Lagrangian at a point, relative to the
-//! size of its terms.
+//! Section 3 of the paper as residuals: each statement is evaluated for a discrete Lagrangian at a point, relative to
+//! the size of its terms.
 //!
 //! The residual of a true statement is round-off times the condition numbers of the matrices involved. The tolerances
 //! belong to the tests that call this module.
@@ -46,8 +46,8 @@ pub const STATEMENTS: [Statement; 16] = [
 /// The residual of a statement of section 3 for a discrete Lagrangian at a time and a point of Q x Q x R.
 ///
 /// `None` where the hypotheses of the statement do not apply (a statement on symmetries without a symmetry), and for a
-/// statement that is not one of [`STATEMENTS`]. [`Statement::Volume`] and [`Statement::ReebField`] are those of section 2
-/// on Q x Q x R.
+/// statement that is not one of [`STATEMENTS`]. [`Statement::Volume`] and [`Statement::ReebField`] are those of section
+/// 2 on Q x Q x R.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian and of its forms at a point where it is not regular.
@@ -147,8 +147,8 @@ fn form_residual<const N: usize>(
     Ok(relative(closed.eta(x)?, eta).max_or_nan((closed.d_eta(x)? - &d_eta).max_abs_or_nan() / d_eta.max_abs_or_nan()))
 }
 
-/// Statement 1 on Q x Q x R: the volume forms of eta+ and eta- do not vanish, and their closed form agrees with the generic
-/// one.
+/// Statement 1 on Q x Q x R: the volume forms of eta+ and eta- do not vanish, and their closed form agrees with the
+/// generic one.
 fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
     let point = (*x).into();
     let of = |closed: f64, generic: f64| {
@@ -159,8 +159,8 @@ fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscreteP
         .max_or_nan(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
 }
 
-/// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, in closed form against the generic computation
-/// and by definition.
+/// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, in closed form against the generic
+/// computation and by definition.
 fn reeb<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
     fn of<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         let (eta, reeb) = (form.eta(x)?, form.reeb(x)?);
@@ -252,9 +252,9 @@ fn two_steps<const N: usize>(
 
 /// Statement 15: a path is critical for A_d with fixed ends if and only if it solves the discrete Herglotz equations.
 ///
-/// Both directions are checked. Along the discrete flow the interior part of dA_d, differentiated independently, vanishes;
-/// on a path that is not a solution it is the residual of the equations times the product of the later sigma_d, none of
-/// which vanishes.
+/// Both directions are checked. Along the discrete flow the interior part of dA_d, differentiated independently,
+/// vanishes; on a path that is not a solution it is the residual of the equations times the product of the later
+/// sigma_d, none of which vanishes.
 fn principle<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -334,7 +334,8 @@ fn momentum_matching<const N: usize>(
     Ok(if distinguishes { matching.max_or_nan(equations) } else { f64::INFINITY })
 }
 
-/// Statement 19: the flow exists where F-L_d is a local diffeomorphism; the inverses of F-L_d and F+L_d return the point.
+/// Statement 19: the flow exists where F-L_d is a local diffeomorphism; the inverses of F-L_d and F+L_d return the
+/// point.
 fn flow_exists<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -367,8 +368,8 @@ fn three_expressions<const N: usize>(
         .max_or_nan(distance(step.end)))
 }
 
-/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form. Their jets and the linearised transforms
-/// agree with automatic differentiation of the value.
+/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form. Their jets and the linearised
+/// transforms agree with automatic differentiation of the value.
 fn contact_forms<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -501,7 +502,8 @@ fn momentum_is_dissipated<const N: usize>(
     let h = ld.step_size();
     let image = discrete_flow(ld, t, x)?;
     let (before, after) = (discrete_momentum(ld, group, t, x)?, discrete_momentum(ld, group, t + h, &image)?);
-    // p1 is computed from rounded positions: its error is W/h times their round-off, and J_d multiplies it by the generator.
+    // p1 is computed from rounded positions: its error is W/h times their round-off, and J_d multiplies it by the
+    // generator.
     let xi = group.generator(&image.q0).max_abs_or_nan();
     let size =
         before.abs().max_or_nan(xi * ld.second_jet(t + h, &image)?.d12.max_abs_or_nan() * image.q1.max_abs_or_nan());
