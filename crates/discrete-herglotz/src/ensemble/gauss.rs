@@ -119,8 +119,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// Takes all steps of some motions in place, and records a state after every `rows` steps. The final state is not
     /// finite if the equations of a step could not be solved, or if the motion is not finite.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
-        let stride = wants.rows.unwrap_or(self.steps);
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
+        let stride = options.rows.unwrap_or(self.steps);
         if action {
             instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
         } else {
@@ -179,7 +179,7 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     judge: Judge<S, K>,
     /// The largest velocity of the last steps, and 1 in lanes with a suspect step.
     fast: SimdBatch<S, K>,
-    doubt: SimdBatch<S, K>,
+    suspect: SimdBatch<S, K>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
@@ -208,7 +208,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
                     for (own, m) in some.chunks_mut(width).zip(&moving) {
                         for (i, lane) in own.iter_mut().enumerate() {
                             lane.reach(self.t0 + taken as f64 * self.h, self.state(m, i));
-                            lane.doubtful = m.doubt.lanes()[i] != 0.0;
+                            lane.suspect = m.suspect.lanes()[i] != 0.0;
                         }
                     }
                 }
@@ -240,7 +240,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             size: zero,
             judge: Judge::new(),
             fast: zero,
-            doubt: zero,
+            suspect: zero,
         }
     }
 
@@ -360,8 +360,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
                     size = size.max(a[d].abs());
                 }
             }
-            let moves = (tail * (h * h)).at_most(wide * MOVED, m.doubt, one);
-            m.doubt = tail.at_most(size * TAIL, m.doubt, moves);
+            let moves = (tail * (h * h)).at_most(wide * MOVED, m.suspect, one);
+            m.suspect = tail.at_most(size * TAIL, m.suspect, moves);
             return;
         }
         let (mut turn, mut fast) = (zero, m.fast * KEPT);
@@ -372,8 +372,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             }
         }
         m.fast = fast;
-        let moves = (turn * (h * h)).at_most(wide * ROUNDED, m.doubt, one);
-        m.doubt = (turn * h).at_most(fast * TURN, m.doubt, moves);
+        let moves = (turn * (h * h)).at_most(wide * ROUNDED, m.suspect, one);
+        m.suspect = (turn * h).at_most(fast * TURN, m.suspect, moves);
     }
 
     /// The terms that all iterations of a step have in common; with `tails` including those of the low parts of the

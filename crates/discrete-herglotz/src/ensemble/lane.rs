@@ -20,7 +20,7 @@ pub(crate) struct Lane<const N: usize> {
     /// The rows, if they are recorded.
     pub rows: Option<Vec<Row<N>>>,
     /// Whether a step may not have resolved the motion.
-    pub doubtful: bool,
+    pub suspect: bool,
     /// Whether the rows include the action.
     action: bool,
 }
@@ -33,7 +33,7 @@ impl<const N: usize> Lane<N> {
             rows.push(row(t0, state, action));
             rows
         });
-        Lane { state, rows, doubtful: false, action }
+        Lane { state, rows, suspect: false, action }
     }
 
     /// Updates the state, and records a row if rows are recorded.

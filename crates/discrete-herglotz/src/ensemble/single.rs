@@ -28,13 +28,13 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         &self,
         problem: &Problem<'p, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let Problem { t0, start, state, structure, .. } = *problem;
         self.integrator.stepper(
             &Problem { lagrangian: self.lagrangian, t0, start, state, structure, interrupt: None },
             h,
-            wants,
+            options,
         )
     }
 

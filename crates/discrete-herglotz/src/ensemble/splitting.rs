@@ -85,9 +85,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Takes all steps of some motions in place, and records a state after every `rows` steps. If a motion is not
     /// finite at its start or at its end, its final state is not finite.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
-        let stride = wants.rows.unwrap_or(self.steps);
-        match (action, wants.watched) {
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
+        let stride = options.rows.unwrap_or(self.steps);
+        match (action, options.watched) {
             (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
             (true, false) => instructions.dispatch(All::<_, N, true, false> { packs: self, lanes, stride }),
             (false, true) => instructions.dispatch(All::<_, N, false, true> { packs: self, lanes, stride }),
@@ -138,7 +138,7 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     value: SimdBatch<S, K>,
     /// The square of the largest momentum of the last steps, and 1 in lanes with a suspect step.
     fast: SimdBatch<S, K>,
-    doubt: SimdBatch<S, K>,
+    suspect: SimdBatch<S, K>,
 }
 
 impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
@@ -155,7 +155,7 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
     #[inline(always)]
     fn zero() -> Self {
         let (zero, still) = (SimdBatch::splat(0.0), SVector::from_fn(|_, _| SimdBatch::splat(0.0)));
-        Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, doubt: zero }
+        Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
     }
 
     /// The state in a lane.
@@ -187,7 +187,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             let whole = self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
                 for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.reach(t, at.state(i));
-                    lane.doubtful = at.doubt.lanes()[i] != 0.0;
+                    lane.suspect = at.suspect.lanes()[i] != 0.0;
                 }
             });
             if !whole {
@@ -262,8 +262,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         }
         m.fast = fast.max(m.fast * KEPT);
         // A change that moves the position by less than its round-off does not count.
-        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.doubt, SimdBatch::splat(1.0));
-        m.doubt = turn.at_most(m.fast * self.look.turn, m.doubt, moves);
+        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.suspect, SimdBatch::splat(1.0));
+        m.suspect = turn.at_most(m.fast * self.look.turn, m.suspect, moves);
     }
 
     #[inline(always)]

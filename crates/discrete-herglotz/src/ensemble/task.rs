@@ -36,11 +36,11 @@ impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
         }
     }
 
-    pub(crate) fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
+    pub(crate) fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
         match self {
             Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, wants),
-            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, wants),
+            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, options),
+            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, options),
         }
     }
 }
@@ -185,28 +185,28 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut lanes: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, most_rows, action)).collect();
         let mut done = [false; SHARD];
         let mut batch_kernel = 0;
-        let wants = LaneOptions { rows, watched: self.watched };
+        let options = LaneOptions { rows, watched: self.watched };
         forget_branches();
         if let Some(wanted) = length.wanted() {
             let mut ends: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, None, false)).collect();
             finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, watched: false });
-            kernel.run(self.instructions, &mut lanes, action, wants);
+            kernel.run(self.instructions, &mut lanes, action, options);
             refuse_beyond(wanted, &mut lanes, &ends);
         } else {
-            kernel.run(self.instructions, &mut lanes, action, wants);
+            kernel.run(self.instructions, &mut lanes, action, options);
         }
         if !branched() {
             let order = self.integrator.info().order;
             let structure = lagrangian.structure();
             let dissipates = structure.autonomous && structure.has_constant_rate() && (structure.z_free || action);
-            for ((place, from), Lane { state, rows, doubtful, .. }) in places.into_iter().zip(&states).zip(lanes) {
+            for ((place, from), Lane { state, rows, suspect, .. }) in places.into_iter().zip(&states).zip(lanes) {
                 if ChartVector::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
                     let watched = self.watched && dissipates;
-                    let doubtful = doubtful || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
+                    let suspect = suspect || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
                     let member = &mut members[place];
                     let mut unresolved = None;
-                    if doubtful && self.watched {
+                    if suspect && self.watched {
                         let own = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
                         match own.ending {
                             Ok(ending) if ending.status == Status::Completed => unresolved = ending.unresolved,

@@ -60,7 +60,7 @@ impl GaussCollocation {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         check_step(self.stages, h)?;
         let run = GaussStepper::new(lagrangian, (self.stages, h), Some(structure), t0, state, start.v, action)?;
-        Ok(if watched { run.doubting() } else { run })
+        Ok(if watched { run.with_suspects() } else { run })
     }
 }
 
@@ -98,9 +98,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(self.run(problem, h, wants)?))
+        Ok(Box::new(self.run(problem, h, options)?))
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {

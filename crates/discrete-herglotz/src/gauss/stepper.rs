@@ -158,7 +158,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     }
 
     /// Records [`SuspectInterval`]s for any number of stages.
-    pub(crate) fn doubting(mut self) -> Self {
+    pub(crate) fn with_suspects(mut self) -> Self {
         if self.sequence.is_none() {
             self.sequence = Some(Sequence::new(self.values()));
         }
@@ -423,7 +423,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.doubt.take()
+        self.watch.suspect.take()
     }
 }
 

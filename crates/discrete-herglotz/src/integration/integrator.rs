@@ -86,7 +86,7 @@ pub trait Integrator<'a, L, const N: usize> {
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 
     /// The kernel with which an [`Ensemble`](crate::Ensemble) takes these steps for many motions at once; `None` where

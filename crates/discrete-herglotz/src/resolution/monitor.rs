@@ -21,7 +21,7 @@ use contact_geom::{
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ResolutionMonitor<const N: usize> {
     pub first: Option<UnresolvedStep>,
-    pub doubt: Option<SuspectInterval<N>>,
+    pub suspect: Option<SuspectInterval<N>>,
     /// The threshold for the next suspect interval: the square of a second difference, in units of the velocity.
     pub sharpest: f64,
     /// Changes of position below this are round-off.
@@ -45,7 +45,7 @@ pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>,
 impl<const N: usize> ResolutionMonitor<N> {
     /// A monitor for a motion from a position and a velocity, with steps of length h.
     pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
-        ResolutionMonitor { first: None, doubt: None, sharpest: SHARP * SHARP, floor: rounding(q, v, h) }
+        ResolutionMonitor { first: None, suspect: None, sharpest: SHARP * SHARP, floor: rounding(q, v, h) }
     }
 
     /// Records the first step with a defect above one.
@@ -63,9 +63,9 @@ impl<const N: usize> ResolutionMonitor<N> {
     /// bounds their number.
     #[cold]
     #[inline(never)]
-    pub fn doubt(&mut self, sharpness: f64, doubt: SuspectInterval<N>) {
+    pub fn suspect(&mut self, sharpness: f64, suspect: SuspectInterval<N>) {
         self.sharpest = 4.0 * sharpness;
-        self.doubt = Some(doubt);
+        self.suspect = Some(suspect);
     }
 }
 
@@ -156,13 +156,13 @@ saved!([] UnresolvedStep { step, defect });
 impl<const N: usize> Saved for ResolutionMonitor<N> {
     fn save(&self, to: &mut Vec<u64>) {
         save_option(self.first.as_ref(), to);
-        save_option(self.doubt.as_ref(), to);
+        save_option(self.suspect.as_ref(), to);
         [self.sharpest, self.floor].save(to);
     }
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         self.first = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         let nowhere = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
-        self.doubt = load_option(from, || SuspectInterval { step: 0, steps: 0, t: 0.0, from: nowhere, to: nowhere })?;
+        self.suspect = load_option(from, || SuspectInterval { step: 0, steps: 0, t: 0.0, from: nowhere, to: nowhere })?;
         self.sharpest.load(from)?;
         self.floor.load(from)
     }

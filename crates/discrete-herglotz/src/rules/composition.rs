@@ -168,7 +168,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         {
             // The cause of a change of the first mean velocity may lie in the previous step.
             let t = self.t0 + step as f64 * self.h;
-            self.watch.doubt(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
+            self.watch.suspect(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
         }
         self.before = self.state;
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
@@ -254,7 +254,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.doubt.take()
+        self.watch.suspect.take()
     }
 }
 

@@ -144,9 +144,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // The cause of a change of the mean velocities lies in this step or the previous one.
-            let doubt =
+            let suspect =
                 SuspectInterval { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
-            self.watch.doubt(sharpness, doubt);
+            self.watch.suspect(sharpness, suspect);
         }
         // After two steps, the velocity before the first is extrapolated linearly.
         self.velocities = match self.k {
@@ -242,7 +242,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.doubt.take()
+        self.watch.suspect.take()
     }
 }
 

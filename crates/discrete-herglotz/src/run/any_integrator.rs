@@ -105,9 +105,9 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        each!(*self, integrator => integrator.stepper(problem, h, wants))
+        each!(*self, integrator => integrator.stepper(problem, h, options))
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {

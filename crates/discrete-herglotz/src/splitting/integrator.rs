@@ -46,7 +46,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
-            return Ok(Box::new(if watched { splitting.doubting() } else { splitting }));
+            return Ok(Box::new(if watched { splitting.with_suspects() } else { splitting }));
         }
         // The problem has already verified the claims of its Lagrangian.
         let form = SeparableForm::read_of(lagrangian, h, t0, &state, true)?;

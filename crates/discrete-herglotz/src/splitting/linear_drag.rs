@@ -205,7 +205,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.progress.watch.doubt.take()
+        self.progress.watch.suspect.take()
     }
 }
 

@@ -187,7 +187,7 @@ impl<const N: usize> SplittingRun<N> {
                 longest = CHUNK;
             } else if sharper {
                 let (t, from) = (self.time_after(0), self.state);
-                self.watch.doubt(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
+                self.watch.suspect(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
                 longest = CHUNK;
             }
             (self.motion, self.state) = (motion, state);

@@ -23,7 +23,7 @@ pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
     table: DragTable<F::Map>,
     progress: SplittingRun<N>,
     compensated: bool,
-    doubting: bool,
+    with_suspects: bool,
 }
 
 /// The substeps of a step.
@@ -99,7 +99,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         let table = DragTable { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
         let progress = SplittingRun::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
-        Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
+        Ok(ActionSplitting { form, table, progress, compensated: false, with_suspects: false })
     }
 
     /// The same with compensated summation (Kahan), as in
@@ -115,15 +115,15 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
     }
 
     /// The same with the detection of suspect intervals, which takes a tenth of the time.
-    pub(crate) fn doubting(self) -> Self {
-        ActionSplitting { doubting: true, ..self }
+    pub(crate) fn with_suspects(self) -> Self {
+        ActionSplitting { with_suspects: true, ..self }
     }
 }
 
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplitting<'_, L, F, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        let ActionSplitting { form, table, progress, compensated, doubting } = self;
-        match (*compensated, *doubting) {
+        let ActionSplitting { form, table, progress, compensated, with_suspects } = self;
+        match (*compensated, *with_suspects) {
             (false, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, false>(form, table, at, n)),
             (false, true) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, true>(form, table, at, n)),
             (true, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, true, false>(form, table, at, n)),
@@ -166,7 +166,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.progress.watch.doubt.take()
+        self.progress.watch.suspect.take()
     }
 }
 

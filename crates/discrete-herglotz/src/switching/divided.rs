@@ -43,10 +43,10 @@ impl DividedGauss {
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
         let gauss = GaussCollocation { stages: self.stages };
-        let make = move |problem: &Problem<'a, L, N>, h: f64, _: bool| gauss.run(problem, h, wants);
+        let make = move |problem: &Problem<'a, L, N>, h: f64, _: bool| gauss.run(problem, h, options);
         Ok(SwitchingStepper::new(problem, h, Reach::Inside, make)?.dividing(self.most_misfit))
     }
 }
@@ -70,8 +70,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(self.run(problem, h, wants)?))
+        Ok(Box::new(self.run(problem, h, options)?))
     }
 }

@@ -106,7 +106,7 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
     problem: &Problem<'a, L, N>,
     h: f64,
-    wants: StepperOptions,
+    options: StepperOptions,
 ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
     let info = integrator.info();
     let inside = info.collocation.is_some() || info.order > HIGHEST;
@@ -117,7 +117,7 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     };
     let parts = GaussCollocation { stages: (info.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
     let make = move |problem: &Problem<'a, L, N>, h: f64, is_part: bool| {
-        if is_part && !inside { parts.stepper(problem, h, wants) } else { integrator.stepper(problem, h, wants) }
+        if is_part && !inside { parts.stepper(problem, h, options) } else { integrator.stepper(problem, h, options) }
     };
     Ok(Box::new(SwitchingStepper::new(problem, h, reach, make)?))
 }
@@ -503,8 +503,8 @@ where
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        let doubt = self.base.stepper_mut().suspect_interval()?;
-        Some(SuspectInterval { step: doubt.step + self.before, ..doubt })
+        let suspect = self.base.stepper_mut().suspect_interval()?;
+        Some(SuspectInterval { step: suspect.step + self.before, ..suspect })
     }
 }
 

@@ -61,7 +61,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
             let t = self.t0 + step as f64 * h;
             let (from, to) = (self.phase(&from), self.phase(&end));
-            self.watch.doubt(sharpness, SuspectInterval { step, steps: 2, t, from, to });
+            self.watch.suspect(sharpness, SuspectInterval { step, steps: 2, t, from, to });
         }
     }
 

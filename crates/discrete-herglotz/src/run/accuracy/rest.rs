@@ -28,8 +28,8 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
         }
         let gauss = GaussCollocation { stages: 8 };
         let h = self.span / first_guess(self, gauss.stages, 1e-3) as f64;
-        let wants = StepperOptions { action: self.needs.action, watched: false };
-        let mut stepper = Integrator::stepper(&gauss, problem, h, wants).ok()?;
+        let options = StepperOptions { action: self.needs.action, watched: false };
+        let mut stepper = Integrator::stepper(&gauss, problem, h, options).ok()?;
         for _ in 0..SEARCHED / STRIDE {
             stepper.advance(STRIDE).ok()?;
             let t = stepper.time();

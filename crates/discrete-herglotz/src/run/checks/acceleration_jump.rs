@@ -23,14 +23,14 @@ const JUMP: f64 = 0.1;
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// Decides on a suspect interval: an unresolved step if shorter steps differ or the acceleration jumps, `None`
     /// otherwise.
-    pub(crate) fn unresolved_within(&self, doubt: &SuspectInterval<N>) -> Option<UnresolvedStep> {
-        let halves = self.against_halves(doubt).unwrap_or(0.0);
+    pub(crate) fn unresolved_within(&self, suspect: &SuspectInterval<N>) -> Option<UnresolvedStep> {
+        let halves = self.against_halves(suspect).unwrap_or(0.0);
         // The cubic curve does not approximate long steps of many stages, which detect jumps between their nodes by
         // defect samples. On jumps given by switching functions steps end.
-        let jump = if self.many_stages() || self.switches { None } else { self.jump(doubt) };
+        let jump = if self.many_stages() || self.switches { None } else { self.jump(suspect) };
         let defect = max_or_nan(halves, jump.unwrap_or(0.0));
         // Written so that a NaN counts as a defect.
-        if defect <= 1.0 { None } else { Some(UnresolvedStep { step: doubt.step + doubt.steps - 1, defect }) }
+        if defect <= 1.0 { None } else { Some(UnresolvedStep { step: suspect.step + suspect.steps - 1, defect }) }
     }
 
     /// The defect computed from the largest second difference of the acceleration along the cubic curve through both
