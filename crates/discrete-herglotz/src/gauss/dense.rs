@@ -26,6 +26,15 @@ impl<const N: usize> StepStart<N> {
     pub const ZERO: Self = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
 }
 
+/// The last step of a run: the mass matrix of the condensed routes (`None` in the general route), the time and the state
+/// at its start.
+#[derive(Clone, Copy)]
+pub(crate) struct SolvedStep<'r, const N: usize> {
+    pub mass: Option<&'r SMatrix<f64, N, N>>,
+    pub t: f64,
+    pub from: &'r StepStart<N>,
+}
+
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, padded with 0 after the last stage.
 pub(crate) struct Solved<const N: usize> {
     pub v: [[f64; MAX_STAGES]; N],
@@ -52,12 +61,13 @@ impl<const N: usize> Solved<N> {
     /// The stages of a condensed step from its accelerations and positions.
     pub fn from_accelerations(
         lagrangian: &impl Lagrangian<N>,
+        step: &SolvedStep<'_, N>,
         table: &Condensed,
-        mass: &SMatrix<f64, N, N>,
-        (t, start): (f64, &StepStart<N>),
         [a, x]: [&[[f64; MAX_STAGES]; N]; 2],
         wants_z: bool,
     ) -> Self {
+        let SolvedStep { t, from: start, .. } = *step;
+        let mass = step.mass.copied().unwrap_or_else(SMatrix::identity);
         let (s, mut solved) = (table.s, Self::ZERO);
         for d in 0..N {
             let v = &mut solved.v[d];

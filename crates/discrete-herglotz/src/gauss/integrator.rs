@@ -1,9 +1,9 @@
 //! Contact Gauss collocation as an integrator.
 
-use crate::gauss::routes::transformed::OwnTransformation;
+use crate::gauss::routes::transformed::StatedTransformation;
 use crate::gauss::{GaussStepper, MAX_STAGES, TransformedStepper};
 use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
-use contact_geom::Lagrangian;
+use contact_geom::{Lagrangian, TimeTransformation};
 
 /// Contact [`Gauss`](crate::gauss::Gauss) collocation with s = 1 to 16 stages, of order 2s, for every regular
 /// Lagrangian.
@@ -13,13 +13,43 @@ pub struct GaussCollocation {
     pub stages: usize,
 }
 
-/// Contact Gauss collocation with equal steps in transformed time, by the time transformation of an autonomous
-/// Lagrangian: the steps are short where the motion is fast, and the last step is shortened to end at the end of the
-/// time span.
+/// Contact Gauss collocation with equal steps in a transformed time, for autonomous Lagrangians: the steps are short
+/// where the motion is fast, and the last step is shortened to end at the end of the time span.
+///
+/// ```
+/// use contact_geom::systems::{Kepler, System};
+/// use discrete_herglotz::{Problem, Steps, TransformedGauss, Until};
+/// let kepler = Kepler::<2>::default();
+/// let problem = Problem::new(&kepler, 0.0, kepler.initial())?;
+/// let by = TransformedGauss::with(6, kepler.time_transformation());
+/// let outcome = problem.by(by).steps(Steps::Size(0.2)).run(Until::Time(10.0))?;
+/// assert!((outcome.t - 10.0).abs() < 1e-14);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TransformedGauss {
-    /// The number of stages.
+pub struct TransformedGauss<T = OwnTransformation> {
+    /// The number of stages, 1 to 16.
     pub stages: usize,
+    /// The time transformation: that of the Lagrangian, or another one.
+    pub transformation: T,
+}
+
+/// The time transformation that a Lagrangian states ([`Lagrangian::dt_dtau`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnTransformation;
+
+impl TransformedGauss {
+    /// The method with the time transformation that the Lagrangian states.
+    pub fn new(stages: usize) -> Self {
+        TransformedGauss { stages, transformation: OwnTransformation }
+    }
+}
+
+impl<T> TransformedGauss<T> {
+    /// The method with a given [`TimeTransformation`].
+    pub fn with(stages: usize, transformation: T) -> Self {
+        TransformedGauss { stages, transformation }
+    }
 }
 
 /// The description of either method.
@@ -44,45 +74,15 @@ fn check_stages(stages: usize) -> Result<(), InputError> {
     if (1..=MAX_STAGES).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
 }
 
-fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
+/// Checks a number of stages and a step.
+pub(crate) fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
     check_stages(stages)?;
     if h != 0.0 && h.is_finite() { Ok(()) } else { Err(InputError::Step { h }) }
 }
 
-impl GaussCollocation {
-    /// A stepper by the least expensive route that the Lagrangian's structure allows.
-    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
-        self,
-        problem: &Problem<'a, L, N>,
-        h: f64,
-        StepperOptions { action, watched }: StepperOptions,
-    ) -> Result<GaussStepper<'a, L, N>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
-        check_step(self.stages, h)?;
-        let run = GaussStepper::new(lagrangian, (self.stages, h), Some(structure), t0, state, start.v, action)?;
-        Ok(if watched { run.with_suspects() } else { run })
-    }
-}
-
-impl TransformedGauss {
-    /// A stepper with the Lagrangian's own time transformation.
-    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
-        self,
-        problem: &Problem<'a, L, N>,
-        h: f64,
-    ) -> Result<TransformedStepper<'a, L, OwnTransformation<'a, L>, N>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
-        check_step(self.stages, h)?;
-        TransformedStepper::new(
-            lagrangian,
-            (self.stages, h),
-            OwnTransformation(lagrangian),
-            Some(structure),
-            t0,
-            state,
-            start.v,
-        )
-    }
+fn check_transformed<L: Lagrangian<N>, const N: usize>(lagrangian: &L, stages: usize) -> Result<(), InputError> {
+    check_stages(stages)?;
+    if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussCollocation {
@@ -100,7 +100,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(self.run(problem, h, options)?))
+        Ok(Box::new(GaussStepper::new(problem, self.stages, h, options)?))
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
@@ -114,13 +114,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-        check_stages(self.stages)?;
         if const { !L::HINTS.time_transformation } {
+            check_stages(self.stages)?;
             return Err(InputError::Hypothesis {
                 hypothesis: "a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`)",
             });
         }
-        if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
+        check_transformed(lagrangian, self.stages)
     }
 
     fn stepper(
@@ -130,11 +130,34 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         _: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
-        // Compiled only for Lagrangians with a time transformation; the check rejects all others.
+        // The stepper is compiled only for Lagrangians with a time transformation; the check rejects all others.
         if const { L::HINTS.time_transformation } {
-            Ok(Box::new(self.run(problem, h)?))
+            Ok(Box::new(TransformedStepper::new(problem, self.stages, h, StatedTransformation(problem.lagrangian))?))
         } else {
-            Err(InputError::NoIntegrator)
+            Err(InputError::Unclaimed { claim: "a time transformation" })
         }
+    }
+}
+
+impl<'a, L, T, const N: usize> Integrator<'a, L, N> for TransformedGauss<T>
+where
+    L: Lagrangian<N>,
+    T: TimeTransformation<N> + Clone + 'a,
+{
+    fn info(&self) -> MethodInfo {
+        info(self.stages, true)
+    }
+
+    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        check_transformed(lagrangian, self.stages)
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        _: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        Ok(Box::new(TransformedStepper::new(problem, self.stages, h, self.transformation.clone())?))
     }
 }

@@ -1,16 +1,18 @@
 //! Contact Gauss collocation.
 
-mod consistent_start;
 mod dense;
+mod initial_mass;
 pub(crate) mod integrator;
+mod limits;
 pub(crate) mod resolution;
-mod routes;
+pub(crate) mod routes;
 mod stages;
 mod stepper;
 pub(crate) mod tables;
 mod work_summary;
 
 pub(crate) use dense::StepStart;
+pub use integrator::OwnTransformation;
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 pub(crate) use resolution::sequence::FEW_STAGES;
@@ -22,7 +24,7 @@ use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solv
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
-    TimeTransformation, support::seed,
+    support::seed,
 };
 use stages::equations::{Given, Products, StageEquations, Workspace};
 pub(crate) use tables::coefficients::MAX_STAGES;
@@ -38,15 +40,15 @@ pub(crate) use tables::coefficients::MAX_STAGES;
 /// `(rho L_v)' = rho L_q` with `rho' = -rho L_z` is Herglotz' equation. The method is Gauss collocation applied to the
 /// symplectified motion and reduced to the contact phase space; its flow is therefore conformally contact up to
 /// round-off. It is symmetric. As a [`DiscreteLagrangian`] it solves the stage equations by Newton's method, starting
-/// from a constant velocity; for runs use the faster [`stepper`](Self::stepper).
+/// from a constant velocity. Runs by [`GaussCollocation`](crate::GaussCollocation) take the same steps in a fraction of
+/// the time.
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::DoublePendulum};
-/// use discrete_herglotz::{Stepper, gauss::Gauss};
-/// let gauss = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
-/// let mut run = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0), [0.0, 0.0].into())?;
-/// run.advance(100)?;
-/// println!("t = {}: {:?}", run.time(), run.state());
+/// use contact_geom::{DiscretePoint, systems::DoublePendulum};
+/// use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss};
+/// let ld = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
+/// let x = DiscretePoint::new([1.0, 0.5], [0.95, 0.5], 0.0);
+/// println!("L_d = {}, sigma_d = {}", ld.value(0.0, &x)?, ld.jet(0.0, &x)?.sigma);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -68,12 +70,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        if !(1..=MAX_STAGES).contains(&stages) {
-            return Err(InputError::Stages { found: stages });
-        }
-        if !(h != 0.0 && h.is_finite()) {
-            return Err(InputError::Step { h });
-        }
+        integrator::check_step(stages, h)?;
         if N == 0 {
             return Err(InputError::Dimension);
         }
@@ -83,69 +80,6 @@ impl<L> Gauss<L> {
     /// The number of stages.
     pub fn stages(&self) -> usize {
         self.forward.s
-    }
-
-    /// A stepper from a state at a time, by the least expensive route that the Lagrangian's declared structure allows.
-    /// `guess` is the initial guess for the velocity at the start.
-    ///
-    /// # Errors
-    /// [`InputError`] if the state is not finite, if a declared property of the structure is false, or if no velocity
-    /// with the given momentum is found.
-    pub fn stepper<const N: usize>(
-        &self,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<GaussStepper<'_, L, N>, InputError>
-    where
-        L: Lagrangian<N>,
-    {
-        GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, true)
-    }
-
-    /// Like [`stepper`](Self::stepper), for a run whose action is not requested: z is not computed if it decouples from
-    /// the motion.
-    ///
-    /// # Errors
-    /// Those of [`stepper`](Self::stepper).
-    pub fn stepper_without_action<const N: usize>(
-        &self,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<GaussStepper<'_, L, N>, InputError>
-    where
-        L: Lagrangian<N>,
-    {
-        GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, false)
-    }
-
-    /// A stepper with variable steps from a state at a time, for autonomous Lagrangians: the step size is constant in
-    /// the transformed time tau, `dt = g(q) dtau`. `guess` is the initial guess for the velocity at the start.
-    ///
-    /// # Errors
-    /// Those of [`stepper`](Self::stepper); [`InputError::Unclaimed`] if the Lagrangian does not declare that it is
-    /// autonomous; [`InputError::TimeTransformation`] if the rate dt/dtau at the start is not positive and finite.
-    pub fn transformed_stepper<const N: usize, C>(
-        &self,
-        transformation: C,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<TransformedStepper<'_, L, C, N>, InputError>
-    where
-        L: Lagrangian<N>,
-        C: TimeTransformation<N>,
-    {
-        TransformedStepper::new(
-            &self.lagrangian,
-            (self.forward.s, self.forward.h),
-            transformation,
-            None,
-            t0,
-            state,
-            guess,
-        )
     }
 
     /// The stage equations of a step forward or backward in time.

@@ -4,18 +4,20 @@ mod resolution;
 mod retries;
 mod state_words;
 
-use crate::gauss::consistent_start::ConsistentStart;
-use crate::gauss::dense::{Solved, StepStart};
+use crate::gauss::dense::{SolvedStep, StepStart};
+use crate::gauss::initial_mass::InitialMass;
+use crate::gauss::integrator::check_step;
+use crate::gauss::limits::{FIRST_NEWTON_PAUSE, MAX_LINEAR_DIMENSION};
 use crate::gauss::resolution::sequence::{FEW_STAGES, Sequence};
 use crate::gauss::resolution::tail;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::linear::Linear;
 use crate::gauss::routes::separable::SeparableStages;
-use crate::gauss::stages::equations::{Products, Workspace};
+use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::parametrization::{Extension, Physical};
-use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::GaussRoute;
@@ -25,25 +27,34 @@ use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
 use crate::solve::mass_matrix::is_identity;
 use crate::{
-    DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    DenseStep, InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions, UnresolvedStep,
+    integration::SuspectInterval,
 };
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint};
 use pulp::{Simd, WithSimd};
-use retries::{PAUSE, Tried};
-use std::sync::Arc;
+use retries::Tried;
 
-/// The largest dimension for which a linear motion is advanced by one precomputed matrix.
-const MOST_LINEAR: usize = 32;
-
-/// The state and the workspace of a route.
+/// The route of a run.
 #[allow(clippy::large_enum_variant)] // A run has one, in a box.
 enum Route<'a, L, const N: usize> {
     /// Boxed, since its matrices are larger than the data of the other variants.
-    Linear(Box<Linear<N>>, Arc<Condensed>),
+    Linear(Box<Linear<'a, L, N>>),
     Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
+
+/// Evaluates an expression for the [`StageRoute`] of a run, compiled for each route.
+macro_rules! with_route {
+    ($route:expr, $run:ident => $value:expr) => {
+        match $route {
+            Route::Linear($run) => $value,
+            Route::Condensed($run) => $value,
+            Route::General($run) => $value,
+        }
+    };
+}
+use with_route;
 
 /// How the stage equations of a step are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,9 +93,6 @@ pub struct GaussStepper<'a, L, const N: usize> {
     /// each change to a more expensive one).
     pause: usize,
     pauses: usize,
-    /// The workspace of Newton's method in the general route; made for the first step in which the fixed-point
-    /// iteration does not converge.
-    by_newton: Option<Box<(Products, Workspace<N>)>>,
     newton_steps: u64,
     /// The defect of a constant conformal factor, see [`tail::of_sigma`].
     of_sigma: f64,
@@ -95,17 +103,22 @@ pub struct GaussStepper<'a, L, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
-    pub(crate) fn new(
-        lagrangian: &'a L,
-        (s, h): (usize, f64),
-        probed: Option<Structure>,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-        wants_z: bool,
+    /// A stepper at the start of a problem with `stages` from 1 to 16 and the time step `h`, negative for a motion
+    /// backward in time, by the least expensive route that the structure of the Lagrangian allows.
+    ///
+    /// # Errors
+    /// [`InputError::Stages`], [`InputError::Step`]; [`InputError::FirstStep`] if the mass matrix at the start is
+    /// singular; [`InputError::Sigma`] and [`InputError::FirstStep`] if the step is too long for a constant rate.
+    pub fn new(
+        problem: &Problem<'a, L, N>,
+        stages: usize,
+        h: f64,
+        StepperOptions { action, watched }: StepperOptions,
     ) -> Result<Self, InputError> {
-        let ConsistentStart { start, structure, w, inverse } =
-            ConsistentStart::of(lagrangian, probed, t0, &state, guess)?;
+        check_step(stages, h)?;
+        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
+        let (s, wants_z) = (stages, action);
+        let InitialMass { w, inverse } = InitialMass::of(problem)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
@@ -113,15 +126,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let unit = is_identity(&w);
             mass = Some(w);
             of_sigma = tail::of_sigma(1.0 + table.grow.head, table.gamma * h);
-            // For many coordinates the matrix costs more than the iterations that it saves, and does not fit on the
-            // stack.
-            let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
+            let linear = if structure.quadratic && structure.autonomous && const { N <= MAX_LINEAR_DIMENSION } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
                 None
             };
             match linear {
-                Some(linear) => Route::Linear(linear, table),
+                Some(linear) => Route::Linear(linear),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
                     let inverse = (!unit).then_some(inverse);
@@ -130,8 +141,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             }
         } else {
             let mass = Mass::new(&structure, inverse);
-            let (physical, driven) = (Extension::new(Physical, t0, 0.0), !structure.is_affine_in_z());
-            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, driven, &state, &start.v))
+            let (physical, z_drives) = (Extension::new(Physical, t0, 0.0), !structure.is_affine_in_z());
+            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, z_drives, &state, &start.v))
         };
         let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {
@@ -148,21 +159,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             newton: true,
             solution: Solution::FixedPointIteration,
             pause: 0,
-            pauses: PAUSE,
-            by_newton: None,
+            pauses: FIRST_NEWTON_PAUSE,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW_STAGES).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
+            sequence: (s <= FEW_STAGES || watched).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
             watch: ResolutionMonitor::new(&state.q, &start.v, h),
         })
-    }
-
-    /// Records [`SuspectInterval`]s for any number of stages.
-    pub(crate) fn with_suspects(mut self) -> Self {
-        if self.sequence.is_none() {
-            self.sequence = Some(Sequence::new(self.values()));
-        }
-        self
     }
 
     /// Without Newton's method: a step whose fixed-point iteration does not converge fails with
@@ -174,12 +176,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// How the steps are computed.
     pub fn route(&self) -> GaussRoute {
-        match &*self.route {
-            Route::Linear(..) => GaussRoute::Linear,
-            Route::Condensed(_) => GaussRoute::Condensed,
-            Route::General(General { mass: Mass::Constant(_), .. }) => GaussRoute::ConstantMass,
-            Route::General(_) => GaussRoute::General,
-        }
+        with_route!(&*self.route, run => run.route())
     }
 
     /// The number of steps that were solved by simplified Newton iteration or Newton's method, since the fixed-point
@@ -188,61 +185,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self.newton_steps
     }
 
-    /// The dense output of the last step.
-    fn curve(&self) -> Option<DenseStep<N>> {
-        let (s, h) = (self.s, self.h);
-        let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
-        let condensed = |table: &Condensed, stages: [&[[f64; MAX_STAGES]; N]; 2], wants_z| {
-            let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
-            Solved::from_accelerations(self.lagrangian, table, &mass, (t, &self.from), stages, wants_z)
-        };
-        if !self.solved {
-            return None;
-        }
-        let start = self.phase(&self.from);
-        let solved = match &*self.route {
-            Route::Linear(run, table) => {
-                let a = run.accelerations(&self.from.q, &self.from.y);
-                condensed(table, [&a, &table.positions(&self.from.q, &self.from.y, &a)], run.wants_z())
-            }
-            Route::Condensed(run) => condensed(&run.table, [&run.a.map(|a| a.0), &run.x.map(|x| x.0)], run.wants_z),
-            Route::General(run) => run.solved(),
-        };
-        Some(solved.curve(s, t, h, start))
+    /// The last step, if its stages are known.
+    fn last_step(&self) -> Option<SolvedStep<'_, N>> {
+        let t = self.t0 + self.k.checked_sub(1)? as f64 * self.h;
+        self.solved.then_some(SolvedStep { mass: self.mass.as_deref(), t, from: &self.from })
     }
 
     /// The state in the variables of the route: velocities in the condensed routes, momenta in the general one.
     #[inline(always)]
     fn values(&self) -> StepStart<N> {
-        let (q, y, z) = match &*self.route {
-            Route::Linear(run, _) => (&run.q, &run.v, run.z),
-            Route::Condensed(run) => (&run.q, &run.v, run.z),
-            Route::General(run) => (&run.q, &run.p, run.z),
-        };
+        let RouteState { q, y, z } = with_route!(&*self.route, run => run.state());
         StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
     }
 
     /// The compensation terms of the state's compensated sums.
-    pub(crate) fn rests(&self) -> StepStart<N> {
-        let (q, y, z) = match &*self.route {
-            Route::Linear(run, _) => (&run.q, &run.v, run.z),
-            Route::Condensed(run) => (&run.q, &run.v, run.z),
-            Route::General(run) => (&run.q, &run.p, run.z),
-        };
+    pub(crate) fn compensation(&self) -> StepStart<N> {
+        let RouteState { q, y, z } = with_route!(&*self.route, run => run.state());
         StepStart { q: q.map(|q| q.rest), y: y.map(|y| y.rest), z: z.rest }
     }
 
     /// Takes over the compensation terms of a stepper of the same problem that has reached this stepper's start.
-    pub(crate) fn add_rests(&mut self, rests: &StepStart<N>) {
-        let (q, y, z) = match &mut *self.route {
-            Route::Linear(run, _) => (&mut run.q, &mut run.v, &mut run.z),
-            Route::Condensed(run) => (&mut run.q, &mut run.v, &mut run.z),
-            Route::General(run) => (&mut run.q, &mut run.p, &mut run.z),
-        };
-        for d in 0..N {
-            (q[d].rest, y[d].rest) = (rests.q[d], rests.y[d]);
-        }
-        z.rest = rests.z;
+    pub(crate) fn set_compensation(&mut self, terms: &StepStart<N>) {
+        with_route!(&mut *self.route, run => run.set_compensation(terms));
     }
 
     /// The phase point of a state of the route; the velocities of the condensed routes are turned into momenta.
@@ -253,7 +217,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// Takes steps by fixed-point or simplified Newton iteration. Returns the number of steps taken, and the error if
     /// they are fewer than requested.
-    fn sweep(&mut self, steps: usize) -> (usize, Option<StepError>) {
+    fn take_steps(&mut self, steps: usize) -> (usize, Option<StepError>) {
         let (taken, refused) = match self.arch.dispatch(AdvanceGauss { run: self, steps }) {
             Ok(()) => (steps, None),
             Err((taken, progress)) => (taken, Some(progress)),
@@ -281,8 +245,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
         let AdvanceGauss { run, steps } = self;
         forget_branches();
         let (t0, h) = (run.t0, run.h);
-        if let Route::Linear(linear, _) = &mut *run.route {
-            let (taken, from) = linear.advance(steps);
+        if let Some((taken, from)) = with_route!(&mut *run.route, route => route.take_steps(steps)) {
             run.k += taken;
             run.from = from;
             return if taken == steps { Ok(()) } else { Err((taken, IterationOutcome::NonFinite)) };
@@ -293,19 +256,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
                 run.from = run.values();
             }
             let t = t0 + run.k as f64 * h;
-            let progress = match &mut *run.route {
-                Route::Linear(..) => IterationOutcome::Done,
-                Route::Condensed(condensed) => condensed.step::<S>(t),
-                Route::General(general) => general.step::<S>(t),
-            };
+            let progress = with_route!(&mut *run.route, route => route.step::<S>(t));
             if progress != IterationOutcome::Done {
                 return Err((taken, progress));
             }
-            let defect = match &*run.route {
-                Route::Linear(..) => 0.0,
-                Route::Condensed(condensed) => condensed.defect,
-                Route::General(general) => general.defect,
-            };
+            let defect = with_route!(&*run.route, route => route.defect());
             if defect > 1.0 && !run.is_at_rest(t + h) {
                 run.watch.note(run.k, defect);
             }
@@ -325,11 +280,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             self.resume();
             let left = steps - done;
             let (taken, refused) = match self.solution {
-                Solution::FixedPointIteration => self.sweep(left),
-                Solution::Simplified => self.sweep(self.pause.min(left)),
+                Solution::FixedPointIteration => self.take_steps(left),
+                Solution::Simplified => self.take_steps(self.pause.min(left)),
                 Solution::Newton => {
                     tried.newton = true;
-                    self.solve_stages().map_or_else(|cause| (0, Some(cause)), |()| self.sweep(1))
+                    self.solve_stages().map_or_else(|cause| (0, Some(cause)), |()| self.take_steps(1))
                 }
             };
             done += taken;
@@ -362,24 +317,15 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        match &*self.route {
-            _ if self.k == 0 => 1.0,
-            Route::Linear(_, table) => 1.0 + table.grow.head,
-            Route::Condensed(run) => 1.0 + run.table.grow.head,
-            Route::General(run) => 1.0 / (1.0 - run.one_minus_rho),
-        }
+        if self.k == 0 { 1.0 } else { with_route!(&*self.route, run => run.sigma()) }
     }
 
     fn evaluations(&self) -> u64 {
-        match &*self.route {
-            Route::Linear(..) => 0,
-            Route::Condensed(run) => run.evaluations,
-            Route::General(run) => run.evaluations,
-        }
+        with_route!(&*self.route, run => run.evaluations())
     }
 
     fn has_constant_rate(&self) -> bool {
-        !matches!(&*self.route, Route::General(_))
+        matches!(self.route(), GaussRoute::Linear | GaussRoute::Condensed)
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
@@ -388,24 +334,21 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
 
     /// The collocation polynomial of the last step; computed only when it is requested.
     fn dense(&self) -> Option<DenseStep<N>> {
-        self.curve()
+        let step = self.last_step()?;
+        let solved = with_route!(&*self.route, run => StageRoute::solved(run, &step));
+        Some(solved.curve(self.s, step.t, self.h, self.phase(step.from)))
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        match &*self.route {
-            Route::General(run) if self.k > 0 => Some(run.last_velocity()),
-            _ => None,
-        }
+        if self.k == 0 { None } else { with_route!(&*self.route, run => StageRoute::last_velocity(run)) }
     }
 
     fn guess(&mut self, longer: &DenseStep<N>) {
-        let (s, h) = (self.s, self.h);
-        if let Route::General(run) = &mut *self.route {
-            let part = h / longer.length();
-            // L is not finite where the collocation polynomial of the action has a pole.
-            let stages = Coefficients::of(s).c.iter().take(s).map(|c| longer.stage(part * c.0));
-            run.predict(stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho)));
-        }
+        let part = self.h / longer.length();
+        // L is not finite where the collocation polynomial of the action has a pole.
+        let stages = Coefficients::of(self.s).c.iter().take(self.s).map(|c| longer.stage(part * c.0));
+        let stages = stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho));
+        with_route!(&mut *self.route, run => run.predict_stages(stages));
     }
 
     fn save(&self) -> Option<Vec<u64>> {

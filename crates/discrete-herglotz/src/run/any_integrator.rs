@@ -45,7 +45,7 @@ macro_rules! each {
                 $result
             }
             AnyIntegrator::TransformedGauss { stages } => {
-                let $integrator = TransformedGauss { stages };
+                let $integrator = TransformedGauss::new(stages);
                 $result
             }
             AnyIntegrator::Divided($integrator) => $result,

@@ -1,6 +1,7 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
 use super::{Reach, SwitchingStepper};
+use crate::gauss::GaussStepper;
 use crate::gauss::info;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
@@ -45,8 +46,8 @@ impl DividedGauss {
         h: f64,
         options: StepperOptions,
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
-        let gauss = GaussCollocation { stages: self.stages };
-        let make = move |problem: &Problem<'a, L, N>, h: f64, _: bool| gauss.run(problem, h, options);
+        let make =
+            move |problem: &Problem<'a, L, N>, h: f64, _: bool| GaussStepper::new(problem, self.stages, h, options);
         Ok(SwitchingStepper::new(problem, h, Reach::Inside, make)?.dividing(self.most_misfit))
     }
 }

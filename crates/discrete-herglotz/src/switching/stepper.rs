@@ -34,12 +34,12 @@ pub(crate) trait AsStepper<const N: usize> {
     fn stepper(&self) -> &(dyn Stepper<N> + '_);
     fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
 
-    /// The compensation terms of its sums, beyond the last digits of the state. [`add_rests`](Self::add_rests) restores
+    /// The compensation terms of its sums, beyond the last digits of the state. [`set_compensation`](Self::set_compensation) restores
     /// them.
-    fn rests(&self) -> StepStart<N> {
+    fn compensation(&self) -> StepStart<N> {
         StepStart::ZERO
     }
-    fn add_rests(&mut self, _rests: &StepStart<N>) {}
+    fn set_compensation(&mut self, _rests: &StepStart<N>) {}
 
     /// The largest defect of its last step between the nodes, relative to the momenta; 0 where it is unknown.
     fn defect(&self) -> f64 {
@@ -57,11 +57,11 @@ impl<const N: usize> AsStepper<N> for Box<dyn Stepper<N> + '_> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
-    fn rests(&self) -> StepStart<N> {
-        GaussStepper::rests(self)
+    fn compensation(&self) -> StepStart<N> {
+        GaussStepper::compensation(self)
     }
-    fn add_rests(&mut self, rests: &StepStart<N>) {
-        GaussStepper::add_rests(self, rests);
+    fn set_compensation(&mut self, rests: &StepStart<N>) {
+        GaussStepper::set_compensation(self, rests);
     }
     fn defect(&self) -> f64 {
         self.look(1).map_or(0.0, |look| {
@@ -223,13 +223,13 @@ where
         let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
         let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
         let mut stepper = (self.make)(&problem, h, is_part).map_err(step_error)?;
-        stepper.add_rests(&at.rests);
+        stepper.set_compensation(&at.rests);
         Ok(stepper)
     }
 
     /// The state of a stepper, with its velocity.
     fn reached(&self, stepper: &S, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
-        let (state, rests) = (stepper.stepper().state(), stepper.rests());
+        let (state, rests) = (stepper.stepper().state(), stepper.compensation());
         let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
         Ok(TimedState { t, state, v, rests })
     }

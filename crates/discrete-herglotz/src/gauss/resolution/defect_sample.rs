@@ -3,7 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::gauss::dense::Solved;
+use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::parametrization::Parametrization;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
@@ -11,7 +11,6 @@ use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::lanes::{Lanes, vector};
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{StageMap, Stages, blocks};
-use contact_geom::nalgebra::SMatrix;
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -150,11 +149,11 @@ impl<const N: usize> Curve<N> {
     pub fn of_accelerations<S: Simd, L: Lagrangian<N>>(
         &mut self,
         lagrangian: &L,
+        step: &SolvedStep<'_, N>,
         table: &Condensed,
-        mass: Option<&SMatrix<f64, N, N>>,
-        v0: &[f64; N],
         [a, x]: [&[Stages; N]; 2],
     ) {
+        let (mass, v0) = (step.mass, &step.from.y);
         (self.acts, self.z) = (false, 0.0);
         for d in 0..N {
             let v0 = Lanes::<S>::splat(v0[d]);

@@ -1,16 +1,24 @@
 //! Steps of contact Gauss collocation for a linear motion: one precomputed matrix.
 
-use crate::gauss::dense::StepStart;
+use crate::StepError;
+use crate::gauss::dense::{Solved, SolvedStep, StepStart};
+use crate::gauss::resolution::defect_sample::{Curve, SAMPLE_SETS};
+use crate::gauss::routes::{RouteState, StageRoute, set_compensation};
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::condensed::Condensed;
+use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::double_double::solve_exactly;
+use crate::numbers::registers::Stages;
 use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, support::linear};
 use num_traits::{One, Zero};
+use pulp::Simd;
 use qd::Quad;
 use std::array::from_fn;
+use std::sync::Arc;
 
 /// The change of the action in a step without the term `grow z`: a polynomial of degree two in the velocity and in the
 /// position relative to a reference point. The reference point is the equilibrium if there is one; with another one the
@@ -26,7 +34,9 @@ struct Action<const N: usize> {
 }
 
 /// The state of a linear motion, and the affine map to its changes in a step, `q1 - q0` and `v1 - v0`.
-pub(crate) struct Linear<const N: usize> {
+pub(crate) struct Linear<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    table: Arc<Condensed>,
     qq: [[Unevaluated; N]; N],
     qv: [[Unevaluated; N]; N],
     vq: [[Unevaluated; N]; N],
@@ -37,9 +47,9 @@ pub(crate) struct Linear<const N: usize> {
     action: Option<Action<N>>,
     /// The accelerations of the stages as affine functions of (q0, v0), in row `i N + d`; for dense output.
     stages: Vec<Vec<f64>>,
-    pub q: [CompensatedSum; N],
-    pub v: [CompensatedSum; N],
-    pub z: CompensatedSum,
+    q: [CompensatedSum; N],
+    v: [CompensatedSum; N],
+    z: CompensatedSum,
 }
 
 /// The zero of a force that is affine in the positions, from its derivative and its value at the origin; the origin if
@@ -54,12 +64,12 @@ fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f
     if solved { equilibrium_position } else { SVector::zeros() }
 }
 
-impl<const N: usize> Linear<N> {
+impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
     /// The step for `a = M^-1 L_q = -K q + f`; `None` if the stage equations are singular.
     #[inline(never)]
-    pub fn new<L: Lagrangian<N>>(
-        lagrangian: &L,
-        table: &Condensed,
+    pub fn new(
+        lagrangian: &'a L,
+        table: &Arc<Condensed>,
         inverse_mass: &SMatrix<f64, N, N>,
         t: f64,
         start: &VelocityPoint<N>,
@@ -136,6 +146,8 @@ impl<const N: usize> Linear<N> {
         });
         let entries = |f: &dyn Fn(usize, usize) -> Quad| from_fn(|d| from_fn(|e| f(d, e).into()));
         Some(Box::new(Linear {
+            lagrangian,
+            table: table.clone(),
             qq: entries(&|d, e| sum(&exact.end_b, d, e)),
             qv: entries(&|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
             vq: entries(&|d, e| sum(&exact.end_v, d, e)),
@@ -157,7 +169,7 @@ impl<const N: usize> Linear<N> {
     /// The state is checked at the end of all steps; only if it is not finite they are repeated from the start with a
     /// check after each step.
     #[inline(always)]
-    pub fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
+    fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
         let start = (self.q, self.v, self.z);
         (1..steps).for_each(|_| self.step());
         let last = self.start();
@@ -212,13 +224,8 @@ impl<const N: usize> Linear<N> {
         }
     }
 
-    /// Whether the action is computed.
-    pub fn wants_z(&self) -> bool {
-        self.action.is_some()
-    }
-
     /// The accelerations of the stages of the step that starts at a position and a velocity.
-    pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
+    fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
         let side = |k: usize| {
             if k < N {
                 q[k]
@@ -240,4 +247,73 @@ impl<const N: usize> Linear<N> {
     }
 }
 
-saved!([const N: usize] Linear<N> { q, v, z });
+saved!([L, const N: usize] Linear<'_, L, N> { q, v, z });
+
+/// Its steps solve no equations: no iteration, and no Newton method.
+impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for Box<Linear<'_, L, N>> {
+    fn route(&self) -> GaussRoute {
+        GaussRoute::Linear
+    }
+
+    #[inline(always)]
+    fn state(&self) -> RouteState<'_, N> {
+        RouteState { q: &self.q, y: &self.v, z: self.z }
+    }
+
+    fn set_compensation(&mut self, terms: &StepStart<N>) {
+        set_compensation((&mut self.q, &mut self.v, &mut self.z), terms);
+    }
+
+    #[inline(always)]
+    fn step<S: Simd>(&mut self, _t: f64) -> IterationOutcome {
+        if self.advance(1).0 == 1 { IterationOutcome::Done } else { IterationOutcome::NonFinite }
+    }
+
+    #[inline(always)]
+    fn take_steps(&mut self, steps: usize) -> Option<(usize, StepStart<N>)> {
+        Some(self.advance(steps))
+    }
+
+    #[inline(always)]
+    fn defect(&self) -> f64 {
+        0.0
+    }
+
+    /// A linear motion that is not resolved is unresolved in every step, and no step was sampled during the run.
+    fn sample_sets(&self) -> usize {
+        SAMPLE_SETS
+    }
+
+    fn sigma(&self) -> f64 {
+        1.0 + self.table.grow.head
+    }
+
+    fn evaluations(&self) -> u64 {
+        0
+    }
+
+    fn reserve_newton(&mut self) {}
+
+    fn linearise_at_state(&mut self, _t: f64) -> bool {
+        false
+    }
+
+    fn suspend_newton(&mut self) {}
+
+    fn solve_stages(&mut self, _t: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+
+    fn solved(&self, step: &SolvedStep<'_, N>) -> Solved<N> {
+        let a = self.accelerations(&step.from.q, &step.from.y);
+        let x = self.table.positions(&step.from.q, &step.from.y, &a);
+        Solved::from_accelerations(self.lagrangian, step, &self.table, [&a, &x], self.action.is_some())
+    }
+
+    #[inline(always)]
+    fn collect<S: Simd>(&self, step: &SolvedStep<'_, N>, curve: &mut Curve<N>) {
+        let a = self.accelerations(&step.from.q, &step.from.y);
+        let x = self.table.positions(&step.from.q, &step.from.y, &a);
+        curve.of_accelerations::<S, L>(self.lagrangian, step, &self.table, [&a.map(Stages), &x.map(Stages)]);
+    }
+}

@@ -3,11 +3,13 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::StepError;
+use crate::gauss::limits::{
+    MAX_CHANGE_FOR_TAILS, MAX_PREDICTOR_ERROR, MIN_JACOBIAN_AGE, PREDICTOR_PAUSE, SLOW_NEWTON, TAIL_PERIOD,
+};
 use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, Tail};
-use crate::gauss::stages::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::lagrangian_values::StageValues;
-use crate::gauss::stages::position_newton::{At, PositionNewton, curvature};
+use crate::gauss::stages::position_newton::{PositionNewton, curvature};
 use crate::gauss::stages::simplified_newton::SlopeNewton;
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
@@ -21,24 +23,8 @@ use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_n
 use pulp::Simd;
 use std::sync::Arc;
 
+mod route;
 mod slope;
-
-/// The extrapolated predictor is dropped if its first change exceeds the part of the force that is outside the linear
-/// force by this factor. Its error is rough, and the first iterations remove it, whereas the error of a motion by the
-/// linear force alone is smooth and decreases more slowly.
-const ROUGH: f64 = 16.0;
-
-/// The number of steps after which a dropped predictor is tried again.
-const UNFORETOLD: u32 = 31;
-
-/// The largest relative change of an iteration after which its values are accurate enough for the terms with the tails
-/// of the matrices.
-const NEAR: f64 = 1e-3;
-
-/// The tails of the matrices are applied in one of this many steps, with a weight of this number: their accumulated
-/// effect is the same at a fraction of the cost. The number is odd, so that all phases are met if the period of the
-/// motion is a power of two of steps.
-const TAILS: usize = 7;
 
 /// The state and the workspace of the condensed step.
 ///
@@ -77,7 +63,7 @@ pub(crate) struct SeparableStages<'a, L, const N: usize> {
     /// Whether the stages of the next step are solved already, with their solution in `rest`.
     solved: bool,
     /// The number of further steps whose initial guess is a motion by the linear force alone.
-    unforetold: u32,
+    steps_without_predictor: u32,
     /// The number of steps since the Jacobian of the simplified Newton iteration was computed.
     age: u32,
     tail: Tail,
@@ -118,7 +104,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             suspended_newton: None,
             positions: None,
             solved: false,
-            unforetold: 0,
+            steps_without_predictor: 0,
             age: 0,
             tail,
             defect: 0.0,
@@ -130,7 +116,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// Switches to simplified Newton iteration with `L_qq` at a time and a position; `false` if the Jacobian is
     /// singular or not finite.
-    pub fn linearise(&mut self, t: f64, q: SVector<f64, N>) -> bool {
+    fn linearise(&mut self, t: f64, q: SVector<f64, N>) -> bool {
         if !self.prepare() {
             return false;
         }
@@ -155,42 +141,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         true
     }
 
-    /// Returns to fixed-point iteration.
-    pub fn suspend_newton(&mut self) {
-        self.suspended_newton = self.newton.take();
-        self.look_again();
-    }
-
     /// Takes a motion without forces as the initial guess of the next step.
-    pub fn forget(&mut self) {
+    fn forget(&mut self) {
         self.rest = [Stages::ZERO; N];
         self.warm = false;
-    }
-
-    /// Allocates the workspace of Newton's method, so that later steps do not allocate.
-    pub fn reserve(&mut self) {
-        self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
-    }
-
-    /// Solves the stage equations of the next step, from the time `t`, by Newton's method; the next call of `step` uses
-    /// them.
-    ///
-    /// # Errors
-    /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
-    pub fn solve(&mut self, t: f64) -> Result<(), StepError> {
-        let positions = self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
-        let (q, v) = (SVector::from(self.q.map(|q| q.value)), SVector::from(self.v.map(|v| v.value)));
-        let inverse_mass = self.inverse_mass.as_deref();
-        positions.solve(&At { lagrangian: self.lagrangian, table: &self.table, inverse_mass, t, q, v })?;
-        self.rest = [Stages::ZERO; N];
-        for (i, (a, q)) in positions.stages().enumerate() {
-            for d in 0..N {
-                // The last stage is repeated in the padding.
-                self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
-            }
-        }
-        self.solved = true;
-        Ok(())
     }
 
     /// Recomputes the Jacobian of the simplified Newton iteration at the middle stage of the last step.
@@ -237,23 +191,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
+    fn take_step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         if self.warm && self.newton.is_none() && self.taken >= self.review {
             self.review *= 2;
-            self.look_again();
+            self.update_matrix();
         }
         let s = self.table.s;
         let m = blocks::<S>(s);
         let solved = std::mem::take(&mut self.solved);
-        let foretells = self.warm && !solved && (self.unforetold == 0 || self.newton.is_some());
-        if foretells {
+        let predicts = self.warm && !solved && (self.steps_without_predictor == 0 || self.newton.is_some());
+        if predicts {
             for d in 0..N {
                 let before = self.rest[d];
                 self.table.extrapolation.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
         } else if !solved {
             self.rest = [Stages::ZERO; N];
-            self.unforetold = self.unforetold.saturating_sub(1);
+            self.steps_without_predictor = self.steps_without_predictor.saturating_sub(1);
         }
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
@@ -262,9 +216,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         // they cost little. If the initial guess is poor, the terms with the tails of the matrices use the values of a
         // later iteration.
         let at_once = solved || self.newton.is_some();
-        let weight = match self.taken % TAILS {
+        let weight = match self.taken % TAIL_PERIOD {
             _ if at_once => 1.0,
-            0 => TAILS as f64,
+            0 => TAIL_PERIOD as f64,
             _ => 0.0,
         };
         let tails = !at_once && weight > 0.0;
@@ -273,7 +227,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
         // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
-        let mut sweeps =
+        let mut iteration =
             FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
         // The positions and `rest` of the iteration before.
         let mut before = [Stages::ZERO; 2];
@@ -301,21 +255,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 break IterationOutcome::Done;
             }
             if self.newton.is_some() {
-                (change, sweeps.still) = self.correct();
+                (change, iteration.still) = self.correct();
             }
-            match sweeps.judge(change, size) {
-                IterationOutcome::Continue if tails && change > NEAR * size => (due, self.far) = (true, true),
+            match iteration.assess(change, size) {
+                IterationOutcome::Continue if tails && change > MAX_CHANGE_FOR_TAILS * size => {
+                    (due, self.far) = (true, true)
+                }
                 IterationOutcome::Continue => (again, due) = (again || due, false),
                 IterationOutcome::Slow { .. } if self.is_rounding(t, change) => break IterationOutcome::Done,
                 done => break done,
             }
             if const { N == 1 } && self.newton.is_none() {
-                let extrapolation = sweeps.secant_step(change / size);
-                self.sweep_ahead::<S>(&mut before, extrapolation);
+                let extrapolation = iteration.secant_step(change / size);
+                self.store_values::<S>(&mut before, extrapolation);
             }
         };
-        if const { N == 1 } && outcome == IterationOutcome::Done && sweeps.ends_ahead() {
-            self.sweep_ahead::<S>(&mut before, true);
+        if const { N == 1 } && outcome == IterationOutcome::Done && iteration.ends_with_secant() {
+            self.store_values::<S>(&mut before, true);
             let kappa = Lanes::<S>::splat(self.left.kappa);
             for r in 0..m {
                 self.a[0].set(r, self.rest[0].block::<S>(r) - kappa * self.x[0].block(r));
@@ -332,15 +288,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             self.rest = [Stages::ZERO; N];
             return outcome;
         }
-        if foretells && const { N == 1 } && sweeps.first_change() > ROUGH * self.largest_rest::<S>() {
-            self.unforetold = UNFORETOLD;
+        if predicts && const { N == 1 } && iteration.first_change() > MAX_PREDICTOR_ERROR * self.largest_rest::<S>() {
+            self.steps_without_predictor = PREDICTOR_PAUSE;
         }
-        let foretold = sweeps.first() <= FORETOLD && !solved;
+        let predicted_well = iteration.first() <= FORETOLD && !solved;
         let h = self.table.h;
-        self.defect = if foretold { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
+        self.defect = if predicted_well { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
             self.age = self.age.saturating_add(1);
-            if sweeps.count() > SLOW && self.age > AGE {
+            if iteration.count() > SLOW_NEWTON && self.age > MIN_JACOBIAN_AGE {
                 self.renew(t);
             }
             return IterationOutcome::Done;
@@ -463,7 +419,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 }
 
 saved!([L, const N: usize] SeparableStages<'_, L, N> {
-    rest, x, a, base, q, v, z, far, warm, solved, unforetold, age, defect, taken, review, evaluations,
+    rest, x, a, base, q, v, z, far, warm, solved, steps_without_predictor, age, defect, taken, review, evaluations,
 } and save_solution, load_solution);
 
 impl<L, const N: usize> SeparableStages<'_, L, N> {

@@ -1,6 +1,7 @@
 //! Stepper of contact Gauss collocation with equal steps in transformed time.
 
-use crate::gauss::consistent_start::ConsistentStart;
+use crate::gauss::initial_mass::InitialMass;
+use crate::gauss::integrator::check_step;
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::fixed_point::IterationOutcome;
@@ -12,16 +13,16 @@ use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
+use crate::{InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, TimeTransformation};
 use pulp::{Simd, WithSimd};
 
-/// The time transformation that a Lagrangian provides.
+/// The time transformation that a Lagrangian states.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OwnTransformation<'a, L>(pub &'a L);
+pub(crate) struct StatedTransformation<'a, L>(pub &'a L);
 
-impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformation<'_, L> {
+impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for StatedTransformation<'_, L> {
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
         self.0.dt_dtau(q)
@@ -45,17 +46,7 @@ impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformati
 /// The stage equations are solved by fixed-point iteration; a step that is too large for it fails with
 /// [`StepError::NotConverged`].
 ///
-/// ```
-/// use contact_geom::{legendre, systems::{Kepler, System}};
-/// use discrete_herglotz::{Stepper, gauss::Gauss};
-/// let kepler = Kepler::<2>::default();
-/// let start = kepler.initial();
-/// let gauss = Gauss::new(kepler, 6, 0.2)?;
-/// let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
-/// run.advance_to(10.0)?;
-/// assert!((run.time() - 10.0).abs() < 1e-14);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// A run by [`TransformedGauss`](crate::TransformedGauss) uses it.
 pub struct TransformedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
     arch: Instructions,
@@ -68,17 +59,16 @@ pub struct TransformedStepper<'a, L, C, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> TransformedStepper<'a, L, C, N> {
-    pub(crate) fn new(
-        lagrangian: &'a L,
-        (s, h): (usize, f64),
-        transformation: C,
-        probed: Option<Structure>,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<Self, InputError> {
-        let ConsistentStart { start, structure, inverse, .. } =
-            ConsistentStart::of(lagrangian, probed, t0, &state, guess)?;
+    /// A stepper at the start of a problem with `stages` from 1 to 16 and steps of length `h` in tau.
+    ///
+    /// # Errors
+    /// [`InputError::Stages`], [`InputError::Step`]; [`InputError::Unclaimed`] if the Lagrangian does not claim that it
+    /// is autonomous; [`InputError::TimeTransformation`] if the rate dt/dtau at the start is not positive and finite;
+    /// [`InputError::FirstStep`] if the mass matrix or the energy at the start is not regular or not finite.
+    pub fn new(problem: &Problem<'a, L, N>, stages: usize, h: f64, transformation: C) -> Result<Self, InputError> {
+        check_step(stages, h)?;
+        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
+        let InitialMass { inverse, .. } = InitialMass::of(problem)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
         }
@@ -91,7 +81,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let extension = Extension::new(Fictitious(transformation), t0, -energy);
-        let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
+        let (table, mass) = (StageTable::new(stages, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, false, &state, &start.v));
         Ok(TransformedStepper {
             general,
@@ -151,7 +141,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
             length = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
             self.general.reset(before);
             self.general.table = StageTable::new(self.general.table.s, length * way);
-            self.sweep(1).map_err(|halt| halt.cause)?;
+            self.take_steps(1).map_err(|halt| halt.cause)?;
             over = (self.time() - t_end) * way;
             if self.ends_at(t_end, before.t.value) {
                 // The stages belong to a step of another length than the next one, which must not be extrapolated from
@@ -175,7 +165,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
     }
 
     /// Takes steps by fixed-point iteration.
-    fn sweep(&mut self, steps: usize) -> Result<(), StepFailure> {
+    fn take_steps(&mut self, steps: usize) -> Result<(), StepFailure> {
         let TransformedStepper { general, taken, unresolved, .. } = self;
         self.arch.dispatch(AdvanceTransformed { general: &mut **general, unresolved, taken, steps })
     }
@@ -220,7 +210,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for Ad
         for taken in 0..self.steps {
             // L is autonomous.
             let t = self.general.extension.t.value;
-            let progress = self.general.step::<S>(t);
+            let progress = self.general.take_step::<S>(t);
             if progress != IterationOutcome::Done {
                 return Err(StepFailure { taken, cause: progress.into() });
             }
@@ -238,7 +228,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for 
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.lengthen();
         self.from = None;
-        let done = self.sweep(steps);
+        let done = self.take_steps(steps);
         self.tau += done.map_or_else(|halt| halt.taken, |()| steps) as f64 * self.h;
         done
     }
@@ -258,7 +248,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for 
             self.lengthen();
             let before = self.general.values();
             self.from = None;
-            self.sweep(1).map_err(|refused| halt(taken, refused.cause))?;
+            self.take_steps(1).map_err(|refused| halt(taken, refused.cause))?;
             if !self.ends_at(t_end, before.t.value)
                 && (self.time() - t_end) * self.h > 0.0
                 && let Err(cause) = self.shorten(&before, t_end)

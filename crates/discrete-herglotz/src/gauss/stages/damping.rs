@@ -1,27 +1,11 @@
 //! Damped Newton iteration for the stages of a step: the choice of the damping factor, and the detection of failure.
 
-/// The largest number of iterations of a step: three times the number for forces that grow like a third power.
-pub(crate) const ITERATIONS: u32 = 24;
-
-/// The damping factor that is tried if the full correction fails the test. Smaller factors find few further solutions,
-/// and each of them costs an evaluation.
-const SHORT: f64 = 0.3;
-
-/// The relative decrease of the next correction that the test requires of a full correction; for a damped one it is
-/// multiplied by the damping factor.
-const GAIN: f64 = 0.25;
-
-/// The ratio of two successive corrections above which the Jacobian is recomputed. An iteration with the old Jacobian
-/// costs at most a tenth of one with a new Jacobian.
-const CONTRACTION: f64 = 0.2;
-
-/// The number of unknowns from which on a factorisation costs more than a step whose iteration contracts.
-const DEAR: usize = 16;
+use crate::gauss::limits::{DAMPING_FACTOR, EXPENSIVE_FACTORISATION, MAX_CONTRACTION, MIN_DECREASE};
 
 /// The number of corrections that may be taken although they fail the test: one for a small number of unknowns, where a
 /// factorisation is inexpensive.
 pub(crate) fn chances(unknowns: usize) -> u32 {
-    u32::from(unknowns < DEAR)
+    u32::from(unknowns < EXPENSIVE_FACTORISATION)
 }
 
 /// The decision on a trial.
@@ -62,7 +46,7 @@ impl Damping {
 
     /// Whether the next correction needs a new Jacobian; if not, it is the one that the last trial has computed.
     pub fn renews(&self) -> bool {
-        self.ratio > CONTRACTION
+        self.ratio > MAX_CONTRACTION
     }
 
     /// The size of the next correction divided by that of the last; 1 if the last correction was damped.
@@ -73,7 +57,7 @@ impl Damping {
     /// Decides on a trial from the sizes of its correction and of the next one; corrections below `near` are always
     /// accepted.
     pub fn judge(&mut self, correction: f64, next: f64, near: f64) -> Verdict {
-        let smaller = next <= (1.0 - GAIN * self.part) * correction;
+        let smaller = next <= (1.0 - MIN_DECREASE * self.part) * correction;
         let regardless = (self.regardless || correction <= near) && next.is_finite();
         if smaller || regardless {
             self.ratio = match self.part {
@@ -85,7 +69,7 @@ impl Damping {
             return Verdict::Taken;
         }
         if !self.regardless && self.part == 1.0 {
-            self.part = SHORT;
+            self.part = DAMPING_FACTOR;
         } else if !self.regardless && self.chances > 0 {
             self.chances -= 1;
             (self.part, self.regardless) = (1.0, true);
@@ -99,11 +83,12 @@ impl Damping {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 
     /// The damped iteration for `f(x) = 0`: the number of trials, and the root if it converges.
     fn follow(f: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64, mut x: f64, chances: u32) -> (u32, Option<f64>) {
         let (mut damping, mut trials) = (Damping::new(chances), 0);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_NEWTON_ITERATIONS {
             let slope = slope(x);
             let correction = -f(x) / slope;
             x = loop {
@@ -132,7 +117,7 @@ mod tests {
     /// `x^2 + 1` has no root, and the second function is not defined at its first iterate.
     #[test]
     fn what_has_no_root_is_given_up() {
-        for chances in [chances(DEAR), chances(1)] {
+        for chances in [chances(EXPENSIVE_FACTORISATION), chances(1)] {
             for start in [0.3, 2.0, 1e3] {
                 let (trials, x) = follow(|x| x * x + 1.0, |x| 2.0 * x, start, chances);
                 assert!(x.is_none() && trials <= 60, "{trials} from {start}: {x:?}");

@@ -2,7 +2,8 @@
 //! for the discrete Lagrangian. For constant mass and constant rate
 //! [`PositionNewton`](crate::gauss::stages::position_newton::PositionNewton) has fewer unknowns.
 
-use crate::gauss::stages::damping::{Damping, ITERATIONS, Verdict, chances};
+use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
+use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
@@ -336,7 +337,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             return Err(StepError::NonFinite);
         }
         let (mut damping, mut change) = (Damping::new(chances(residual.len())), f64::INFINITY);
-        for iterations in 1..=ITERATIONS {
+        for iterations in 1..=MAX_NEWTON_ITERATIONS {
             if damping.renews() {
                 self.jacobian(given, x, l, jacobian);
                 lu.factorise(|i, j| jacobian[(i, j)])?;
@@ -373,7 +374,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             }
             from.copy_from(x);
         }
-        Err(StepError::NotConverged { residual: change, iterations: ITERATIONS })
+        Err(StepError::NotConverged { residual: change, iterations: MAX_NEWTON_ITERATIONS })
     }
 
     /// The end of a solved step, from L and its gradient at the stages.

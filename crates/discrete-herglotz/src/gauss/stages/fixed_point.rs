@@ -1,6 +1,7 @@
 //! Convergence test of the iterations for the stages.
 
 use crate::StepError;
+use crate::gauss::limits::{MAX_INCREASES, MAX_ITERATIONS, MAX_SECANT_CHANGE, MAX_SECANT_RATIO, ROUND_OFF_CHANGE};
 
 /// The outcome of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +11,7 @@ pub(crate) enum IterationOutcome {
     /// The stages are solved to round-off.
     Done,
     /// The iteration does not converge; the largest change of the last iteration, relative to the terms.
-    Slow { change: f64, sweeps: u32 },
+    Slow { change: f64, iterations: u32 },
     /// A value is not finite.
     NonFinite,
     /// The integrating factor of a stage is not positive.
@@ -26,27 +27,12 @@ impl From<IterationOutcome> for StepError {
         match refused {
             IterationOutcome::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
             IterationOutcome::StageFactor { rho } => StepError::StageFactor { rho },
-            IterationOutcome::Slow { change, sweeps } => {
-                StepError::NotConverged { residual: change, iterations: sweeps }
-            }
+            IterationOutcome::Slow { change, iterations } => StepError::NotConverged { residual: change, iterations },
             IterationOutcome::Branched => StepError::Branched,
             _ => StepError::NonFinite,
         }
     }
 }
-
-/// The number of iterations after which the iteration counts as not converging.
-const LIMIT: u32 = 60;
-
-/// The largest relative change for which the last two values of a force determine its slope.
-const TELLING: f64 = 0.1;
-
-/// The number of simplified Newton iterations above which the Jacobian is recomputed: three times the usual number.
-pub(crate) const SLOW: u32 = 18;
-
-/// The smallest number of steps for which a Jacobian is kept, unless a step fails: second derivatives by dual numbers
-/// cost as much as ten steps.
-pub(crate) const AGE: u32 = 16;
 
 /// The convergence test of a fixed-point iteration or simplified Newton iteration in one step.
 ///
@@ -64,8 +50,8 @@ pub(crate) struct FixedPointIteration {
     ratio: f64,
     /// Whether a secant step, without evaluations of the force, lies between the last change and the next, and whether
     /// one is to follow the last iteration.
-    ahead: bool,
-    ends_ahead: bool,
+    secant: bool,
+    ends_with_secant: bool,
     risen: u32,
     /// Whether the last iteration has moved the positions by no more than their round-off. For stiff forces this
     /// changes the accelerations by more than the round-off of the accelerations.
@@ -99,26 +85,26 @@ impl FixedPointIteration {
     /// Whether a secant step follows this change, given relative to the terms: if the changes decrease, and are small
     /// enough to determine the slope of the force. The caller must then take it.
     pub fn secant_step(&mut self, change: f64) -> bool {
-        self.ahead = self.count > 1 && self.ratio < 0.5 && change <= TELLING;
-        self.ahead
+        self.secant = self.count > 1 && self.ratio < MAX_SECANT_RATIO && change <= MAX_SECANT_CHANGE;
+        self.secant
     }
 
     /// Whether the iteration ends with one more secant step: its end was predicted from a change that followed one.
-    pub fn ends_ahead(&self) -> bool {
-        self.ends_ahead
+    pub fn ends_with_secant(&self) -> bool {
+        self.ends_with_secant
     }
 
     /// Evaluates an iteration by its largest change and the largest term.
     #[inline(always)]
-    pub fn judge(&mut self, change: f64, size: f64) -> IterationOutcome {
+    pub fn assess(&mut self, change: f64, size: f64) -> IterationOutcome {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
-        let ahead = std::mem::take(&mut self.ahead);
+        let secant = std::mem::take(&mut self.secant);
         if change <= self.enough * round_off {
             return IterationOutcome::Done;
         }
-        if self.last && change <= 256.0 * round_off {
-            self.ends_ahead = ahead;
+        if self.last && change <= ROUND_OFF_CHANGE * round_off {
+            self.ends_with_secant = secant;
             return IterationOutcome::Done;
         }
         if !(change + size).is_finite() {
@@ -132,18 +118,18 @@ impl FixedPointIteration {
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
             if next <= self.left * round_off {
-                self.ends_ahead = ahead;
+                self.ends_with_secant = secant;
                 return IterationOutcome::Done;
             }
             self.last = next * expected <= self.left * round_off;
             if ratio >= 1.0 {
-                if change <= 256.0 * round_off || self.still {
+                if change <= ROUND_OFF_CHANGE * round_off || self.still {
                     return IterationOutcome::Done;
                 }
                 self.risen += 1;
             }
-            if self.risen > 3 || self.count > LIMIT {
-                return IterationOutcome::Slow { change: change / size, sweeps: self.count };
+            if self.risen > MAX_INCREASES || self.count > MAX_ITERATIONS {
+                return IterationOutcome::Slow { change: change / size, iterations: self.count };
             }
             self.ratio = ratio;
         }

@@ -2,7 +2,8 @@
 //! derivative of the force at each stage.
 
 use crate::StepError;
-use crate::gauss::stages::damping::{Damping, ITERATIONS, Verdict, chances};
+use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
+use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::tables::condensed::Condensed;
 use crate::solve::DenseLu;
 use crate::solve::mass_matrix::BLOCK;
@@ -140,7 +141,7 @@ impl<const N: usize> PositionNewton<N> {
         }
         let mut damping = Damping::new(chances);
         let mut change = f64::INFINITY;
-        for iterations in 1..=ITERATIONS {
+        for iterations in 1..=MAX_NEWTON_ITERATIONS {
             if damping.renews() {
                 self.factorise(at)?;
                 self.correction.copy_from_slice(&self.residual);
@@ -179,7 +180,7 @@ impl<const N: usize> PositionNewton<N> {
                 return Ok(iterations + 1);
             }
         }
-        Err(StepError::NotConverged { residual: change, iterations: ITERATIONS })
+        Err(StepError::NotConverged { residual: change, iterations: MAX_NEWTON_ITERATIONS })
     }
 
     /// Evaluates the accelerations and the residual at the trial positions.
@@ -230,8 +231,10 @@ fn extent(x: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::gauss::Gauss;
+    use crate::gauss::GaussStepper;
     use crate::gauss::stages::equations::{Given, StageEquations};
     use crate::{DiscreteLagrangian, Stepper, solve::Solver};
+    use crate::{Problem, Start, StepperOptions};
     use contact_geom::{PhasePoint, Scalar, Structure, numbers::max_or_nan};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -332,9 +335,9 @@ mod tests {
             Structure::default(),
         ] {
             let hill = Hill { count: AtomicUsize::new(0), claims };
-            let gauss = Gauss::new(&hill, 8, 5.0).unwrap();
             let start = PhasePoint::new([1.0], [0.5], 0.2);
-            let mut run = gauss.stepper(0.0, start, [0.5].into()).unwrap();
+            let problem = Problem::new(&hill, 0.0, Start::Momentum(start, [0.5].into())).unwrap();
+            let mut run = GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, watched: false }).unwrap();
             let halt = run.advance(3).unwrap_err();
             assert!(halt.taken == 0 && matches!(halt.cause, StepError::NotConverged { .. }), "{halt:?}");
             assert_eq!(run.state(), start);

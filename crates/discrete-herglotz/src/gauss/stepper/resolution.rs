@@ -1,11 +1,12 @@
 //! Whether the steps of a run resolve the motion.
 
-use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample, SAMPLE_SETS};
+use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
 use crate::gauss::resolution::sequence::FEW_STAGES;
 use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail::ROUNDINGS;
+use crate::gauss::routes::StageRoute;
 use crate::gauss::stages::parametrization::Physical;
-use crate::gauss::stepper::{GaussStepper, Route};
+use crate::gauss::stepper::{GaussStepper, Route, with_route};
 use crate::resolution::monitor::{defect, sharper, size, value_rounding};
 use crate::{Stepper, UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
@@ -72,8 +73,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
         }
         self.watch.first.or_else(|| {
-            // A linear motion that is not resolved is unresolved in every step; no step was sampled during the run.
-            let sets = if let Route::Linear(..) = &*self.route { SAMPLE_SETS } else { 1 };
+            let sets = with_route!(&*self.route, run => StageRoute::sample_sets(run));
             let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
             // For fewer stages the defect between the nodes is large even in resolved steps.
             let allowed = if self.s > FEW_STAGES { UNRESOLVED } else { 1.0 };
@@ -130,27 +130,10 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for LookAtStages<'_, '_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
-        let GaussStepper { s, h, route, solved, from, k, t0, .. } = self.run;
-        if !solved {
-            return None;
-        }
-        let start = self.run.phase(from);
-        let t = t0 + k.checked_sub(1)? as f64 * h;
-        let mut curve = Curve::new(*s, t, *h, &start);
-        match &**route {
-            Route::Linear(run, table) => {
-                let a = run.accelerations(&from.q, &from.y);
-                let x = table.positions(&from.q, &from.y, &a);
-                let [a, x] = [a, x].map(|y| y.map(crate::numbers::registers::Stages));
-                let mass = self.run.mass.as_deref();
-                curve.of_accelerations::<S, L>(self.run.lagrangian, table, mass, &from.y, [&a, &x]);
-            }
-            Route::Condensed(run) => {
-                let mass = self.run.mass.as_deref();
-                curve.of_accelerations::<S, L>(self.run.lagrangian, &run.table, mass, &from.y, [&run.a, &run.x]);
-            }
-            Route::General(run) => curve.of_solved(&run.solved()),
-        }
+        let GaussStepper { s, h, route, .. } = self.run;
+        let step = self.run.last_step()?;
+        let mut curve = Curve::new(*s, step.t, *h, &self.run.phase(step.from));
+        with_route!(&**route, run => run.collect::<S>(&step, &mut curve));
         Some(curve)
     }
 }

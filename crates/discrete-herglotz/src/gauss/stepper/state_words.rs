@@ -1,6 +1,6 @@
 //! Saving and restoring the state of a run of contact Gauss collocation.
 
-use crate::gauss::stepper::{GaussStepper, Route, Sequence, Solution};
+use crate::gauss::stepper::{GaussStepper, Route, Sequence, Solution, with_route};
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use contact_geom::Lagrangian;
 
@@ -8,11 +8,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// The data that change from step to step, as 64-bit words.
     pub(crate) fn words(&self) -> Vec<u64> {
         let mut to = Vec::new();
-        match &*self.route {
-            Route::Linear(run, _) => run.save(&mut to),
-            Route::Condensed(run) => run.save(&mut to),
-            Route::General(run) => run.save(&mut to),
-        }
+        with_route!(&*self.route, run => run.save(&mut to));
         self.k.save(&mut to);
         self.from.save(&mut to);
         self.solved.save(&mut to);
@@ -26,11 +22,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
 
     /// Reads back what [`words`](Self::words) has written; `None` if the words do not fit.
     pub(crate) fn read(&mut self, from: &mut &[u64]) -> Option<()> {
-        match &mut *self.route {
-            Route::Linear(run, _) => run.load(from)?,
-            Route::Condensed(run) => run.load(from)?,
-            Route::General(run) => run.load(from)?,
-        }
+        with_route!(&mut *self.route, run => run.load(from))?;
         self.k.load(from)?;
         self.from.load(from)?;
         self.solved.load(from)?;

@@ -68,9 +68,10 @@ fn instruction_sets() -> Vec<Arch> {
 
 /// Takes 100 steps from `q < 0` and compares each with the same step over `f64`. Returns the number of steps that cross
 /// the kink, and the number solved by a Newton method.
-fn follow(gauss: &Gauss<OneSided>, set: Arch, route: GaussRoute) -> (usize, u64) {
-    let start = PhasePoint::new([-0.4], [0.0], 0.0);
-    let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
+fn follow(spring: OneSided, stages: usize, set: Arch, route: GaussRoute) -> (usize, u64) {
+    let gauss = Gauss::new(spring, stages, 0.2).unwrap();
+    let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
+    let mut run = GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, watched: false }).unwrap();
     assert_eq!(run.route(), route);
     run.arch = Instructions::only(set);
     let mut across = 0;
@@ -92,9 +93,8 @@ fn follow(gauss: &Gauss<OneSided>, set: Arch, route: GaussRoute) -> (usize, u64)
 fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
     for ((route, claims), how) in routes().into_iter().flat_map(|r| [How::Max, How::Select, How::Abs].map(|h| (r, h))) {
         for stages in [2, 5, 8] {
-            let gauss = Gauss::new(OneSided { how, claims }, stages, 0.2).unwrap();
             for set in instruction_sets() {
-                let (across, by_newton) = follow(&gauss, set, route);
+                let (across, by_newton) = follow(OneSided { how, claims }, stages, set, route);
                 assert!(across >= 4, "{across} steps go across the kink");
                 assert_eq!(by_newton, 0, "{how:?} {route:?} {set:?}");
             }
@@ -105,12 +105,14 @@ fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
 /// Updating the stage actions with the positions within an iteration saves at least 5 per cent of the evaluations for
 /// these motions, and the results agree to the accumulated round-off.
 #[test]
-fn actions_that_follow_spare_sweeps_and_change_nothing() {
+fn actions_that_follow_spare_iterations_and_change_nothing() {
     let (steps, start) = (100, PhasePoint::new([1.0], [0.5], 0.8));
     for (stages, h) in [(4, 0.1), (8, 0.5), (8, 1.0), (16, 0.5), (16, 1.0)] {
-        let gauss = Gauss::new(QuadraticInZ::default(), stages, h).unwrap();
+        let system = QuadraticInZ::default();
+        let problem = Problem::new(&system, 0.0, start).unwrap();
         let [(with, a), (without, b)] = [true, false].map(|follows| {
-            let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
+            let mut run =
+                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, watched: false }).unwrap();
             let Route::General(general) = &mut *run.route else { panic!("z does not drive the motion") };
             general.follows &= follows;
             run.advance(steps).unwrap();
@@ -130,13 +132,14 @@ fn actions_that_follow_spare_sweeps_and_change_nothing() {
 #[test]
 fn lanes_have_no_value_to_branch_on() {
     for (route, claims) in routes() {
-        let gauss = Gauss::new(OneSided { how: How::Branch, claims }, 8, 0.2).unwrap();
+        let spring = OneSided { how: How::Branch, claims };
+        let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
         for set in instruction_sets() {
             if matches!(set, Arch::Scalar) {
-                assert!(follow(&gauss, set, route).0 >= 4);
+                assert!(follow(spring, 8, set, route).0 >= 4);
                 continue;
             }
-            let mut run = gauss.stepper(0.0, PhasePoint::new([-0.4], [0.0], 0.0), SVector::zeros()).unwrap();
+            let mut run = GaussStepper::new(&problem, 8, 0.2, StepperOptions { action: true, watched: false }).unwrap();
             run.arch = Instructions::only(set);
             assert_eq!(run.advance(3), Err(StepFailure { taken: 0, cause: StepError::Branched }), "{set:?}");
         }

@@ -3,6 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use crate::gauss::limits::MIN_PIVOT;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::compensated::{Unevaluated, exact_sum};
 use crate::numbers::double_double::{ExactRow, solve_exactly};
@@ -204,7 +205,7 @@ impl Condensed {
             from_fn(|i| from_fn(|j| if i == j { 1.0 } else { 0.0 } + kappa * self.b[i][j].0));
         if kappa != 0.0 {
             for k in 0..s {
-                if left[k][k].abs() < 1e-3 {
+                if left[k][k].abs() < MIN_PIVOT {
                     return None;
                 }
                 let inverse = 1.0 / left[k][k];

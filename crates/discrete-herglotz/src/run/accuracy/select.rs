@@ -129,7 +129,7 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     }
     let Err(Ended::SwitchReason(SwitchReason::TimeTransformation)) = found else { return Ok(found?) };
     // If the search in transformed time fails, equal steps are tried.
-    let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss { stages: TRANSFORMED_STAGES });
+    let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss::new(TRANSFORMED_STAGES));
     Ok(in_transformed_time(trials, &transformed, TRANSFORMED_STAGES).or_else(|ended| match ended {
         Ended::Refused(InputError::Interrupted) => Err(ended),
         _ => by_equal_steps(trials, &gauss(stages), stages),

@@ -1,11 +1,12 @@
 //! The cost of the step-size selection.
 
 use crate::Problem;
+use crate::gauss::GaussStepper;
 use crate::run::accuracy::select::choose_with;
 use crate::run::accuracy::trial_runs::{BUDGET, TrialRuns};
 use crate::run::request::{Request, Shared};
 use crate::run::{OutputRequest, Until};
-use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
+use crate::{AnyIntegrator, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
@@ -76,8 +77,7 @@ fn steps_that_cost_less_are_taken() {
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 1.0)).unwrap();
     let (_, count, _) = search(&problem, 100.0, None, 1e-3);
     let newton_steps = |count: usize| {
-        let mut run =
-            GaussCollocation { stages: 8 }.run(&problem, 100.0 / count as f64, StepperOptions::default()).unwrap();
+        let mut run = GaussStepper::new(&problem, 8, 100.0 / count as f64, StepperOptions::default()).unwrap();
         run.advance(count).unwrap();
         run.newton_steps()
     };

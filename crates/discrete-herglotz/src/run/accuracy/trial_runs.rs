@@ -1,6 +1,7 @@
 //! Trial runs: a motion that is computed with a given number of steps, recorded at a few common times, and sampled for
 //! defects between its nodes.
 
+use crate::gauss::routes::transformed::StatedTransformation;
 use crate::gauss::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 use crate::integration::check_claims::violated_claim;
 use crate::run::accuracy::noise::{DECAYED, all_together};
@@ -10,8 +11,8 @@ use crate::run::discretization::Discretization;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
 use crate::{
-    GaussCollocation, InputError, StepError, StepFailure, Stepper, TransformedGauss,
-    gauss::{GaussRoute, GaussStepper},
+    InputError, StepError, StepFailure, Stepper,
+    gauss::{GaussRoute, GaussStepper, TransformedStepper},
 };
 use crate::{Interrupt, Problem, StepperOptions};
 use contact_geom::{Defect, Lagrangian, numbers::max_or_nan};
@@ -243,18 +244,19 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let points = if closely { POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
         let course = TrialSettings { count, marks, points, narrow, price: EvaluationCost::of::<N>(stages) };
         if const { L::HINTS.time_transformation } && matches!(marks, ComparisonGrid::Times) {
-            let mut stepper = match (TransformedGauss { stages }).run(problem, h) {
-                Ok(stepper) => stepper,
-                Err(error) => return halted_at_the_start(error),
-            };
+            let mut stepper =
+                match TransformedStepper::new(problem, stages, h, StatedTransformation(problem.lagrangian)) {
+                    Ok(stepper) => stepper,
+                    Err(error) => return halted_at_the_start(error),
+                };
             let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let gauss = GaussCollocation { stages };
+        let options = StepperOptions::default();
         if const { L::HINTS.switching_functions }
             && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?
         {
-            let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| gauss.run(problem, h, StepperOptions::default());
+            let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| GaussStepper::new(problem, stages, h, options);
             let mut stepper = match SwitchingStepper::new(problem, h, Reach::Inside, make) {
                 Ok(stepper) => stepper.keeping_parts(),
                 Err(error) => return halted_at_the_start(error),
@@ -266,7 +268,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
                 (look, parts.iter().map(GaussStepper::newton_steps).sum())
             });
         }
-        let mut stepper = match gauss.run(problem, h, StepperOptions::default()) {
+        let mut stepper = match GaussStepper::new(problem, stages, h, options) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };

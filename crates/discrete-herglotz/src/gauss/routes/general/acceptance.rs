@@ -2,6 +2,7 @@
 //! the motion.
 
 use crate::gauss::dense::Solved;
+use crate::gauss::limits::MAX_UNCHECKED_FACTOR_CHANGE;
 use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, of_sigma};
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::parametrization::Parametrization;
@@ -15,20 +16,17 @@ use contact_geom::{Lagrangian, VelocityPoint, numbers::max_or_nan, support::grad
 use pulp::Simd;
 use std::array::from_fn;
 
-/// The change of the integrating factor in a step above which it is compared with the integral of `L_z`.
-const STRONG: f64 = 0.2;
-
 impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// Sets the defect of the last step. `first` is the relative error of its predictor; the stages are checked only if
     /// it is large, and the conformal factor also if it changes strongly.
     #[inline(always)]
-    pub(crate) fn judge<S: Simd>(&mut self, first: f64) {
+    pub(crate) fn assess_resolution<S: Simd>(&mut self, first: f64) {
         self.defect = 0.0;
         if first > FORETOLD {
             let rates = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
             self.defect = self.tail.defect::<S, N>(&self.v, rates, &self.x, self.table.h);
         }
-        if first > FORETOLD || self.one_minus_rho.abs() > STRONG {
+        if first > FORETOLD || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {
             let one = Lanes::<S>::splat(1.0);
             let mut integral = Lanes::<S>::splat(0.0);
             for r in 0..blocks::<S>(self.table.s) {

@@ -38,7 +38,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
     /// Intermediate results stay in registers until they are used, since a round trip through memory is slower. The
     /// code uses loops: closures may be compiled as separate functions without vector instructions.
     #[inline(always)]
-    pub(crate) fn sweep<S: Simd>(&mut self) -> f64 {
+    pub(crate) fn iterate<S: Simd>(&mut self) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
         let mut seen = Changes { change: [zero; 3], size: [zero, one, zero] };
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, &mut seen));

@@ -6,10 +6,13 @@
 mod acceptance;
 mod evaluation;
 mod iteration;
+mod route;
 mod state_words;
 
+use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON};
 use crate::gauss::resolution::tail::Tail;
-use crate::gauss::stages::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
+use crate::gauss::stages::equations::{Products, Workspace};
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::parametrization::{Extension, Parametrization, Values};
 use crate::gauss::stages::simplified_newton::{CorrectStages, StageNewton};
@@ -23,10 +26,6 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
-
-/// The largest dimension for which W is inverted at several stages at once, in SIMD lanes; the matrices are on the
-/// stack.
-const MOST_IN_LANES: usize = 8;
 
 /// The state and the workspace of the general step.
 ///
@@ -85,6 +84,8 @@ pub(crate) struct General<'a, L, P, const N: usize> {
     pub defect: f64,
     /// The simplified Newton iteration while it is not used.
     suspended_newton: Option<Box<StageNewton<N>>>,
+    /// The workspace of Newton's method; made for the first step in which the fixed-point iteration does not converge.
+    by_newton: Option<Box<(Products, Workspace<N>)>>,
     /// Whether the stages of the next step are solved already, with their solution in `v`, `l` and
     /// `one_minus_rho_stages`.
     pub(crate) solved: bool,
@@ -97,13 +98,13 @@ pub(crate) struct General<'a, L, P, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L, P, N> {
-    /// The step from a state with its velocity, or a guess of it; `driven` states that L is not affine in z.
+    /// The step from a state with its velocity, or a guess of it; `z_drives` states that L is not affine in z.
     pub fn new(
         lagrangian: &'a L,
         extension: Extension<P>,
         table: StageTable,
         mass: Mass<N>,
-        driven: bool,
+        z_drives: bool,
         state: &PhasePoint<N>,
         v: &SVector<f64, N>,
     ) -> Self {
@@ -115,7 +116,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             table,
             mass,
             // In transformed time the times of the stages change too.
-            follows: driven && P::PHYSICAL,
+            follows: z_drives && P::PHYSICAL,
             q: [0.0.into(); N],
             p: [0.0.into(); N],
             z: 0.0.into(),
@@ -135,6 +136,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             tail,
             defect: 0.0,
             suspended_newton: None,
+            by_newton: None,
             solved: false,
             predicted: false,
             known: (*v).into(),
@@ -160,20 +162,15 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
 
     /// Switches to simplified Newton iteration with these derivatives of L; `false` if the Jacobian is singular or not
     /// finite.
-    pub fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
+    fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
         if self.newton.is_none() {
             self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
         }
         self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
     }
 
-    /// Returns to fixed-point iteration.
-    pub fn suspend_newton(&mut self) {
-        self.suspended_newton = self.newton.take();
-    }
-
     /// Sets the solved stages of the next step: their velocities, values of L and integrating factors.
-    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+    fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
         self.predict(stages);
         (self.predicted, self.solved) = (false, true);
     }
@@ -248,7 +245,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         if matches!(self.mass, Mass::Constant(_)) {
             return true;
         }
-        if const { N > MOST_IN_LANES } {
+        if const { N > MAX_DIMENSION_IN_LANES } {
             return self.invert_one_by_one(t);
         }
         for r in 0..blocks::<S>(self.table.s) {
@@ -298,7 +295,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
+    pub fn take_step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         let (solved, predicted) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.predicted));
         // Without a preceding step the initial guess is a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
@@ -321,7 +318,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         if !self.invert_mass::<S>(t) {
             return IterationOutcome::NonFinite;
         }
-        let mut sweeps = FixedPointIteration::until(1.0, 0.25);
+        let mut iteration = FixedPointIteration::until(1.0, 0.25);
         // The extrapolated L_v are not those of the extrapolated velocities. A small first change then proves nothing,
         // and the convergence test starts again with the next iteration.
         let mut carried = !cold && !solved;
@@ -332,15 +329,15 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
                 f64::INFINITY
             } else if self.newton.is_some() {
                 let (change, moved) = self.correct();
-                sweeps.still = moved <= 4.0 * f64::EPSILON;
+                iteration.still = moved <= 4.0 * f64::EPSILON;
                 change
             } else {
-                self.sweep::<S>()
+                self.iterate::<S>()
             };
             let of_transformed = self.evaluate::<S>(t);
             if solved {
                 let outcome = self.finish::<S>();
-                self.judge::<S>(f64::INFINITY);
+                self.assess_resolution::<S>(f64::INFINITY);
                 return outcome;
             }
             if cold {
@@ -353,14 +350,14 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             } else {
                 change
             };
-            match sweeps.judge(change, 1.0) {
+            match iteration.assess(change, 1.0) {
                 IterationOutcome::Continue => {}
-                IterationOutcome::Done if carried => sweeps = FixedPointIteration::until(1.0, 0.25),
+                IterationOutcome::Done if carried => iteration = FixedPointIteration::until(1.0, 0.25),
                 IterationOutcome::Done => {
                     let outcome = self.finish::<S>();
-                    self.judge::<S>(sweeps.first());
+                    self.assess_resolution::<S>(iteration.first());
                     self.age = self.age.saturating_add(1);
-                    if self.newton.is_some() && sweeps.count() > SLOW && self.age > AGE {
+                    if self.newton.is_some() && iteration.count() > SLOW_NEWTON && self.age > MIN_JACOBIAN_AGE {
                         self.renew(t);
                     }
                     return outcome;
@@ -372,7 +369,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         }
     }
 
-    /// One simplified Newton iteration, in place of [`sweep`](Self::sweep).
+    /// One simplified Newton iteration, in place of [`iterate`](Self::iterate).
     #[cold]
     #[inline(never)]
     fn correct(&mut self) -> (f64, f64) {

@@ -1,20 +1,18 @@
 //! The slope of the force: its estimate in the matrix of the iteration, and secant steps between iterations.
 
+use crate::gauss::limits::LONG_RUN;
 use crate::gauss::routes::separable::SeparableStages;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
 use contact_geom::Lagrangian;
 use pulp::Simd;
 
-/// The number of steps after which the matrix of the iteration is expected to be kept for long.
-const LASTING: usize = 64;
-
 impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
     /// Stores the positions and `rest` of this iteration in `[x, rest]`. With `ahead` it first takes a secant step,
     /// which uses the slope of the force between the last two iterations instead of an evaluation. For one coordinate
     /// only: a force of several coordinates has no such slope.
     #[inline(always)]
-    pub(crate) fn sweep_ahead<S: Simd>(&mut self, [x, rest]: &mut [Stages; 2], ahead: bool) {
+    pub(crate) fn store_values<S: Simd>(&mut self, [x, rest]: &mut [Stages; 2], ahead: bool) {
         let (s, base) = (self.table.s, &self.base[0]);
         let mut next = Stages::ZERO;
         if ahead {
@@ -50,9 +48,9 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
     }
 
     /// Estimates the slope of the force, and refines the matrices if they are expected to be kept for long.
-    pub(crate) fn look_again(&mut self) {
+    pub(crate) fn update_matrix(&mut self) {
         self.adapt();
-        if self.taken >= LASTING {
+        if self.taken >= LONG_RUN {
             self.left.refine(&self.table);
         }
     }
@@ -90,10 +88,8 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{
-        Stepper,
-        gauss::{Gauss, GaussRoute},
-    };
+    use crate::gauss::{GaussRoute, GaussStepper};
+    use crate::{Problem, Stepper, StepperOptions};
     use contact_geom::nalgebra::SVector;
     use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 
@@ -113,25 +109,26 @@ mod tests {
     /// The first coordinate after 100 units of time, the iterations per step, and the number of steps by Newton
     /// methods.
     fn motion<const N: usize>(stages: usize, h: f64) -> (f64, f64, u64) {
-        let gauss = Gauss::new::<N>(Anharmonic, stages, h).unwrap();
         let start = PhasePoint::new(std::array::from_fn(|i| 1.2 * (i == 0) as u8 as f64), [0.0; N], 0.0);
-        let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
+        let problem = Problem::new(&Anharmonic, 0.0, start).unwrap();
+        let mut run = GaussStepper::new(&problem, stages, h, StepperOptions { action: true, watched: false }).unwrap();
         assert_eq!(run.route(), GaussRoute::Condensed);
         let steps = (100.0 / h).round() as usize;
         run.advance(steps).unwrap();
-        let sweeps = run.evaluations() as f64 / (stages * steps) as f64;
-        (run.state().q[0], sweeps, run.newton_steps())
+        let iterations = run.evaluations() as f64 / (stages * steps) as f64;
+        (run.state().q[0], iterations, run.newton_steps())
     }
 
     /// The motion of one coordinate agrees with the same motion beside a second coordinate at rest, for which no secant
     /// steps are taken; it needs fewer iterations, and no more steps by Newton methods. The positions may differ by 500
     /// units of round-off after about a hundred oscillations.
     #[test]
-    fn secants_spare_sweeps_and_change_nothing() {
+    fn secants_spare_iterations_and_change_nothing() {
         for (stages, h, part) in [(8, 0.25, 0.9), (8, 0.5, 0.85), (16, 0.5, 0.9), (16, 1.0, 0.9)] {
-            let ((q, sweeps, newton), (beside, more, more_newton)) = (motion::<1>(stages, h), motion::<2>(stages, h));
+            let ((q, iterations, newton), (beside, more, more_newton)) =
+                (motion::<1>(stages, h), motion::<2>(stages, h));
             assert!((q - beside).abs() <= 500.0 * f64::EPSILON, "gauss_{stages}, h = {h}: {q:e}, {beside:e}");
-            assert!(sweeps <= part * more, "gauss_{stages}, h = {h}: {sweeps}, {more} sweeps");
+            assert!(iterations <= part * more, "gauss_{stages}, h = {h}: {iterations}, {more} iterations");
             assert!(newton <= more_newton, "gauss_{stages}, h = {h}: {newton}, {more_newton} steps by Newton's method");
         }
     }
