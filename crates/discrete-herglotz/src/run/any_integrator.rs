@@ -15,7 +15,8 @@ use thiserror::Error;
 /// Any integrator of this crate, selected by name at run time. A program that uses this type compiles all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AnyIntegrator {
-    /// The flow of a discrete Lagrangian, each step by Newton's method.
+    /// The flow of a discrete Lagrangian, each step by Newton's method; for [`Method::Strang`] by the splitting of this
+    /// name, which has the same flow.
     Discrete(Method),
     /// [`GaussCollocation`].
     Gauss {
@@ -39,6 +40,11 @@ pub enum AnyIntegrator {
 macro_rules! each {
     ($any:expr, $integrator:ident => $result:expr) => {
         match $any {
+            // The discrete Lagrangian of Strang's splitting has the splitting's flow, which is explicit.
+            AnyIntegrator::Discrete(Method::Strang) => {
+                let $integrator = SplittingScheme::STRANG;
+                $result
+            }
             AnyIntegrator::Discrete($integrator) => $result,
             AnyIntegrator::Gauss { stages } => {
                 let $integrator = GaussCollocation { stages };
@@ -119,8 +125,6 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
 impl Display for AnyIntegrator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
-            // The name `strang` belongs to the splitting, which has its own stepper.
-            AnyIntegrator::Discrete(Method::Strang) => f.pad("discrete_strang"),
             AnyIntegrator::Discrete(method) => f.pad(method.name()),
             AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
             AnyIntegrator::TransformedGauss { stages } => f.pad(&format!("transformed_gauss_{stages}")),
@@ -136,8 +140,7 @@ impl FromStr for AnyIntegrator {
     type Err = UnknownIntegrator;
 
     fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
-        let all = Self::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]);
-        let named = all.into_iter().find(|integrator| integrator.to_string() == name);
+        let named = Self::all().into_iter().find(|integrator| integrator.to_string() == name);
         // `all` lists compositions of the midpoint rule only; compositions of the other rules are parsed here.
         let composed = || {
             let (rule, scheme) = name.split_once("_by_")?;
