@@ -70,7 +70,7 @@ pub struct Ensemble<'a, L, const N: usize> {
     pub(crate) action: bool,
     /// The number of steps from one recorded row to the next.
     pub(crate) rows: Option<usize>,
-    pub(crate) watched: bool,
+    pub(crate) check_resolution: bool,
     pub(crate) threads: Option<usize>,
     pub(crate) instructions: Instructions,
     pub(crate) checkpoint: Option<PathBuf>,
@@ -121,7 +121,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             length: None,
             action: true,
             rows: None,
-            watched: true,
+            check_resolution: true,
             threads: None,
             instructions: Instructions::new(),
             checkpoint: None,
@@ -152,8 +152,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 
     /// Omits the check in lanes whether the steps resolve the motion. For steps that are known not to resolve it, each
     /// member would otherwise have a run of its own.
-    pub fn unwatched(self) -> Self {
-        Ensemble { watched: false, ..self }
+    pub fn without_resolution_check(self) -> Self {
+        Ensemble { check_resolution: false, ..self }
     }
 
     /// Records states of each member in its [rows](Member::rows): the start, the state after every `steps` steps, and
@@ -272,13 +272,13 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
         }
         rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD))).map_err(refused)?;
-        let (members, count, instructions, watched) =
-            (&*self.members, self.count, self.instructions, self.watched && length.wanted().is_none());
+        let (members, count, instructions, check_resolution) =
+            (&*self.members, self.count, self.instructions, self.check_resolution && length.wanted().is_none());
         let mut task = Task {
             members,
             count,
             instructions,
-            watched,
+            check_resolution,
             integrator,
             common,
             plan,

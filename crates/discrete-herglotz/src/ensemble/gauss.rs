@@ -5,15 +5,16 @@
 
 use crate::ensemble::judge::Judge;
 use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
-use crate::gauss::FEW_STAGES;
-use crate::gauss::resolution::tail::{MOVED, of_sigma};
+use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::gauss::tables::condensed::Condensed;
-use crate::integration::interrupt::BETWEEN;
+use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::numbers::compensated_batch::{CompensatedBatch, Pair};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
-use crate::resolution::monitor::ROUNDED;
+use crate::resolution::thresholds::{
+    FEW_STAGES, MAX_LAST_COEFFICIENT_IN_LANES, MAX_TURN_IN_LANES, POSITION_ROUND_OFF, STAGE_ROUND_OFF,
+};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, StepError};
 use contact_geom::nalgebra::SVector;
@@ -57,19 +58,9 @@ struct Table {
     last: [f64; MAX_STAGES],
 }
 
-/// The last Legendre coefficient of the accelerations, relative to the largest acceleration, above which a step is
-/// suspect. A single run flags steps as unresolved from one half on, and samples the defect between the nodes of the
-/// last step.
-const TAIL: f64 = 0.1;
-
-/// For few stages, which have no such coefficient: the change of the acceleration from step to step, times the step
-/// size, relative to the velocity, above which a step is suspect. A single run flags two consecutive changes as
-/// unresolved if their sum exceeds one; in general the two are not equal.
-const TURN: f64 = 0.4;
-
 /// The factor by which the largest velocity for this comparison decreases from step to step; a single run compares with
 /// the largest velocity of three steps.
-const KEPT: f64 = 0.5;
+const VELOCITY_MEMORY: f64 = 0.5;
 
 impl Table {
     fn new(condensed: &Condensed) -> Self {
@@ -198,7 +189,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
                 moving.push(self.start::<S, K>(own));
             }
             for k in 0..self.steps {
-                if k % BETWEEN == 0 && self.interrupt.is_some_and(Interrupt::is_wanted) {
+                if k % STEPS_BETWEEN_QUERIES == 0 && self.interrupt.is_some_and(Interrupt::is_requested) {
                     interrupted(some);
                     break;
                 }
@@ -360,11 +351,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
                     size = size.max(a[d].abs());
                 }
             }
-            let moves = (tail * (h * h)).at_most(wide * MOVED, m.suspect, one);
-            m.suspect = tail.at_most(size * TAIL, m.suspect, moves);
+            let moves = (tail * (h * h)).at_most(wide * STAGE_ROUND_OFF, m.suspect, one);
+            m.suspect = tail.at_most(size * MAX_LAST_COEFFICIENT_IN_LANES, m.suspect, moves);
             return;
         }
-        let (mut turn, mut fast) = (zero, m.fast * KEPT);
+        let (mut turn, mut fast) = (zero, m.fast * VELOCITY_MEMORY);
         for d in 0..N {
             fast = fast.max(m.v[d].value.abs());
             if let Some(last) = last {
@@ -372,8 +363,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             }
         }
         m.fast = fast;
-        let moves = (turn * (h * h)).at_most(wide * ROUNDED, m.suspect, one);
-        m.suspect = (turn * h).at_most(fast * TURN, m.suspect, moves);
+        let moves = (turn * (h * h)).at_most(wide * POSITION_ROUND_OFF, m.suspect, one);
+        m.suspect = (turn * h).at_most(fast * MAX_TURN_IN_LANES, m.suspect, moves);
     }
 
     /// The terms that all iterations of a step have in common; with `tails` including those of the low parts of the

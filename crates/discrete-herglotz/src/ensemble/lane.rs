@@ -9,7 +9,7 @@ pub(crate) struct LaneOptions {
     /// The number of steps from one row to the next, if rows are recorded.
     pub rows: Option<usize>,
     /// Whether members are flagged whose steps may not resolve the motion.
-    pub watched: bool,
+    pub check_resolution: bool,
 }
 
 /// A member in a lane.

@@ -1,10 +1,10 @@
 //! Splittings for many motions in SIMD lanes.
 
 use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
-use crate::integration::interrupt::BETWEEN;
+use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
-use crate::resolution::monitor::ROUNDED;
+use crate::resolution::thresholds::{DRIFT_MARGIN_IN_LANES, POSITION_ROUND_OFF};
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
@@ -19,7 +19,7 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
-    look: DefectSample,
+    check: DriftCheck,
     h: f64,
     t0: f64,
     steps: usize,
@@ -32,7 +32,7 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
 /// flags as unresolved satisfy `omega^2 (s1^2 + s2^2) > 1` for an oscillation of frequency omega (see
 /// `resolution/monitor.rs`). In the longest drift, of length s, the change of the force times s then exceeds the
 /// fraction `s^2/(s1^2+s2^2)` of the momentum. A member for which this holds has a run of its own, which decides.
-struct DefectSample {
+struct DriftCheck {
     /// The index of the drift, and its length.
     stage: usize,
     span: f64,
@@ -40,14 +40,11 @@ struct DefectSample {
     turn: f64,
 }
 
-/// The fraction of the bound above which a step is suspect, for motions that do not turn uniformly.
-const MARGIN: f64 = 0.8;
-
 /// The factor by which the square of the largest momentum for this comparison decreases from step to step: a force that
 /// acts near a turning point is compared with the momenta of neighbouring steps.
-const KEPT: f64 = 0.9;
+const MOMENTUM_MEMORY: f64 = 0.9;
 
-impl DefectSample {
+impl DriftCheck {
     fn new(table: &SubstepTable) -> Self {
         let squares = || table.joined.iter().map(|stage| stage.span * stage.span);
         let (mut stage, mut longest) = (0, 0.0);
@@ -57,8 +54,8 @@ impl DefectSample {
             }
         }
         let pairs = squares().zip(squares().cycle().skip(1)).map(|(a, b)| a + b);
-        let turn = MARGIN * longest / max_abs_or_nan(pairs);
-        DefectSample { stage, span: longest.sqrt(), turn: turn * turn }
+        let turn = DRIFT_MARGIN_IN_LANES * longest / max_abs_or_nan(pairs);
+        DriftCheck { stage, span: longest.sqrt(), turn: turn * turn }
     }
 }
 
@@ -74,8 +71,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let form = SeparableForm::read(lagrangian, h, t0, state)?;
         let drag = Drag::of(&form, t0, state)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let look = DefectSample::new(&table);
-        Ok(SplittingPacks { form, drag, table, look, h, t0, steps, interrupt: None })
+        let check = DriftCheck::new(&table);
+        Ok(SplittingPacks { form, drag, table, check, h, t0, steps, interrupt: None })
     }
 
     /// Whether a single run would use compensated sums for a motion.
@@ -87,7 +84,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     /// finite at its start or at its end, its final state is not finite.
     pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
         let stride = options.rows.unwrap_or(self.steps);
-        match (action, options.watched) {
+        match (action, options.check_resolution) {
             (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
             (true, false) => instructions.dispatch(All::<_, N, true, false> { packs: self, lanes, stride }),
             (false, true) => instructions.dispatch(All::<_, N, false, true> { packs: self, lanes, stride }),
@@ -101,15 +98,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 const PACKS_IN_FLIGHT: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
-struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
+struct All<'s, 'a, L, const N: usize, const ACTION: bool, const CHECKED: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
     lanes: &'s mut [Lane<N>],
     /// The number of steps from one recorded state to the next.
     stride: usize,
 }
 
-impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> WithSimd
-    for All<'_, '_, L, N, ACTION, WATCH>
+impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const CHECKED: bool> WithSimd
+    for All<'_, '_, L, N, ACTION, CHECKED>
 {
     type Output = ();
 
@@ -119,9 +116,9 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
         // The registers of a pack share the constants that a stage reads; if a pack had more registers than the
         // processor, they would be spilled to memory.
         if const { N == 1 } {
-            packs.all::<S, 4, ACTION, WATCH>(lanes, stride);
+            packs.all::<S, 4, ACTION, CHECKED>(lanes, stride);
         } else {
-            packs.all::<S, 2, ACTION, WATCH>(lanes, stride);
+            packs.all::<S, 2, ACTION, CHECKED>(lanes, stride);
         }
     }
 }
@@ -172,7 +169,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
+    fn all<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
         lanes: &mut [Lane<N>],
         stride: usize,
@@ -184,7 +181,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
                 *m = Moving::from_lanes(own);
             }
-            let whole = self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
+            let whole = self.take_steps::<S, K, ACTION, CHECKED>(moving, stride, |t, w, at| {
                 for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.reach(t, at.state(i));
                     lane.suspect = at.suspect.lanes()[i] != 0.0;
@@ -199,7 +196,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     /// Takes all steps, with the operations of a single run in the same order. `reach` is called after each stride and
     /// at the end. Returns false if it was interrupted.
     #[inline(always)]
-    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
+    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
         moving: &mut [Moving<S, K, N>],
         stride: usize,
@@ -214,7 +211,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         while taken < *steps {
             let next = taken.saturating_add(stride).min(*steps);
             for k in taken..next {
-                if k % BETWEEN == 0 && self.interrupt.is_some_and(Interrupt::is_wanted) {
+                if k % STEPS_BETWEEN_QUERIES == 0 && self.interrupt.is_some_and(Interrupt::is_requested) {
                     return false;
                 }
                 let t = t0 + k as f64 * h;
@@ -222,12 +219,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                 let stages = if k == 0 { &table.first } else { &table.joined };
                 for (i, stage) in stages.iter().enumerate() {
                     let time = t + stage.time;
-                    if WATCH && i == self.look.stage {
+                    if CHECKED && i == self.check.stage {
                         for m in moving.iter_mut() {
                             let before = m.force;
                             self.kick_and_drift::<S, K, ACTION>(m, stage);
                             self.take_force::<S, K, ACTION>(m, time);
-                            self.look_at(m, &before);
+                            self.check_drift(m, &before);
                         }
                         continue;
                     }
@@ -251,19 +248,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Checks the drift, by the change from the force `before` it.
     #[inline(always)]
-    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
+    fn check_drift<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
         let zero = SimdBatch::splat(0.0);
         let (mut turn, mut fast, mut wide) = (zero, zero, zero);
         for d in 0..N {
-            let change = (m.force[d] - before[d]) * self.look.span;
+            let change = (m.force[d] - before[d]) * self.check.span;
             turn = change.mul_add(change, turn);
             fast = m.p[d].mul_add(m.p[d], fast);
             wide = m.q[d].mul_add(m.q[d], wide);
         }
-        m.fast = fast.max(m.fast * KEPT);
+        m.fast = fast.max(m.fast * MOMENTUM_MEMORY);
         // A change that moves the position by less than its round-off does not count.
-        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.suspect, SimdBatch::splat(1.0));
-        m.suspect = turn.at_most(m.fast * self.look.turn, m.suspect, moves);
+        let moves = (turn * (self.h * self.h)).at_most(
+            wide * (POSITION_ROUND_OFF * POSITION_ROUND_OFF),
+            m.suspect,
+            SimdBatch::splat(1.0),
+        );
+        m.suspect = turn.at_most(m.fast * self.check.turn, m.suspect, moves);
     }
 
     #[inline(always)]

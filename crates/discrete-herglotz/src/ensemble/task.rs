@@ -50,7 +50,7 @@ pub(crate) struct Task<'e, 'a, L, const N: usize> {
     pub members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
     pub count: usize,
     pub instructions: Instructions,
-    pub watched: bool,
+    pub check_resolution: bool,
     pub integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
     pub common: Common<L, N>,
     /// The step size and the number of steps.
@@ -185,11 +185,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut lanes: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, most_rows, action)).collect();
         let mut done = [false; SHARD];
         let mut batch_kernel = 0;
-        let options = LaneOptions { rows, watched: self.watched };
+        let options = LaneOptions { rows, check_resolution: self.check_resolution };
         forget_branches();
         if let Some(wanted) = length.wanted() {
             let mut ends: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, None, false)).collect();
-            finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, watched: false });
+            finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, check_resolution: false });
             kernel.run(self.instructions, &mut lanes, action, options);
             refuse_beyond(wanted, &mut lanes, &ends);
         } else {
@@ -202,11 +202,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             for ((place, from), Lane { state, rows, suspect, .. }) in places.into_iter().zip(&states).zip(lanes) {
                 if ChartVector::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
-                    let watched = self.watched && dissipates;
-                    let suspect = suspect || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
+                    let check_resolution = self.check_resolution && dissipates;
+                    let suspect = suspect || check_resolution && may_drift(lagrangian, order, (t0, from), (t, &state));
                     let member = &mut members[place];
                     let mut unresolved = None;
-                    if suspect && self.watched {
+                    if suspect && self.check_resolution {
                         let own = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
                         match own.ending {
                             Ok(ending) if ending.status == Status::Completed => unresolved = ending.unresolved,

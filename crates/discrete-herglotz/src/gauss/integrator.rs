@@ -55,12 +55,12 @@ impl GaussCollocation {
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        StepperOptions { action, watched }: StepperOptions,
+        StepperOptions { action, check_resolution }: StepperOptions,
     ) -> Result<GaussStepper<'a, L, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         check_step(self.stages, h)?;
         let run = GaussStepper::new(lagrangian, (self.stages, h), Some(structure), t0, state, start.v, action)?;
-        Ok(if watched { run.with_suspects() } else { run })
+        Ok(if check_resolution { run.with_suspects() } else { run })
     }
 }
 

@@ -12,8 +12,7 @@ mod work_summary;
 
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
-pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
-pub(crate) use resolution::sequence::FEW_STAGES;
+pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 pub use routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
 pub use work_summary::GaussRoute;

@@ -6,7 +6,7 @@ mod state_words;
 
 use crate::gauss::consistent_start::ConsistentStart;
 use crate::gauss::dense::{Solved, StepStart};
-use crate::gauss::resolution::sequence::{FEW_STAGES, Sequence};
+use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::linear::Linear;
@@ -23,6 +23,7 @@ use crate::gauss::work_summary::work_summary;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
+use crate::resolution::thresholds::FEW_STAGES;
 use crate::solve::mass_matrix::is_identity;
 use crate::{
     DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
@@ -91,7 +92,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     /// The last mean velocities: present for few stages, where the defect between the nodes is no measure of
     /// resolution, and when suspect intervals are requested.
     sequence: Option<Box<Sequence<N>>>,
-    watch: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor<N>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
@@ -153,7 +154,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             newton_steps: 0,
             of_sigma,
             sequence: (s <= FEW_STAGES).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
-            watch: ResolutionMonitor::new(&state.q, &start.v, h),
+            monitor: ResolutionMonitor::new(&state.q, &start.v, h),
         })
     }
 
@@ -307,10 +308,10 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
                 Route::General(general) => general.defect,
             };
             if defect > 1.0 && !run.is_at_rest(t + h) {
-                run.watch.note(run.k, defect);
+                run.monitor.note(run.k, defect);
             }
             if run.sequence.is_some() {
-                run.follow();
+                run.update_sequence();
             }
             run.k += 1;
         }
@@ -419,11 +420,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// The first unresolved step that was recorded in the run; if there is none, the result of a defect sample of the
     /// last step alone. Further steps are sampled only if this is called more often.
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.mark()
+        self.find_unresolved()
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.suspect.take()
+        self.monitor.suspect.take()
     }
 }
 

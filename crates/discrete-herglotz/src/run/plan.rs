@@ -1,7 +1,7 @@
 //! The plan of a run: its steps, its route, and what they compute and skip.
 
 use crate::integration::check_claims::violated_claim;
-use crate::run::checks::next_probe;
+use crate::run::checks::next_full_check;
 use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
 use crate::run::observers::step_view::StepView;
@@ -109,7 +109,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let mut stepper = self.stepper()?;
         let mut taken = 0;
         while taken < count.min(FIRST_STEPS) {
-            let steps = next_probe(taken).min(count) - taken;
+            let steps = next_full_check(taken).min(count) - taken;
             match stepper.advance_until(steps, t_end) {
                 Ok(done) if done > 0 => taken += done,
                 _ => break,

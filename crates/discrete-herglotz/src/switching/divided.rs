@@ -1,6 +1,6 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
-use super::{Reach, SwitchingStepper};
+use super::{EvaluationRange, SwitchingStepper};
 use crate::gauss::info;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
@@ -47,7 +47,7 @@ impl DividedGauss {
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
         let gauss = GaussCollocation { stages: self.stages };
         let make = move |problem: &Problem<'a, L, N>, h: f64, _: bool| gauss.run(problem, h, options);
-        Ok(SwitchingStepper::new(problem, h, Reach::Inside, make)?.dividing(self.most_misfit))
+        Ok(SwitchingStepper::new(problem, h, EvaluationRange::Within, make)?.dividing(self.most_misfit))
     }
 }
 

@@ -14,5 +14,5 @@ mod surfaces;
 
 pub use divided::DividedGauss;
 pub use jumps::jumps_between;
-pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
+pub(crate) use stepper::{EvaluationRange, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;

@@ -21,13 +21,13 @@ use contact_geom::{
 use std::sync::Arc;
 
 /// The limit of the parts of a step; a step with more fails with [`StepError::Switching`] or [`StepError::Undivided`].
-const MOST_PARTS: usize = 4096;
+const MAX_PARTS: usize = 4096;
 
 /// The limit of sign changes at one point: a motion that is pushed to a surface from both sides has infinitely many.
-const MOST_AT_A_PLACE: usize = 16;
+const MAX_CHANGES_AT_ONE_POINT: usize = 16;
 
 /// The Newton iterations for a zero before it is bracketed.
-const NEWTON: usize = 8;
+const MAX_NEWTON_ITERATIONS: usize = 8;
 
 /// A type that is, or holds, a stepper.
 pub(crate) trait AsStepper<const N: usize> {
@@ -64,10 +64,10 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
         GaussStepper::add_rests(self, rests);
     }
     fn defect(&self) -> f64 {
-        self.look(1).map_or(0.0, |look| {
+        self.sample_defect(1).map_or(0.0, |sample| {
             // A jump with vanishing gradients on both sides shows only in the values of L.
-            let of_value = if look.kinetic > 0.0 { look.of_value / look.kinetic } else { 0.0 };
-            if look.is_underflown() { of_value } else { max_or_nan(look.defect, of_value) }
+            let of_value = if sample.kinetic > 0.0 { sample.of_value / sample.kinetic } else { 0.0 };
+            if sample.is_underflown() { of_value } else { max_or_nan(sample.defect, of_value) }
         })
     }
 
@@ -81,21 +81,21 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
 
 /// Where an integrator evaluates L.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Reach {
+pub(crate) enum EvaluationRange {
     /// Between the ends of its steps, as Gauss collocation does.
-    Inside,
+    Within,
     /// Also at the ends of its steps, or beyond them by this fraction of a step.
-    Beside(f64),
+    Extended(f64),
 }
 
 /// A fraction of a step that exceeds the round-off of its ends.
-const AT_ENDS: f64 = 1e-9;
+const END_EXTENSION: f64 = 1e-9;
 
 /// A bound for the distance by which negative substeps make a composition leave its step, in units of the step.
-const SUBSTEPS: f64 = 0.5;
+const SUBSTEP_EXTENSION: f64 = 0.5;
 
 /// The highest order of the parts.
-const HIGHEST: u32 = 2 * Gauss::<()>::STAGES as u32;
+const MAX_PART_ORDER: u32 = 2 * Gauss::<()>::STAGES as u32;
 
 /// The stepper of an integrator with steps that end on kinks and jumps.
 ///
@@ -109,17 +109,17 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     options: StepperOptions,
 ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
     let info = integrator.info();
-    let inside = info.collocation.is_some() || info.order > HIGHEST;
-    let reach = match (inside, info.substeps) {
-        (true, _) => Reach::Inside,
-        (false, true) => Reach::Beside(SUBSTEPS),
-        (false, false) => Reach::Beside(AT_ENDS),
+    let within = info.collocation.is_some() || info.order > MAX_PART_ORDER;
+    let range = match (within, info.substeps) {
+        (true, _) => EvaluationRange::Within,
+        (false, true) => EvaluationRange::Extended(SUBSTEP_EXTENSION),
+        (false, false) => EvaluationRange::Extended(END_EXTENSION),
     };
     let parts = GaussCollocation { stages: (info.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
     let make = move |problem: &Problem<'a, L, N>, h: f64, is_part: bool| {
-        if is_part && !inside { parts.stepper(problem, h, options) } else { integrator.stepper(problem, h, options) }
+        if is_part && !within { parts.stepper(problem, h, options) } else { integrator.stepper(problem, h, options) }
     };
-    Ok(Box::new(SwitchingStepper::new(problem, h, reach, make)?))
+    Ok(Box::new(SwitchingStepper::new(problem, h, range, make)?))
 }
 
 /// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of
@@ -129,7 +129,7 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
 pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     problem: Problem<'a, L, N>,
     make: M,
-    reach: Reach,
+    range: EvaluationRange,
     h: f64,
     /// The number of steps taken.
     k: usize,
@@ -141,7 +141,7 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     here: TimedState<N>,
     surfaces: Surfaces,
     /// The bound for the defect of a step; a step with a larger one is divided.
-    most_misfit: f64,
+    max_defect: f64,
     sigma: f64,
     /// The number of evaluations of the steppers before `base`.
     spent: u64,
@@ -163,13 +163,13 @@ where
     S: AsStepper<N>,
     M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
-    pub fn new(problem: &Problem<'a, L, N>, h: f64, reach: Reach, make: M) -> Result<Self, InputError> {
+    pub fn new(problem: &Problem<'a, L, N>, h: f64, range: EvaluationRange, make: M) -> Result<Self, InputError> {
         let base = make(problem, h, false)?;
         let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v, rests: StepStart::ZERO };
         Ok(SwitchingStepper {
             problem: *problem,
             make,
-            reach,
+            range,
             h,
             k: 0,
             base,
@@ -177,7 +177,7 @@ where
             before: 0,
             here,
             surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start),
-            most_misfit: f64::INFINITY,
+            max_defect: f64::INFINITY,
             sigma: 1.0,
             spent: 0,
             unresolved: None,
@@ -192,17 +192,17 @@ where
     }
 
     /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it.
-    pub fn dividing(self, most_misfit: f64) -> Self {
-        SwitchingStepper { most_misfit, ..self }
+    pub fn dividing(self, max_defect: f64) -> Self {
+        SwitchingStepper { max_defect, ..self }
     }
 
     /// Whether a step is to be divided.
     fn is_too_long(&self, step: &S) -> bool {
-        if self.most_misfit == f64::INFINITY {
+        if self.max_defect == f64::INFINITY {
             return false;
         }
         let defect = step.defect();
-        defect.is_nan() || defect > self.most_misfit
+        defect.is_nan() || defect > self.max_defect
     }
 
     /// The steppers of the last step: those of its parts if it had some, otherwise the common stepper of all steps.
@@ -237,7 +237,7 @@ where
     /// One part of a step, from a state to the time t.
     fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(S, TimedState<N>), StepError> {
         let mut stepper = self.stepper_at(at, t - at.t, true)?;
-        let taken = stepper.stepper_mut().advance(1).map_err(|halt| halt.cause);
+        let taken = stepper.stepper_mut().advance(1).map_err(|failure| failure.cause);
         self.spent += stepper.stepper().evaluations();
         taken?;
         let to = self.reached(&stepper, t, at)?;
@@ -254,9 +254,9 @@ where
         {
             let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
             let (lagrangian, surfaces) = (self.problem.lagrangian, &mut self.surfaces);
-            let quiet = match self.reach {
-                Reach::Inside => true,
-                Reach::Beside(part) => !surfaces.are_near(lagrangian, &curve, part),
+            let quiet = match self.range {
+                EvaluationRange::Within => true,
+                EvaluationRange::Extended(part) => !surfaces.are_near(lagrangian, &curve, part),
             };
             if quiet && surfaces.first_change(lagrangian, &curve).is_none() && !self.is_too_long(&self.base) {
                 (self.here, self.sigma) = (to, self.base.stepper().sigma());
@@ -291,11 +291,11 @@ where
 
     /// A step in parts that end on zeros.
     fn in_parts(&mut self, from: TimedState<N>, t_end: f64) -> Result<(TimedState<N>, f64), StepError> {
-        let (mut at, mut sigma, mut at_a_place) = (from, 1.0, 0);
+        let (mut at, mut sigma, mut changes_at_point) = (from, 1.0, 0);
         let span = t_end - from.t;
         let spacing = 4.0 * f64::EPSILON * max_or_nan(max_or_nan(from.t.abs(), t_end.abs()), span.abs());
         let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
-        for _ in 0..MOST_PARTS {
+        for _ in 0..MAX_PARTS {
             let rest = t_end - at.t;
             if rest * span <= 0.0 {
                 return Ok((at, sigma));
@@ -322,7 +322,7 @@ where
             let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
                 self.keep(stepper);
-                (at, longest, at_a_place) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
+                (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
             let Some(Part { stepper, to }) = self.locate(&curve, &change, spacing) else {
@@ -339,17 +339,17 @@ where
                 Some(stepper) => {
                     sigma *= stepper.stepper().sigma();
                     self.keep(stepper);
-                    at_a_place = 0;
+                    changes_at_point = 0;
                 }
-                None => at_a_place += 1,
+                None => changes_at_point += 1,
             }
-            if at_a_place > MOST_AT_A_PLACE {
+            if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
             at = self.through(to, change.index, span)?;
             (longest, switches) = (span.abs(), true);
         }
-        let divides = self.most_misfit < f64::INFINITY && !switches;
+        let divides = self.max_defect < f64::INFINITY && !switches;
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
     }
 
@@ -361,9 +361,9 @@ where
 
     /// The state at a zero, on the side where the motion continues.
     fn through(&mut self, at: TimedState<N>, index: usize, span: f64) -> Result<TimedState<N>, StepError> {
-        let reach = max_abs_or_nan(at.v.iter().map(|v| v * span));
+        let max_displacement = max_abs_or_nan(at.v.iter().map(|v| v * span));
         let lagrangian = self.problem.lagrangian;
-        let p = match corner(lagrangian, &mut self.surfaces, index, &at, reach)? {
+        let p = match corner(lagrangian, &mut self.surfaces, index, &at, max_displacement)? {
             Corner::Continuous => {
                 self.surfaces.cross(index);
                 return Ok(at);
@@ -382,13 +382,13 @@ where
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.
     /// `None` where the motion does not cross the surface.
     fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<S, N>> {
-        let SignChange { index, ends, about, slope } = *change;
+        let SignChange { index, ends, estimate, slope } = *change;
         let (lagrangian, from, span) = (self.problem.lagrangian, curve.from, curve.span());
         let at_start = Part { stepper: None, to: from };
         let mut slope = slope;
-        let mut length = about * span;
+        let mut length = estimate * span;
         let mut last: Option<(f64, f64)> = None;
-        for _ in 0..NEWTON {
+        for _ in 0..MAX_NEWTON_ITERATIONS {
             if length.abs() <= spacing {
                 return Some(at_start);
             }

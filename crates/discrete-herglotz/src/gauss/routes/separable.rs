@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::StepError;
-use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, Tail};
+use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
 use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::position_newton::{At, PositionNewton, curvature};
@@ -16,6 +16,7 @@ use crate::numbers::lanes::{Lanes, branched, vector};
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{Stages, blocks};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding};
 use pulp::Simd;
@@ -335,7 +336,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if foretells && const { N == 1 } && sweeps.first_change() > ROUGH * self.largest_rest::<S>() {
             self.unforetold = UNFORETOLD;
         }
-        let foretold = sweeps.first() <= FORETOLD && !solved;
+        let foretold = sweeps.first() <= MIN_CHECKED_CHANGE && !solved;
         let h = self.table.h;
         self.defect = if foretold { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
@@ -373,7 +374,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
         let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
         let of_acceleration = self.inverse_mass.as_ref().map_or(once.x, |inverse| inverse.abs() * once.x);
-        change <= ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
+        change <= COLLOCATION_ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
     }
 
     /// Corrects a fixed-point iteration by the simplified Newton method. Returns the largest change of the

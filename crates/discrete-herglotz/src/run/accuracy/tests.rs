@@ -1,8 +1,9 @@
 //! The cost of the step-size selection.
 
 use crate::Problem;
-use crate::run::accuracy::select::choose_with;
-use crate::run::accuracy::trial_runs::{BUDGET, TrialRuns};
+use crate::run::accuracy::limits::BUDGET;
+use crate::run::accuracy::select::select_within_budget;
+use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::{Request, Shared};
 use crate::run::{OutputRequest, Until};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
@@ -22,8 +23,8 @@ fn search<L: Lagrangian<N>, const N: usize>(
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
     let request = Request { problem, t_end: span, span, integrator, needs: OutputRequest::default(), scales: None };
     let mut trials = TrialRuns::new(&request, wanted);
-    let choice = choose_with(&mut trials).unwrap();
-    (choice.integrator.info().name, choice.count, BUDGET - trials.left)
+    let selection = select_within_budget(&mut trials).unwrap();
+    (selection.integrator.info().name, selection.count, BUDGET - trials.left)
 }
 
 /// Trial runs cost a small multiple of the run: there are those with k, 2k and k + 1 steps, one with 4k if the first
@@ -51,7 +52,7 @@ fn pilot_runs_cost_little() {
 /// runs, and runs that would need Newton's method, do not.
 #[test]
 fn long_motions_take_more_stages() {
-    let chosen = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
+    let selected = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
         let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
         let run = problem.accuracy(1e-7);
         let run = if let Some(by) = integrator { run.by(by) } else { run };
@@ -59,13 +60,13 @@ fn long_motions_take_more_stages() {
         (plan.integrator().name.to_string(), plan.count())
     };
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
-    let (name, ours) = chosen(&pendulum, None, 1000.0);
-    let (_, of_eight) = chosen(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
+    let (name, ours) = selected(&pendulum, None, 1000.0);
+    let (_, of_eight) = selected(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
     assert_eq!(name, "gauss_16");
     assert!(2 * ours < of_eight, "{ours} steps, {of_eight} with eight stages");
-    assert_eq!(chosen(&pendulum, None, 10.0).0, "gauss_8");
+    assert_eq!(selected(&pendulum, None, 10.0).0, "gauss_8");
     // Where the forced double well is steepest, the iteration of a long step does not contract.
-    assert_eq!(chosen(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
+    assert_eq!(selected(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
 }
 
 /// If steps that are short enough for the error need Newton's method, and steps of half the size rarely do, the latter

@@ -53,8 +53,8 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
         self.rows.needs()
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.rows.prepare(course)
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.rows.prepare(info)
     }
 
     fn next(&self, taken: usize) -> usize {
