@@ -21,6 +21,6 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
         let stages = if wanted < 1e-10 { 12 } else { 8 };
         let of = if self.integrator.is_some() { self } else { self.by(GaussCollocation { stages }) };
-        Ensemble { length: Some(StepControl::For(wanted, within)), ..of }
+        Ensemble { length: Some(StepControl::Accuracy(wanted, within)), ..of }
     }
 }

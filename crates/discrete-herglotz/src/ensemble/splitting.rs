@@ -1,6 +1,6 @@
 //! Splittings for many motions in SIMD lanes.
 
-use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
+use crate::ensemble::lane::{Lane, LaneOptions, interrupt};
 use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
@@ -125,7 +125,7 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const CHECKED: bool> 
 
 /// The state that a step advances, as [`Motion`](crate::splitting) for a single motion.
 #[derive(Clone, Copy)]
-struct Moving<S: Simd, const K: usize, const N: usize> {
+struct Pack<S: Simd, const K: usize, const N: usize> {
     q: SVector<SimdBatch<S, K>, N>,
     p: SVector<SimdBatch<S, K>, N>,
     /// The accumulated round-off of the damping of p.
@@ -138,21 +138,21 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     suspect: SimdBatch<S, K>,
 }
 
-impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
+impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
     /// The pack of some motions; lanes beyond the last motion repeat it.
     #[inline(always)]
-    fn from_lanes(some: &[Lane<N>]) -> Self {
+    fn from_lanes(members: &[Lane<N>]) -> Self {
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
-            SimdBatch::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state)))
+            SimdBatch::from_lanes(|i| members.get(i).or(members.last()).map_or(0.0, |lane| f(&lane.state)))
         };
         let (q, p) = (SVector::from_fn(|d, _| of(&|at| at.q[d])), SVector::from_fn(|d, _| of(&|at| at.p[d])));
-        Moving { q, p, z: of(&|at| at.z), ..Self::zero() }
+        Pack { q, p, z: of(&|at| at.z), ..Self::zero() }
     }
 
     #[inline(always)]
     fn zero() -> Self {
         let (zero, still) = (SimdBatch::splat(0.0), SVector::from_fn(|_, _| SimdBatch::splat(0.0)));
-        Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
+        Pack { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
     }
 
     /// The state in a lane.
@@ -175,20 +175,20 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         stride: usize,
     ) {
         let width = SimdBatch::<S, K>::COUNT;
-        for some in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
-            let mut moving = [Moving::zero(); PACKS_IN_FLIGHT];
-            let moving = &mut moving[..some.len().div_ceil(width)];
-            for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
-                *m = Moving::from_lanes(own);
+        for members in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
+            let mut in_flight = [Pack::zero(); PACKS_IN_FLIGHT];
+            let in_flight = &mut in_flight[..members.len().div_ceil(width)];
+            for (own, m) in members.chunks(width).zip(in_flight.iter_mut()) {
+                *m = Pack::from_lanes(own);
             }
-            let whole = self.take_steps::<S, K, ACTION, CHECKED>(moving, stride, |t, w, at| {
-                for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
+            let whole = self.take_steps::<S, K, ACTION, CHECKED>(in_flight, stride, |t, w, at| {
+                for (i, lane) in members.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.reach(t, at.state(i));
                     lane.suspect = at.suspect.lanes()[i] != 0.0;
                 }
             });
             if !whole {
-                interrupted(some);
+                interrupt(members);
             }
         }
     }
@@ -198,13 +198,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
-        moving: &mut [Moving<S, K, N>],
+        in_flight: &mut [Pack<S, K, N>],
         stride: usize,
-        mut reach: impl FnMut(f64, usize, &Moving<S, K, N>),
+        mut reach: impl FnMut(f64, usize, &Pack<S, K, N>),
     ) -> bool {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
-        for m in moving.iter_mut() {
+        for m in in_flight.iter_mut() {
             self.take_force::<S, K, ACTION>(m, *t0);
         }
         let mut taken = 0;
@@ -220,7 +220,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                 for (i, stage) in stages.iter().enumerate() {
                     let time = t + stage.time;
                     if CHECKED && i == self.check.stage {
-                        for m in moving.iter_mut() {
+                        for m in in_flight.iter_mut() {
                             let before = m.force;
                             self.kick_and_drift::<S, K, ACTION>(m, stage);
                             self.take_force::<S, K, ACTION>(m, time);
@@ -228,14 +228,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                         }
                         continue;
                     }
-                    for m in moving.iter_mut() {
+                    for m in in_flight.iter_mut() {
                         self.kick_and_drift::<S, K, ACTION>(m, stage);
                         self.take_force::<S, K, ACTION>(m, time);
                     }
                 }
             }
             taken = next;
-            for (w, m) in moving.iter().enumerate() {
+            for (w, m) in in_flight.iter().enumerate() {
                 // The step is completed on a copy, since the next step continues from the stage that it shares with
                 // this one.
                 let mut at = *m;
@@ -248,7 +248,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Checks the drift, by the change from the force `before` it.
     #[inline(always)]
-    fn check_drift<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
+    fn check_drift<S: Simd, const K: usize>(&self, m: &mut Pack<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
         let zero = SimdBatch::splat(0.0);
         let (mut turn, mut fast, mut wide) = (zero, zero, zero);
         for d in 0..N {
@@ -268,7 +268,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64) {
+    fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Pack<S, K, N>, t: f64) {
         let zero = SimdBatch::splat(0.0);
         let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
         let (value, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &rest);
@@ -280,7 +280,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, stage: &Stage) {
+    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Pack<S, K, N>, stage: &Stage) {
         let kick = SimdBatch::splat(stage.kick);
         if ACTION {
             m.z += kick * m.value;

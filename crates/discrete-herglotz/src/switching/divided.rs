@@ -1,7 +1,8 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
-use super::{EvaluationRange, SwitchingStepper};
 use crate::gauss::info;
+use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 

@@ -18,7 +18,9 @@ use crate::run::accuracy::trial_end::{SwitchReason, TrialEnd};
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
 use crate::run::request::{Request, Shared, StepSelection};
-use crate::switching::{DividedGauss, EvaluationRange, SwitchingStepper, has_switching_functions};
+use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::{DividedGauss, has_switching_functions};
 use crate::{
     GaussCollocation, InputError, StepFailure, Stepper, TransformedGauss,
     gauss::{GaussRoute, GaussStepper},
