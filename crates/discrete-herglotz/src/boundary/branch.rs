@@ -8,13 +8,20 @@ use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
-/// The limit of corrections for a point of a branch; with more the step is halved.
+/// The largest number of corrections for a point of a branch; with more the step is halved: convergence is quadratic,
+/// so that a point near the predicted one needs four.
 const MAX_CORRECTIONS: u32 = 8;
-/// The cosine of the angle between neighbouring tangents below which the step is halved. A larger angle indicates a
-/// corner or another branch.
+
+/// The cosine of the angle between neighbouring tangents, 26 degrees, below which the step is
+/// halved. A larger angle indicates a corner or another branch.
 const MIN_TANGENT_COSINE: f64 = 0.9;
-/// The shortest step, relative to the first one.
+
+/// The shortest step, relative to the first one: the branch ends where twenty halvings find no further path.
 const MIN_STEP_RATIO: f64 = 1e-6;
+
+/// The factor by which the step grows after each path: less than the two by which it is halved, so that a step that
+/// fails is not tried again at once.
+const STEP_GROWTH: f64 = 1.3;
 
 /// A point of a branch, or a direction: the positions of a path and a parameter. The inner product of the positions is
 /// the mean over the points, so that it does not depend on the number of steps.
@@ -145,7 +152,7 @@ pub fn branch<D: DiscreteLagrangian<N>, const N: usize>(
             break;
         }
         (at, tangent) = (next, direction);
-        length *= 1.3;
+        length *= STEP_GROWTH;
     }
     Ok(paths)
 }

@@ -7,13 +7,25 @@ use super::path_check::{PathCheck, check_path};
 use crate::{DiscreteLagrangian, solve::last_correction};
 use contact_geom::nalgebra::SVector;
 
-/// The limit of corrections in a search.
+/// The largest number of corrections of a search: a search that succeeds needs a few, and some dozens if it first
+/// leaves local minima of the residual.
 const MAX_CORRECTIONS: u32 = 200;
-/// The limit of halvings of one correction; after these the residual does not decrease along it.
+
+/// The largest number of halvings of one correction; after these, at a four thousandth of its length, the residual does
+/// not decrease along it.
 const MAX_HALVINGS: u32 = 12;
-/// The limit of full corrections that are taken although the residual does not decrease, since local minima of the
-/// residual that are not critical paths are common.
+
+/// The largest number of full corrections that are taken although the residual does not decrease, since local minima of
+/// the residual that are not critical paths are common.
 const MAX_FULL_CORRECTIONS: u32 = 12;
+
+/// The smallest decrease of the merit function, relative to that of the linearised equations, with which a correction
+/// is accepted: Armijo's condition, which excludes steps that only seem to decrease it.
+const MIN_RELATIVE_DECREASE: f64 = 1e-4;
+
+/// The number of roundings of a pivot for each step, below which the ends are conjugate to round-off.
+const PIVOT_ROUNDINGS: f64 = 16.0;
+
 /// The bound for the relative residual of a path at round-off: the round-off of the positions contributes some units in
 /// the last place of the terms, and a discrete Lagrangian that is computed by an iteration some more.
 const MAX_RELATIVE_RESIDUAL: f64 = 1024.0 * f64::EPSILON;
@@ -51,7 +63,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
         Ok(at) => at,
         Err(e) => return CriticalPath::ended(PathStatus::Undefined { step: e.step, cause: e.cause }, x, 0),
     };
-    let least = 16.0 * of.steps as f64 * f64::EPSILON;
+    let least = PIVOT_ROUNDINGS * of.steps as f64 * f64::EPSILON;
     let mut before = f64::INFINITY;
     // The path with the smallest residual among those at which the line search failed.
     let mut best: Option<(Nodes<N>, Measured<N>)> = None;
@@ -70,7 +82,10 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
                 let sizes = at.sizes.sup(&next.sizes);
                 let now = merit(&at, &sizes) * repulsion.powi(2);
                 let then = merit(&next, &sizes) * deflation.factor(&trial.q).powi(2);
-                if is_full || then <= (1.0 - 1e-4 * part) * now || next.relative <= MAX_RELATIVE_RESIDUAL {
+                if is_full
+                    || then <= (1.0 - MIN_RELATIVE_DECREASE * part) * now
+                    || next.relative <= MAX_RELATIVE_RESIDUAL
+                {
                     break Some(next);
                 }
             }

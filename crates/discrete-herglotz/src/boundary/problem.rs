@@ -42,8 +42,12 @@ pub struct BoundaryPath<D, const N: usize> {
     length: f64,
 }
 
-/// The limit of initial paths next to known ones in a search.
+/// The largest number of initial paths next to known ones in a search: both sides of four arcs of one path.
 const MAX_RESTARTS: usize = 8;
+
+/// The distance of two paths, in units of the deflation length, at which they coincide: there the deflated residual is
+/// a million times the residual.
+const MAX_COINCIDENCE: f64 = 1e-3;
 
 fn finite<const N: usize>(what: &'static str, x: &SVector<f64, N>) -> Result<(), InputError> {
     match x.iter().enumerate().find(|(_, c)| !c.is_finite()) {
@@ -198,7 +202,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
             Some(path) => self.moved(path.points().to_vec()),
             None => self.straight(),
         };
-        if self.known.iter().any(|known| square(&points, known) <= (1e-3 * self.length).powi(2)) {
+        if self.known.iter().any(|known| square(&points, known) <= (MAX_COINCIDENCE * self.length).powi(2)) {
             self.shifted(&points, &SVector::from_element(self.length))
         } else {
             points

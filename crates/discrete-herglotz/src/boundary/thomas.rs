@@ -9,6 +9,7 @@ use contact_geom::{DiscretePoint, SecondDiscreteJet};
 /// The smallest admissible pivot, relative to its diagonal entry before the elimination. This bounds the loss of digits
 /// in a correction; the residuals that measure the path are not affected.
 const MIN_PIVOT: f64 = 1.0 / 8192.0;
+
 /// The smallest regularity of the last block at which the loss of digits in the elimination cannot hide that the ends
 /// are conjugate.
 const MIN_REGULARITY: f64 = 1e-6;

@@ -14,7 +14,12 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// The number of members of an ensemble that get all checks of a run before it starts.
+/// The number of steps for which one is added to the largest number of the checked members: an eighth, since other
+/// members may need more. The few that need still more have a run of their own.
+const STEPS_PER_EXTRA_STEP: usize = 8;
+
+/// The largest number of members of an ensemble that get all checks of a run before it starts: errors that all members
+/// share, or that depend on the index, show in them, and the checks of all members would cost as much as their steps.
 const MAX_CHECKED_MEMBERS: usize = 4;
 
 /// The Lagrangian and the start of a member, as a function of its index.
@@ -267,7 +272,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
         let refused = |cause| EnsembleError::Member { index, cause };
         if length.requested_error().is_some() && integrator.batch_kernel().is_some() {
-            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
+            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(STEPS_PER_EXTRA_STEP)));
             let (lagrangian, start) = (self.members)(index);
             plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
         }

@@ -20,7 +20,8 @@ const VERSION: u64 = 2;
 /// The number of words before the shards: these two, the fingerprint, and their digest.
 const HEADER_WORDS: usize = 4;
 
-/// The largest number of words of a shard; a larger number means that the file is damaged.
+/// The largest number of words of a shard; a larger number, of more than sixteen gigabytes, means that the file is
+/// damaged.
 const MAX_SHARD_WORDS: u64 = 1 << 31;
 
 /// The completed shards, in any order. A shard is appended as a whole, with its length before it and a digest at its

@@ -14,8 +14,8 @@ const MAX_INCREASES: f64 = 3.0;
 /// The change, in units of the round-off of the terms, below which the iteration has converged.
 const MAX_CONVERGED_CHANGE: f64 = 1.0 / 16.0;
 
-/// The predicted change, in units of the round-off of the terms, below which it is not computed: the remaining error has
-/// the same direction in every step, and accumulates faster than round-off.
+/// The predicted change, in units of the round-off of the terms, below which it is not computed: the remaining error
+/// has the same direction in every step, and accumulates faster than round-off.
 const MAX_REMAINING_CHANGE: f64 = 1.0 / 64.0;
 
 /// The change, in units of the round-off of the terms, below which an increase is due to round-off.
@@ -29,8 +29,8 @@ const MIN_FIRST_CONTRACTION: f64 = 0.1;
 ///
 /// Both exist because they share the conditions and not the computation: the scalar test returns at the first condition
 /// that holds, and also knows the secant steps and the round-off of the positions of a single run; here all conditions
-/// are evaluated as numbers 0 and 1 in every iteration, since a branch would have to be the same in all lanes. A change of
-/// one must be made in the other.
+/// are evaluated as numbers 0 and 1 in every iteration, since a branch would have to be the same in all lanes. A change
+/// of one must be made in the other.
 #[derive(Clone, Copy)]
 pub(crate) struct ConvergenceTest<S: Simd, const K: usize> {
     before: SimdBatch<S, K>,

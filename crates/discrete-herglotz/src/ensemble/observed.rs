@@ -35,8 +35,8 @@ pub struct ObservedEnsemble<'a, L, F, T, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// Adds an [`Observer`] for each member, a function of its index. `extract` returns a result from the observer at the
-    /// end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
+    /// Adds an [`Observer`] for each member, a function of its index. `extract` returns a result from the observer at
+    /// the end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
     ///
     /// Each member has a run of its own, distributed over the threads, since observers may request quantities of a run
     /// (the velocity, the energy, the last step with dense output) that lanes do not have. To record states after a

@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The number of shards per thread that may be completed or in progress while an earlier shard is not completed.
+/// The number of shards per thread that may be completed or in progress while an earlier shard is not completed: it
+/// bounds the memory, and is large enough that no thread waits for a shard that takes several times longer.
 pub(crate) const MAX_SHARDS_PER_THREAD: usize = 8;
 
 /// The state that the threads share.
@@ -74,8 +75,8 @@ impl<R> Drop for AtTheEnd<'_, R> {
 }
 
 /// Computes a number of shards on several threads, the calling thread among them, and hands on each result in the order
-/// of the shards, on the calling thread, until `hand_on` breaks. At most [`MAX_SHARDS_PER_THREAD`] results per thread are
-/// kept at a time.
+/// of the shards, on the calling thread, until `hand_on` breaks. At most [`MAX_SHARDS_PER_THREAD`] results per thread
+/// are kept at a time.
 ///
 /// The calling thread computes too: a thread that only waits to hand on results would displace the others after each
 /// shard.

@@ -2,7 +2,7 @@
 
 use std::fmt::{Debug, Formatter};
 
-/// What ends an interrupted run, as reported by its [`Status`](crate::Status).
+/// The cause of the end of an interrupted run, as reported by its [`Status`](crate::Status).
 pub const INTERRUPTION: &str = "an interruption";
 
 /// The number of steps between two queries: some hundred microseconds of short steps.

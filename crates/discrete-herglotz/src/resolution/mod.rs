@@ -1,9 +1,9 @@
 //! Whether a step resolves the motion.
 //!
-//! A step of given size has an error that its method does not report: a step that is longer than a period of the motion,
-//! or that passes a jump of the force, ends in a state that looks like any other. The following measures detect such
-//! steps. Each compares a defect with a threshold of [`thresholds`]; a defect above one, in units of its threshold, flags
-//! the step as unresolved.
+//! A step of given size has an error that its method does not report: a step that is longer than a period of the
+//! motion, or that passes a jump of the force, ends in a state that looks like any other. The following measures detect
+//! such steps. Each compares a defect with a threshold of [`thresholds`]; a defect above one, in units of its
+//! threshold, flags the step as unresolved.
 //!
 //! Steps of a given size:
 //!
@@ -21,13 +21,13 @@
 //! | Rest, `run/checks/rest.rs` | all runs | The motion has decayed until products of its numbers underflow, so that defects relative to it are undefined |
 //!
 //! Members of an ensemble in SIMD lanes are checked by one bound on the first or third of these measures
-//! (`ensemble/splitting.rs`, `ensemble/gauss`); a member that exceeds it is suspect, and has a run of its own with all of
-//! them. Paths of a boundary-value problem are checked by the second differences of their velocities and by the effect of
-//! the truncation error (`boundary/path_check.rs`).
+//! (`ensemble/splitting.rs`, `ensemble/gauss`); a member that exceeds it is suspect, and has a run of its own with all
+//! of them. Paths of a boundary-value problem are checked by the second differences of their velocities and by the
+//! effect of the truncation error (`boundary/path_check.rs`).
 //!
-//! For a requested accuracy the steps are not given but found: trial runs with k, 2k and k + 1 steps must agree, and every
-//! step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the measures above are not
-//! taken again; only collocation keeps those that its steps take anyway.
+//! For a requested accuracy the steps are not given but found: trial runs with k, 2k and k + 1 steps must agree, and
+//! every step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the measures above
+//! are not taken again; only collocation keeps those that its steps take anyway.
 
 pub(crate) mod monitor;
 pub(crate) mod thresholds;

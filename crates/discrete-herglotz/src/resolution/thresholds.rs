@@ -1,8 +1,8 @@
 //! The thresholds of the measures that are listed in [`crate::resolution`].
 //!
 //! Most are errors of a step that no user would accept, of a twentieth to a half, far above the errors of steps that
-//! resolve their motion: a flagged step is certainly wrong, whereas a step that is not flagged need not be accurate. The
-//! others are bounds on round-off, in units of the round-off of the terms from which a defect is computed.
+//! resolve their motion: a flagged step is certainly wrong, whereas a step that is not flagged need not be accurate.
+//! The others are bounds on round-off, in units of the round-off of the terms from which a defect is computed.
 
 // Second differences of the velocity.
 
@@ -19,8 +19,8 @@ pub(crate) const MIN_SUSPECT_GROWTH: f64 = 2.0;
 /// vanish together. Differences of velocities in half steps are bounded in the same way.
 pub(crate) const MIN_RELATIVE_DISPLACEMENT: f64 = 1.0 / 256.0;
 
-/// A change of position below this fraction of the position is round-off: half a million units in the last
-/// place, for the round-off that a run accumulates.
+/// A change of position below this fraction of the position is round-off: half a million units in the last place, for
+/// the round-off that a run accumulates.
 pub(crate) const POSITION_ROUND_OFF: f64 = 1e-10;
 
 /// The largest factor by which a step with a rational conformal factor may expand or contract. The factor
@@ -33,14 +33,14 @@ pub(crate) const MAX_RATIONAL_FACTOR: f64 = 3.0;
 /// then this number divided by `1 - 2^-p`, at most a tenth.
 pub(crate) const MAX_HALF_STEP_DIFFERENCE: f64 = 0.05;
 
-/// The number of steps from rest after which a method of order one is judged: after n steps its relative error is `1/n`,
-/// in the displacement and in the energy, also where the steps resolve the motion.
+/// The number of steps from rest after which a method of order one is judged: after n steps its relative error is
+/// `1/n`, in the displacement and in the energy, also where the steps resolve the motion.
 pub(crate) const FIRST_ORDER_STEPS: f64 = 16.0;
 
 // Jumps of the acceleration.
 
-/// The largest change of velocity by a jump of the acceleration over one step, relative to the velocity: a tenth. A step
-/// has this error if it takes the acceleration of the wrong side of the jump throughout.
+/// The largest change of velocity by a jump of the acceleration over one step, relative to the velocity: a tenth. A
+/// step has this error if it takes the acceleration of the wrong side of the jump throughout.
 pub(crate) const MAX_ACCELERATION_JUMP: f64 = 0.1;
 
 // Gauss collocation: stages and defect samples.
@@ -65,8 +65,8 @@ pub(crate) const STAGE_ROUND_OFF: f64 = 1e-8;
 /// the polynomial of the last step predicts to a tenth is resolved.
 pub(crate) const MIN_CHECKED_CHANGE: f64 = 0.1;
 
-/// The largest defect between the nodes of a step with more than [`FEW_STAGES`] stages: for harmonic motions the error of
-/// such a step is then 0.01 to 0.1.
+/// The largest defect between the nodes of a step with more than [`FEW_STAGES`] stages: for harmonic motions the error
+/// of such a step is then 0.01 to 0.1.
 pub(crate) const MAX_STEP_DEFECT: f64 = 0.1;
 
 /// The same for at most [`FEW_STAGES`] stages, for which the defect between the nodes is large even in resolved steps.
@@ -98,8 +98,8 @@ pub(crate) const MAX_DEFECT_RATIO: f64 = 30.0;
 /// The smallest number of sample points over the span of a trial run: features wider than their distance are detected.
 pub(crate) const MIN_SAMPLE_POINTS: usize = 2000;
 
-/// Defects below this, relative to the momenta, are not distinguished from round-off where defects of two runs or of two
-/// estimates are compared: some ten thousand units in the last place.
+/// Defects below this, relative to the momenta, are not distinguished from round-off where defects of two runs or of
+/// two estimates are compared: some ten thousand units in the last place.
 pub(crate) const MIN_COMPARED_DEFECT: f64 = 1e-11;
 
 /// A defect below this, in units of the largest momentum of the run, is round-off: some hundred units, for the sums in
@@ -111,8 +111,8 @@ pub(crate) const TRIAL_ROUNDINGS: f64 = 64.0;
 
 // Energy drift.
 
-/// The step of an oscillation, in radians, whose energy error is allowed: the p-th power of this number, for a method of
-/// order p. With such an error a frequency has a relative error of the same size.
+/// The step of an oscillation, in radians, whose energy error is allowed: the p-th power of this number, for a method
+/// of order p. With such an error a frequency has a relative error of the same size.
 pub(crate) const MAX_OSCILLATION_STEP: f64 = 0.5;
 
 /// The drift that is allowed for every order, relative to the kinetic energy: with it the phase is lost in about ten
@@ -122,8 +122,8 @@ pub(crate) const MIN_ALLOWED_DRIFT: f64 = 0.01;
 /// The number of energy roundings that a run without steps may have; the round-off of each step is added to it.
 pub(crate) const ENERGY_ROUNDINGS: f64 = 64.0;
 
-/// The part of the allowed drift above which the two ends of a run indicate a drift. By chance, an oscillating drift that
-/// a run would flag is smaller than this at the end in about one of twenty members.
+/// The part of the allowed drift above which the two ends of a run indicate a drift. By chance, an oscillating drift
+/// that a run would flag is smaller than this at the end in about one of twenty members.
 pub(crate) const MIN_SUSPECT_DRIFT: f64 = 0.05;
 
 // Claims of structure.
@@ -136,8 +136,8 @@ pub(crate) const MIN_CLAIM_DISPLACEMENT: f64 = 0.125;
 /// lost.
 pub(crate) const MAX_CONSTANT_DIFFERENCE: f64 = 1e-6;
 
-/// The same bound in units of the estimated round-off, which both must exceed: a margin, since the estimate is that
-/// of one evaluation and does not contain the round-off of the state.
+/// The same bound in units of the estimated round-off, which both must exceed: a margin, since the estimate is that of
+/// one evaluation and does not contain the round-off of the state.
 pub(crate) const CLAIM_ROUNDINGS: f64 = 1e4;
 
 // Rest.
@@ -151,8 +151,8 @@ pub(crate) const REST_ROUNDINGS: f64 = 256.0;
 
 // Members of an ensemble in SIMD lanes: bounds on fewer measures, which are therefore stricter.
 
-/// [`MAX_LAST_COEFFICIENT`] in lanes. A single run also samples the defect between the nodes of its last step, which this
-/// bound covers.
+/// [`MAX_LAST_COEFFICIENT`] in lanes. A single run also samples the defect between the nodes of its last step, which
+/// this bound covers.
 pub(crate) const MAX_LAST_COEFFICIENT_IN_LANES: f64 = 0.1;
 
 /// For Gauss collocation with few stages in lanes, the largest change of the acceleration from step to step, times the
@@ -166,6 +166,6 @@ pub(crate) const DRIFT_MARGIN_IN_LANES: f64 = 0.8;
 
 // Paths of a boundary-value problem.
 
-/// The largest error estimate of a resolved path, relative to its range: a quarter. At a conjugate point the estimate is
-/// of order one.
+/// The largest error estimate of a resolved path, relative to its range: a quarter. At a conjugate point the estimate
+/// is of order one.
 pub(crate) const MAX_PATH_ERROR: f64 = 0.25;

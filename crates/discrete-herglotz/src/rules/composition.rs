@@ -265,4 +265,6 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
     }
 }
 
-saved!([D, const N: usize] Composition<D, N> { taken, state, velocity, sigma, evaluations, acceleration, change, before, monitor });
+saved!([D, const N: usize] Composition<D, N> {
+    taken, state, velocity, sigma, evaluations, acceleration, change, before, monitor
+});

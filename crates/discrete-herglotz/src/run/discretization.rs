@@ -12,10 +12,13 @@ use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, Step
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
-/// For a linear motion a collocation step is multiplication by one matrix, which is computed in double-double
-/// precision. It is always computed up to the first number of unknowns of a step; for more unknowns only from a number
-/// of steps on that is the cube of the unknowns divided by the second number.
-const MATRIX: (usize, usize) = (32, 1024);
+/// The largest number of unknowns of a step for which the matrix of a linear motion is always computed. A collocation
+/// step is then multiplication by this matrix, which is computed in double-double precision.
+const MAX_UNKNOWNS_OF_SMALL_MATRIX: usize = 32;
+
+/// For more unknowns, the ratio of the cube of their number to the smallest number of steps for which the matrix is
+/// computed: it costs as much as so many steps.
+const CUBED_UNKNOWNS_PER_STEP: usize = 1024;
 
 /// A problem with the integrator and the steps that are selected for it.
 pub(crate) struct Discretization<'p, L, const N: usize> {
@@ -53,7 +56,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
     /// since the matrix of a step would cost more than the iterations.
     pub fn problem_for_steps(&self) -> Problem<'p, L, N> {
         let unknowns = self.info.collocation.unwrap_or(0) * N;
-        let by_matrix = unknowns <= MATRIX.0 || unknowns.pow(3) / MATRIX.1 <= self.count;
+        let by_matrix =
+            unknowns <= MAX_UNKNOWNS_OF_SMALL_MATRIX || unknowns.pow(3) / CUBED_UNKNOWNS_PER_STEP <= self.count;
         let structure = self.problem.structure;
         Problem { structure: Structure { quadratic: structure.quadratic && by_matrix, ..structure }, ..*self.problem }
     }

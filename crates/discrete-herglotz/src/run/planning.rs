@@ -9,7 +9,14 @@ use crate::{GaussCollocation, InputError};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
+/// The number of times in the span at which the claims of structure are checked before a run with given steps.
+const CHECKED_TIMES: usize = 16;
+
+/// The same before trial runs, which check the equations of motion along the whole span.
+const CHECKED_TIMES_BEFORE_TRIAL_RUNS: usize = 4;
+
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
+    /// The plan of the request, after all checks of its input.
     pub(crate) fn plan(
         &self,
         length: StepControl<'p, L, N>,
@@ -42,8 +49,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
                 return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
             }
         }
-        // Trial runs check the equations of motion along the whole span.
-        let times = if let StepControl::Accuracy(..) = length { 4 } else { 16 };
+        let accuracy = matches!(length, StepControl::Accuracy(..));
+        let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
         check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
         let selection = match length {
             StepControl::Accuracy(wanted, select_steps) => select_steps(self, wanted, terminal)?,

@@ -6,7 +6,8 @@ use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
-/// The bound on a quantity that vanishes if a hypothesis holds: the round-off for a true one, with some margin.
+/// The bound on a quantity that vanishes if a hypothesis holds: the round-off for a true one, with a margin of some
+/// million for its derivatives.
 pub(super) const MAX_HYPOTHESIS_DEFECT: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, evaluated once.

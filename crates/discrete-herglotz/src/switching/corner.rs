@@ -13,14 +13,26 @@ use contact_geom::{
 /// step: far larger than the round-off of a position, and small enough that continuous functions change little over it.
 const SURFACE_DISTANCE: f64 = 1e-9;
 
-/// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms.
+/// A second distance, in units of [`SURFACE_DISTANCE`]: closer to the surface a jump keeps its size, while the
+/// difference of a continuous function decreases to this fraction.
+const NEAR_DISTANCE: f64 = 0.125;
+
+/// The part of a difference that a jump keeps at [`NEAR_DISTANCE`] at least.
+const MIN_KEPT_JUMP: f64 = 0.7;
+
+/// The size of a correction, relative to the number, below which corrections that no longer decrease are the round-off
+/// of the extrapolation to the surface.
+const STAGNATION_ROUND_OFF: f64 = 1e-10;
+
+/// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms: for the
+/// sums in L and the extrapolation.
 const JUMP_ROUNDINGS: f64 = 256.0;
 
 /// The step, relative to the coordinates, of the differences for the normal of a surface. With differences of order six
 /// the error is the round-off of the function divided by this, 1e-13.
 const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// The limit of Newton iterations for one number or one velocity.
+/// The largest number of Newton iterations for one number or one velocity: bisection would need as many.
 const MAX_ITERATIONS: usize = 60;
 
 /// The behaviour of a motion at a zero of a switching function.
@@ -83,7 +95,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
             }
             // The corrections decrease down to the round-off of the extrapolation.
             if size <= f64::EPSILON * max_abs_or_nan(v.iter().copied())
-                || (size >= before && size <= 1e-10 * max_abs_or_nan(v.iter().copied()))
+                || (size >= before && size <= STAGNATION_ROUND_OFF * max_abs_or_nan(v.iter().copied()))
             {
                 return Ok((v, p.dot(&v) - self.value(&v)));
             }
@@ -155,12 +167,11 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
             Ok(Corner::Continuous)
         };
     }
-    // Closer to the surface a jump keeps its size, while the difference of a continuous function decreases.
     let jump = |of: f64| one_sided(-1.0, of).value(&x.v) - one_sided(1.0, of).value(&x.v);
-    let (wide, near) = (jump(1.0), jump(0.125));
-    let (old, new) = (one_sided(1.0, 0.125), one_sided(-1.0, 0.125));
+    let (wide, near) = (jump(1.0), jump(NEAR_DISTANCE));
+    let (old, new) = (one_sided(1.0, NEAR_DISTANCE), one_sided(-1.0, NEAR_DISTANCE));
     let terms = old.value(&x.v).abs() + at.state.p.dot(&x.v).abs();
-    if near.abs() <= JUMP_ROUNDINGS * f64::EPSILON * terms || near.abs() < 0.7 * wide.abs() {
+    if near.abs() <= JUMP_ROUNDINGS * f64::EPSILON * terms || near.abs() < MIN_KEPT_JUMP * wide.abs() {
         return Ok(Corner::Continuous);
     }
     if !near.is_finite() {
@@ -213,7 +224,7 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
         let size = (change * normal.norm()).abs();
         lambda -= change;
         let scale = max_or_nan(max_abs_or_nan(p.iter().copied()), (lambda * normal.norm()).abs());
-        if size <= f64::EPSILON * scale || (size >= before && size <= 1e-10 * scale) {
+        if size <= f64::EPSILON * scale || (size >= before && size <= STAGNATION_ROUND_OFF * scale) {
             return Ok(Some(at.state.p + normal * lambda));
         }
         before = size;
@@ -243,7 +254,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
         let [a, b] = [length(of), -length(of)].map(|by| lagrangian.gradient(at.t, &moved(by)).y);
         max_or_nan(max_abs_or_nan((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
     };
-    let (wide, near) = (jump(1.0), jump(0.125));
+    let (wide, near) = (jump(1.0), jump(NEAR_DISTANCE));
     let terms = here(0.0).abs() + max_abs_or_nan(at.state.p.iter().copied());
-    near > JUMP_ROUNDINGS * f64::EPSILON * terms && near >= 0.7 * wide
+    near > JUMP_ROUNDINGS * f64::EPSILON * terms && near >= MIN_KEPT_JUMP * wide
 }

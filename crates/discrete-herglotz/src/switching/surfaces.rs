@@ -8,11 +8,17 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use std::convert::Infallible;
 
-/// The number of parts in which a step without dense output is searched for sign changes.
+/// The number of parts in which a step without dense output is searched for sign changes: twice those of a search for
+/// events, since a sign change that is missed spoils the step.
 const DEFAULT_PARTS: usize = 8;
 
-/// The limit of halvings of the part after a zero, in the search for a point where the function still has its old sign.
+/// The largest number of halvings of the part after a zero, in the search for a point where the function still has its
+/// old sign: down to the round-off of half of the digits of the time.
 const MAX_HALVINGS: i32 = 30;
+
+/// The distance over which the slope of a function at its zero is computed, as a fraction of the interval in which the
+/// zero lies: an error of 1e-8, by the central difference, is enough for Newton's method.
+const SLOPE_DISTANCE: f64 = 1e-4;
 
 /// Whether a Lagrangian has switching functions.
 ///
@@ -131,8 +137,8 @@ impl Surfaces {
         }
     }
 
-    /// Whether a surface lies within the fraction `extension` of a step before its start or after its end, where the curve
-    /// is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
+    /// Whether a surface lies within the fraction `extension` of a step before its start or after its end, where the
+    /// curve is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
@@ -207,8 +213,8 @@ impl Surfaces {
         }
         let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(x)));
         let estimate = found.unwrap_or(from);
-        let extension = 1e-4 * (to - from);
-        let slope = (toward(estimate + extension) - toward(estimate - extension)) / (2.0 * extension * curve.span());
+        let distance = SLOPE_DISTANCE * (to - from);
+        let slope = (toward(estimate + distance) - toward(estimate - distance)) / (2.0 * distance * curve.span());
         SignChange { index, ends: [from, to], estimate, slope: side * slope }
     }
 }

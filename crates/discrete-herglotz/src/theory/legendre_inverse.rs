@@ -8,7 +8,8 @@ use crate::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
 
-/// After this number of corrections that do not decrease, the remaining ones are taken for round-off.
+/// After this number of corrections that do not decrease, the remaining ones are taken for round-off: an iteration that
+/// still converges has no more than a few.
 const MAX_STALLED_CORRECTIONS: u32 = 8;
 
 /// The inverse Legendre transformation `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method

@@ -20,8 +20,8 @@ pub(super) struct Pack<S: Simd, const K: usize, const N: usize> {
     /// 1 in lanes whose iteration continues, and 1 in lanes that have failed.
     pub continuing: SimdBatch<S, K>,
     pub failed: SimdBatch<S, K>,
-    /// Whether the iteration continues in members lane, and whether it continues in all lanes; the largest change and the
-    /// largest term of the last iteration.
+    /// Whether the iteration continues in members lane, and whether it continues in all lanes; the largest change and
+    /// the largest term of the last iteration.
     pub open: bool,
     pub whole: bool,
     pub change: SimdBatch<S, K>,

@@ -219,8 +219,8 @@ impl Between {
         let g = Coefficients::of(s);
         const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
         // Set 0: the Gauss points of s - 1 stages, which lie between those of s, and one point near the end of the
-        // step, where the defect is largest. The other sets are equidistant, each shifted by the GOLDEN_RATIO ratio, so that
-        // the gaps of their union are shortest.
+        // step, where the defect is largest. The other sets are equidistant, each shifted by the GOLDEN_RATIO ratio, so
+        // that the gaps of their union are shortest.
         let inner = Coefficients::of(s.saturating_sub(1).max(1));
         let end = 0.5 * (1.0 + g.c[s - 1].0);
         let points = from_fn(|i| match set {

@@ -27,8 +27,8 @@ impl Tail {
 
     /// The defect of a step from the values at its stages, times a factor if one is given: above one if a polynomial
     /// does not approximate them. `values * time` has the units of the positions, with which the last coefficient is
-    /// compared. For at most [`FEW_STAGES`] stages the result is 0, since the last coefficient then says nothing beyond the order of the
-    /// step. All values must be finite.
+    /// compared. For at most [`FEW_STAGES`] stages the result is 0, since the last coefficient then says nothing beyond
+    /// the order of the step. All values must be finite.
     #[inline(always)]
     pub fn defect<S: Simd, const N: usize>(
         &self,

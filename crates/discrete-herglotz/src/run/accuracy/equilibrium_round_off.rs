@@ -44,7 +44,8 @@ impl EquilibriumRoundOff {
     }
 }
 
-/// The round-off of all steps in units of the round-off of one force: the contributions add up at random, and are damped.
+/// The round-off of all steps in units of the round-off of one force: the contributions add up at random, and are
+/// damped.
 pub(crate) fn accumulated_roundings(steps: usize) -> f64 {
     (64.0 + steps as f64).sqrt() * 8.0
 }

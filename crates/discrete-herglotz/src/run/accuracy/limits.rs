@@ -9,8 +9,8 @@ use crate::DividedGauss;
 /// The budget of all trial runs of a plan: some seconds.
 pub(crate) const BUDGET: u64 = 1 << 26;
 
-/// The budget of runs that are expected to reach their end, as those of long motions: so the total budget grows with the
-/// cost of the run itself.
+/// The budget of runs that are expected to reach their end, as those of long motions: so the total budget grows with
+/// the cost of the run itself.
 pub(crate) const RESERVE: u64 = 1 << 29;
 
 /// The budget of the search for the time at which an observer ends the run: about a second.
@@ -28,16 +28,16 @@ pub(crate) const CHECKS_PER_INTERRUPT_QUERY: usize = 16;
 /// The number of stages of the reference for other methods.
 pub(crate) const REFERENCE_STAGES: usize = 12;
 
-/// The number of stages from which on a Gauss method is its own reference: with fewer stages, and so a lower
-/// order, a reference with [`REFERENCE_STAGES`] stages costs less than a run with twice as many steps.
+/// The number of stages from which on a Gauss method is its own reference: with fewer stages, and so a lower order, a
+/// reference with [`REFERENCE_STAGES`] stages costs less than a run with twice as many steps.
 pub(crate) const MIN_OWN_REFERENCE_STAGES: usize = 6;
 
 /// The number of stages for short runs, and for Lagrangians whose steps are expensive.
 pub(crate) const DEFAULT_STAGES: usize = 8;
 
-/// The number of steps with [`DEFAULT_STAGES`] stages, estimated from the motion at its start, from which on the largest
-/// number of stages is the least expensive if only the accelerations are iterated: it halves the evaluations for an error,
-/// also in the trial runs, but its tables are four times as large.
+/// The number of steps with [`DEFAULT_STAGES`] stages, estimated from the motion at its start, from which on the
+/// largest number of stages is the least expensive if only the accelerations are iterated: it halves the evaluations
+/// for an error, also in the trial runs, but its tables are four times as large.
 pub(crate) const MIN_STEPS_FOR_MAX_STAGES: usize = 32;
 
 /// The number of stages in transformed time, for every error: the motion is smooth in this time, and longer steps with
@@ -52,15 +52,16 @@ pub(crate) const DIVIDED_STAGES: usize = 8;
 /// The number of parts of a span at whose ends runs are compared.
 pub(crate) const COMPARED_PARTS: usize = 10;
 
-/// The size of a motion, relative to its largest size so far, below which it may consist of the round-off of its forces.
+/// The size of a motion, relative to its largest size so far, below which it may consist of the round-off of its
+/// forces.
 pub(crate) const MAX_DECAYED_SIZE: f64 = 1e-3;
 
 /// The largest number of iterations of a search: each refines the steps or ends the search.
 pub(crate) const MAX_ITERATIONS: usize = 64;
 
-/// The number of refinements, of runs with more than [`LONG_SEARCH_STEPS`] steps, after which a step that still fails or
-/// is unresolved at the same time ends the search. A narrow feature may need many halvings of the step; at a singularity
-/// they never suffice.
+/// The number of refinements, of runs with more than [`LONG_SEARCH_STEPS`] steps, after which a step that still fails
+/// or is unresolved at the same time ends the search. A narrow feature may need many halvings of the step; at a
+/// singularity they never suffice.
 pub(crate) const MAX_FAILURES_AT_ONE_TIME: usize = 8;
 
 /// See [`MAX_FAILURES_AT_ONE_TIME`]: shorter runs are refined in any case, since they cost little.
@@ -101,8 +102,8 @@ pub(crate) const NEGLIGIBLE_DEFECT: f64 = 0.01;
 /// A defect below this, in units of the requested error, is no narrow feature, whatever its ratio to the expected one.
 pub(crate) const NEGLIGIBLE_SAMPLED_DEFECT: f64 = 0.1;
 
-/// The order of the error in units of the observed order of the defect, for the prediction of the error of the finer run.
-/// In theory it is two.
+/// The order of the error in units of the observed order of the defect, for the prediction of the error of the finer
+/// run. In theory it is two.
 pub(crate) const ERROR_ORDER_PER_DEFECT_ORDER: f64 = 1.5;
 
 /// The decrease of the defect, in units of the order, above which it is not due to the order: the finer steps end at a
@@ -111,8 +112,8 @@ pub(crate) const MAX_DEFECT_ORDER: f64 = 2.0;
 
 // The prediction of a number of steps from the defect of the first run.
 
-/// The factor by which the predicted number of steps is reduced: the error is only about the square of the
-/// defect, and too few steps are refined.
+/// The factor by which the predicted number of steps is reduced: the error is only about the square of the defect, and
+/// too few steps are refined.
 pub(crate) const PREDICTION_REDUCTION: f64 = 1.4;
 
 /// The smallest and the largest factor between the predicted number of steps and that of the first run: below the first
@@ -128,9 +129,9 @@ pub(crate) const MAX_FIRST_GUESS: usize = 1 << 20;
 /// steps are tried: each part costs several times as much as a step.
 pub(crate) const MIN_RATIO_FOR_DIVISION: usize = 32;
 
-/// The smallest reduction of the number of steps for which a time transformation is tried: each of its steps costs about
-/// as much as this number of equal steps with the same error. For Kepler orbits this holds for eccentricities above one
-/// half.
+/// The smallest reduction of the number of steps for which a time transformation is tried: each of its steps costs
+/// about as much as this number of equal steps with the same error. For Kepler orbits this holds for eccentricities
+/// above one half.
 pub(crate) const MIN_TRANSFORMATION_GAIN: f64 = 3.5;
 
 /// The number of steps that may need Newton's method before other stages are tried, in addition to
@@ -142,14 +143,15 @@ pub(crate) const MAX_NEWTON_STEPS: f64 = 2.0;
 pub(crate) const MAX_NEWTON_FRACTION: f64 = 0.25;
 
 /// The smallest and the largest number of steps before division: at least 2000 nodes, between which no wide feature is
-/// missed, and as many sample points between them for the defect. Fast parts of the motion are resolved by the division.
+/// missed, and as many sample points between them for the defect. Fast parts of the motion are resolved by the
+/// division.
 pub(crate) const DIVIDED_STEPS: [usize; 2] = [256, 1 << 14];
 
 /// The largest defect of the parts that is tried: larger parts need not resolve the motion.
 pub(crate) const MAX_PART_DEFECT: f64 = 0.02;
 
-/// The first bound on the defect of the parts, in units of the square root of the requested error: the error of a part is
-/// about the square of its defect.
+/// The first bound on the defect of the parts, in units of the square root of the requested error: the error of a part
+/// is about the square of its defect.
 pub(crate) const PART_DEFECT_PER_ROOT: f64 = 0.3;
 
 /// The largest number of iterations of the search for divided steps, each with a finer division.
@@ -182,8 +184,8 @@ pub(crate) const ERROR_ORDER_OF_LONGER_STEPS: f64 = 2.5;
 /// The largest predicted defect of longer steps: they still resolve the motion.
 pub(crate) const MAX_DEFECT_OF_LONGER_STEPS: f64 = 1e-2;
 
-/// The largest ratio of the number of stages to the observed order of the defect for a smooth motion: above it the order
-/// is not used for predictions.
+/// The largest ratio of the number of stages to the observed order of the defect for a smooth motion: above it the
+/// order is not used for predictions.
 pub(crate) const MAX_STAGES_PER_ORDER: f64 = 3.0;
 
 // The selection of a number of steps by comparison with a reference.
@@ -191,8 +193,8 @@ pub(crate) const MAX_STAGES_PER_ORDER: f64 = 3.0;
 /// The error of the reference in units of the requested error.
 pub(crate) const REFERENCE_ERROR: f64 = 1.0 / 8.0;
 
-/// The largest distance from the reference, in units of the requested error, of steps that are selected: it includes the
-/// error of the reference.
+/// The largest distance from the reference, in units of the requested error, of steps that are selected: it includes
+/// the error of the reference.
 pub(crate) const MAX_DISTANCE_FROM_REFERENCE: f64 = 0.7;
 
 /// The distance from the reference, in units of the requested error, at which predictions aim.
@@ -224,8 +226,8 @@ pub(crate) const MAX_STAGNATIONS_FROM_REFERENCE: usize = 4;
 /// Runs that differ only by round-off show an order below this: that of the lowest collocation method.
 pub(crate) const MIN_ORDER_ABOVE_ROUND_OFF: f64 = 2.0;
 
-/// The smallest distance of two runs at the end, absolutely and in units of their distance at the first comparison, that
-/// is due to chaos: round-off alone does not grow so fast in a regular motion.
+/// The smallest distance of two runs at the end, absolutely and in units of their distance at the first comparison,
+/// that is due to chaos: round-off alone does not grow so fast in a regular motion.
 pub(crate) const MIN_CHAOTIC_DISTANCE: f64 = 1e-8;
 
 /// See [`MIN_CHAOTIC_DISTANCE`].
@@ -259,6 +261,6 @@ pub(crate) const MAX_REST_SEARCH_STEPS: usize = 1 << 20;
 /// The number of steps between two checks whether the motion is at rest.
 pub(crate) const STEPS_BETWEEN_REST_CHECKS: usize = 64;
 
-/// The error of the linearised motion at the start that determines the step size of that search: only the time of rest is
-/// needed.
+/// The error of the linearised motion at the start that determines the step size of that search: only the time of rest
+/// is needed.
 pub(crate) const REST_SEARCH_ERROR: f64 = 1e-3;

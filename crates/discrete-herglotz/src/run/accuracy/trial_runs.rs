@@ -220,7 +220,8 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
     }
 
     /// Takes `count` steps, at most `stride` at a time. After each of these chunks `after_chunk` is called with the
-    /// completed fraction of the span; it may end the run, and returns the cost so far, which is deducted from the budget.
+    /// completed fraction of the span; it may end the run, and returns the cost so far, which is deducted from the
+    /// budget.
     fn take_steps<R: Stepper<N> + ?Sized>(
         &mut self,
         run: &mut R,

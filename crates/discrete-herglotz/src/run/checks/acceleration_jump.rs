@@ -13,8 +13,8 @@ use contact_geom::{
     support::herglotz_rates,
 };
 
-/// The number of parts of a suspect interval at whose ends the acceleration is evaluated: second differences of a smooth
-/// acceleration are then a thousandth of what they are over the interval, and those of a jump are not.
+/// The number of parts of a suspect interval at whose ends the acceleration is evaluated: second differences of a
+/// smooth acceleration are then a thousandth of what they are over the interval, and those of a jump are not.
 const ACCELERATION_PARTS: usize = 32;
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {

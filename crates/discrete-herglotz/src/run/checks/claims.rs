@@ -22,9 +22,10 @@ const PARTS_OF_A_STEP: usize = 8;
 const CHECKS_PER_DOUBLING: usize = 8;
 
 /// Compares the quantities that are claimed to be constant (the mass matrix, `L_z` and second derivatives) with their
-/// values at the start of a run. Checks are due after [`CHECKS_PER_DOUBLING`] steps in each doubling of the number of steps;
-/// they are made if the motion has moved by a given part of its extent since the last one, so that the distance between two
-/// checks is about that part. A step whose own displacement exceeds it is checked at points within the step.
+/// values at the start of a run. Checks are due after [`CHECKS_PER_DOUBLING`] steps in each doubling of the number of
+/// steps; they are made if the motion has moved by a given part of its extent since the last one, so that the distance
+/// between two checks is about that part. A step whose own displacement exceeds it is checked at points within the
+/// step.
 ///
 /// A check costs about as much as a step. [`Structure::defects`] checks more, and is evaluated less often.
 pub(crate) struct ClaimMonitor<const N: usize> {

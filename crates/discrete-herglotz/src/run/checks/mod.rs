@@ -26,7 +26,8 @@ const MAX_STEPS_BETWEEN_FULL_CHECKS: usize = 1 << 14;
 /// both.
 const MAX_STEPS_PAST_END: usize = 2;
 
-/// The number of steps after which all claims are checked next: every power of two, and the multiples of [`MAX_STEPS_BETWEEN_FULL_CHECKS`].
+/// The number of steps after which all claims are checked next: every power of two, and the multiples of
+/// [`MAX_STEPS_BETWEEN_FULL_CHECKS`].
 pub(crate) fn next_full_check(taken: usize) -> usize {
     (taken + 1)
         .checked_next_power_of_two()

@@ -28,8 +28,8 @@ pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Pr
     still && free && slope.z < 0.0 && h.vv.cholesky().is_some() && (-h.qq).cholesky().is_some()
 }
 
-/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`MAX_SIZE_AT_REST`], and its
-/// action, if it is requested, is constant.
+/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`MAX_SIZE_AT_REST`], and
+/// its action, if it is requested, is constant.
 pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     needs: OutputRequest,

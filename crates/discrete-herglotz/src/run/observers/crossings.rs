@@ -17,10 +17,29 @@ const RELATIVE_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// 0, or may have different signs on the motion and on the interpolant.
 const MAX_NEAR_VALUE: f64 = 0.01;
 
-/// Fractions of the distance of two points: the tolerance of the root of the interpolant between them, and the distance
-/// over which its slope is computed.
+/// The tolerance of the root of the interpolant between two points, as a fraction of their distance: smaller than the
+/// error of the interpolant, so that the first state of the motion is computed as near to the root as it can be.
 const ROOT_TOLERANCE: f64 = 1e-9;
+
+/// The distance over which the slope of the interpolant is computed, as a fraction of the distance of the two points.
 const SLOPE_DISTANCE: f64 = 1e-3;
+
+/// The smallest distance of two iterates, in units of [`SLOPE_DISTANCE`], whose secant replaces the slope of the
+/// interpolant: below it the round-off of the function dominates the secant.
+const MIN_SECANT_DISTANCE: f64 = 0.1;
+
+/// The largest distance of two iterates, in units of [`SLOPE_DISTANCE`], that may be due to round-off, if the function
+/// does not decrease by more than [`MIN_DECREASE`].
+const MAX_ROUND_OFF_DISTANCE: f64 = 0.01;
+
+/// The ratio of two values of the function above which it does not decrease.
+const MIN_DECREASE: f64 = 0.25;
+
+/// The assumed number of steps of a run whose number of steps is not known.
+const DEFAULT_COUNT: f64 = 64.0;
+
+/// The largest time scale of the round-off of times, in steps: for long runs it stays far below a step.
+const MAX_SPAN_IN_STEPS: f64 = 4096.0;
 
 /// The largest number of corrections of a root; after these the root is bracketed on the motion itself.
 const MAX_CORRECTIONS: usize = 6;
@@ -78,9 +97,8 @@ pub(crate) struct TimeScales {
 impl TimeScales {
     pub(crate) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
         let span = t_end - t0;
-        let h = h.unwrap_or(span / count.map_or(64.0, |count| count.max(1) as f64));
-        // For long runs a part of the span, so that the round-off of times stays far below a step.
-        TimeScales { h, span: span.abs().min(4096.0 * h.abs()) }
+        let h = h.unwrap_or(span / count.map_or(DEFAULT_COUNT, |count| count.max(1) as f64));
+        TimeScales { h, span: span.abs().min(MAX_SPAN_IN_STEPS * h.abs()) }
     }
 
     /// The round-off of a time.
@@ -220,15 +238,15 @@ impl<const N: usize> Event<'_, N> {
             return Ok(None);
         }
         let mut tau = bracketed_root_within(ROOT_TOLERANCE * (b - a), [a, b], ends, &mut interpolant)?;
-        let aside = SLOPE_DISTANCE * (b - a);
-        let (lower, upper) = ((tau - aside).max(0.0), (tau + aside).min(1.0));
+        let distance = SLOPE_DISTANCE * (b - a);
+        let (lower, upper) = ((tau - distance).max(0.0), (tau + distance).min(1.0));
         let mut slope = (interpolant(upper)? - interpolant(lower)?) / (upper - lower);
         let mut last: Option<(f64, f64, (f64, PhasePoint<N>))> = None;
         for _ in 0..MAX_CORRECTIONS {
             let at = (step.time(tau), step.at(step.time(tau))?);
             let g = self.value(at.0, &at.1);
             if let Some((before, g_before, _)) = last
-                && (tau - before).abs() > 0.1 * aside
+                && (tau - before).abs() > MIN_SECANT_DISTANCE * distance
             {
                 slope = (g - g_before) / (tau - before);
             }
@@ -259,14 +277,14 @@ impl<const N: usize> Event<'_, N> {
             }
             // If two iterates differ by round-off only, the one with the smaller value is taken.
             if let Some((_, g_before, before)) = last
-                && g.abs() > 0.25 * g_before.abs()
-                && change.abs() <= 0.01 * aside
+                && g.abs() > MIN_DECREASE * g_before.abs()
+                && change.abs() <= MAX_ROUND_OFF_DISTANCE * distance
             {
                 return Ok(Some(if g.abs() < g_before.abs() { at } else { before }));
             }
             last = Some((tau, g, at));
             tau -= change;
-            if !(a - aside..=b + aside).contains(&tau) || !(0.0..=1.0).contains(&tau) {
+            if !(a - distance..=b + distance).contains(&tau) || !(0.0..=1.0).contains(&tau) {
                 return Ok(None);
             }
         }
@@ -407,12 +425,12 @@ impl<const N: usize> Event<'_, N> {
             |x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
         let mut sum = change(PhasePoint { z: state.z + z, ..*state });
         for i in 0..N {
-            let mut aside = *state;
-            aside.q[i] += q;
-            sum += change(aside);
-            aside = *state;
-            aside.p[i] += p;
-            sum += change(aside);
+            let mut distance = *state;
+            distance.q[i] += q;
+            sum += change(distance);
+            distance = *state;
+            distance.p[i] += p;
+            sum += change(distance);
         }
         sum
     }

@@ -9,9 +9,11 @@ use contact_geom::nalgebra::SVector;
 /// interpolant through both ends has at most three sign changes.
 const INTERPOLATED_PARTS: usize = 4;
 
-/// The distance, as a fraction of a step, over which the curvature of the interpolant is computed, and the relative
-/// difference between its slope and that of the motion up to which the curvature is used.
+/// The distance, as a fraction of a step, over which the curvature of the interpolant is computed.
 const CURVATURE_DISTANCE: f64 = 1e-3;
+
+/// The largest relative difference between the slope of the interpolant and that of the motion with which the curvature
+/// is used: its error then changes a state at [`TaylorPolynomial::MAX_DISTANCE`] by less than round-off.
 const MAX_SLOPE_DIFFERENCE: f64 = 1e-4;
 
 /// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.

@@ -4,7 +4,8 @@ use crate::InputError;
 use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
 use std::ops::ControlFlow;
 
-/// The number of steps between two reports, if the total number of steps is not known.
+/// The number of steps between two reports, if the total number of steps is not known: below a millisecond of short
+/// steps, so that a bar moves smoothly.
 const DEFAULT_STRIDE: usize = 1 << 10;
 
 /// Reports the completed fraction of the span of a run, from 0 to 1, at each hundredth: for a progress bar.

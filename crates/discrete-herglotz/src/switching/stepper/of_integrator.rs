@@ -13,7 +13,7 @@ const END_EXTENSION: f64 = 1e-9;
 /// A bound for the distance by which negative substeps make a composition leave its step, in units of the step.
 const SUBSTEP_EXTENSION: f64 = 0.5;
 
-/// The highest order of the parts.
+/// The highest order of the parts, which are steps of Gauss collocation.
 const MAX_PART_ORDER: u32 = 2 * Gauss::<()>::STAGES as u32;
 
 /// The stepper of an integrator with steps that end on kinks and jumps.

@@ -13,13 +13,16 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// The limit of the parts of a step; a step with more fails with [`StepError::Switching`] or [`StepError::Undivided`].
+/// The largest number of parts of a step; a step with more fails with [`StepError::Switching`] or
+/// [`StepError::Undivided`]. Each costs as much as a step, so that a failure takes a second at most.
 const MAX_PARTS: usize = 4096;
 
-/// The limit of sign changes at one point: a motion that is pushed to a surface from both sides has infinitely many.
+/// The largest number of sign changes at one point, more than there are surfaces through a corner: a motion that is
+/// pushed to a surface from both sides has infinitely many.
 const MAX_CHANGES_AT_ONE_POINT: usize = 16;
 
-/// The Newton iterations for a zero before it is bracketed.
+/// The largest number of Newton iterations for a zero before it is bracketed: they converge quadratically from a zero
+/// of the curve of the step.
 const MAX_NEWTON_ITERATIONS: usize = 8;
 
 /// A part of a step.

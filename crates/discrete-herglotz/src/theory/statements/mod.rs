@@ -43,8 +43,8 @@ pub const STATEMENTS: [Statement; 16] = [
     Statement::MidpointRule,
 ];
 
-/// The number of steps of the longest path along which the differential of the action is computed: the product of as many
-/// `sigma_d` shows an error in their order.
+/// The number of steps of the longest path along which the differential of the action is computed: the product of as
+/// many `sigma_d` shows an error in their order.
 const LONGEST_PATH: usize = 12;
 
 /// The residual of a statement of section 3 for a discrete Lagrangian at a time and a point of Q x Q x R.
