@@ -97,8 +97,8 @@ impl EnergyMonitor {
         if let Some(known) = known {
             let Energies { kinetic, total, terms } = energies(known == Known::Bounded);
             if total.is_finite() && kinetic.is_finite() {
-                let sample = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
-                monitor.known = Some((known, EnergyDrift::new(order, &sample)));
+                let look = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
+                monitor.known = Some((known, EnergyDrift::new(order, &look)));
                 monitor.start = [total, kinetic + terms];
             }
         }
@@ -124,7 +124,7 @@ impl EnergyMonitor {
 
     /// Checks the energy of a state. `energies` returns the energies of this state at a given time; its second argument
     /// requests `T + V` instead of `E_L`.
-    pub fn sample(
+    pub fn look(
         &mut self,
         system: &AssembledSystem,
         reached: Reached,
@@ -137,10 +137,10 @@ impl EnergyMonitor {
         // A decrease of the bounded energy is not a drift.
         let [start, start_terms] = self.start;
         let (found, log_factor) = if bounded { (max_or_nan(total, start), 0.0) } else { (total, log_factor) };
-        let sample = EnergySample { total: found, kinetic, terms, log_factor, taken };
+        let look = EnergySample { total: found, kinetic, terms, log_factor, taken };
         let rounding = |sigma: f64| f64::EPSILON * (kinetic + terms + start_terms * sigma);
         self.looked = taken;
-        let Some(defect) = drift.defect(&sample, rounding) else { return };
+        let Some(defect) = drift.defect(&look, rounding) else { return };
         // The test for dependence on time uses the times of the steps, or `TIMES` equidistant times if there are more
         // steps.
         let span = t - self.t0;

@@ -52,7 +52,7 @@ impl<const N: usize> Lane<N> {
     }
 
     /// Updates the state, and records a row if rows are recorded.
-    pub fn reach(&mut self, t: f64, state: PhasePoint<N>) {
+    pub fn record(&mut self, t: f64, state: PhasePoint<N>) {
         self.state = state;
         if let Some(rows) = &mut self.rows {
             rows.push(row(t, state, self.action));

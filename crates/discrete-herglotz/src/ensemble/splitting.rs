@@ -183,7 +183,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             }
             let whole = self.take_steps::<S, K, ACTION, CHECKED>(in_flight, stride, |t, w, at| {
                 for (i, lane) in members.iter_mut().skip(w * width).take(width).enumerate() {
-                    lane.reach(t, at.state(i));
+                    lane.record(t, at.state(i));
                     lane.suspect = at.suspect.lanes()[i] != 0.0;
                 }
             });
@@ -193,14 +193,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         }
     }
 
-    /// Takes all steps, with the operations of a single run in the same order. `reach` is called after each stride and
+    /// Takes all steps, with the operations of a single run in the same order. `record` is called after each stride and
     /// at the end. Returns false if it was interrupted.
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
         in_flight: &mut [Pack<S, K, N>],
         stride: usize,
-        mut reach: impl FnMut(f64, usize, &Pack<S, K, N>),
+        mut record: impl FnMut(f64, usize, &Pack<S, K, N>),
     ) -> bool {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
@@ -240,7 +240,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                 // this one.
                 let mut at = *m;
                 self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
-                reach(t0 + taken as f64 * h, w, &at);
+                record(t0 + taken as f64 * h, w, &at);
             }
         }
         true

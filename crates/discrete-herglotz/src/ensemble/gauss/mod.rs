@@ -126,7 +126,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
                 if taken % stride == 0 || taken == self.steps {
                     for (own, m) in members.chunks_mut(width).zip(&in_flight) {
                         for (i, lane) in own.iter_mut().enumerate() {
-                            lane.reach(self.t0 + taken as f64 * self.h, self.state(m, i));
+                            lane.record(self.t0 + taken as f64 * self.h, self.state(m, i));
                             lane.suspect = m.suspect.lanes()[i] != 0.0;
                             if m.failed.lanes()[i] != 0.0 {
                                 lane.status = LaneStatus::Failed;

@@ -1,4 +1,4 @@
-//! Whether a step resolves the motion, judged by the last Legendre coefficient of its stages and by its conformal
+//! Whether a step resolves the motion, measured by the last Legendre coefficient of its stages and by its conformal
 //! factor.
 
 use crate::gauss::tables::coefficients::Coefficients;

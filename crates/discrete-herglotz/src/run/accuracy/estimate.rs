@@ -34,13 +34,13 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
             }
             velocities.at(fine.time(), &fine.state(), fine.last_velocity());
         }
-        let mut seen = |state: &PhasePoint<N>, near| {
+        let mut track = |state: &PhasePoint<N>, near| {
             let v = velocities.at(t, state, near);
             let (speed, scales) = (velocities.speed(done), self.scales);
             Track { speed, scales, ..Track::of_end(state, v) }
         };
-        let coarse = seen(end, near);
-        let distance = coarse.distance_at_end(&seen(&fine.state(), fine.last_velocity()));
+        let coarse = track(end, near);
+        let distance = coarse.distance_at_end(&track(&fine.state(), fine.last_velocity()));
         if distance.is_nan() { f64::INFINITY } else { distance }
     }
 }

@@ -31,7 +31,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 /// two do not agree, and before them one that ends because its defect is too large. The run has more than k steps, or
 /// more than 1.2 k.
 #[test]
-fn pilot_runs_cost_little() {
+fn trial_runs_cost_little() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
@@ -40,10 +40,10 @@ fn pilot_runs_cost_little() {
         assert_eq!(count, run.steps);
         // The cost of the defect samples is twice the number of their points, of which there are at least 2000 in
         // addition to those of the steps.
-        let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
+        let (spent, sampled) = (spent as f64, 2.5 * 2.0 * 2000.0);
         // The shortest run after trial runs with k, k + 1 and 2k steps has 0.6 k steps, and a first trial run may have
         // failed.
-        let most = 10.0 * run.evaluations as f64 + looks;
+        let most = 10.0 * run.evaluations as f64 + sampled;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
 }
@@ -89,7 +89,7 @@ fn steps_that_cost_less_are_taken() {
 /// Trial runs in transformed time cost a small multiple of the run too. If transformed time has no advantage, testing
 /// it costs nothing: the cost equals that for the integrator given by name.
 #[test]
-fn pilot_runs_by_a_clock_cost_little() {
+fn trial_runs_in_transformed_time_cost_little() {
     let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
     for e in [0.0, 0.1, 0.6, 0.9, 0.99] {
         for apocentre in [false, true] {

@@ -235,7 +235,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let (mut states, mut round_off, mut taken, mut spent) =
             (Vec::with_capacity(COMPARED_PARTS), Vec::with_capacity(COMPARED_PARTS), 0, 0);
         let mut largest_size = norm(&[problem.state.q, problem.state.p]);
-        let (mut velocities, mut seen) =
+        let (mut velocities, mut speeds) =
             (Vec::with_capacity(COMPARED_PARTS), Velocities::new(problem, self.request.scales));
         let (mut ending, mut chunks) = (None, 0_usize);
         while ending.is_none()
@@ -261,10 +261,10 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             let on_grid = taken == steps || (run.time() - time) * span >= 0.0;
             let x = run.state();
             if on_grid || stride > 1 {
-                let v = seen.at(run.time(), &x, run.last_velocity());
+                let v = speeds.at(run.time(), &x, run.last_velocity());
                 velocities.extend(on_grid.then_some(v));
             } else {
-                seen.record_position(run.time(), &x.q);
+                speeds.record_position(run.time(), &x.q);
             }
             if on_grid {
                 let state = [x.q, x.p];
@@ -283,7 +283,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         }
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
-        let (speed, scales) = (seen.speed(taken), self.request.scales);
+        let (speed, scales) = (speeds.speed(taken), self.request.scales);
         let track = Track { states, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
         ending.unwrap_or(TrialEnd::Completed(track))
     }

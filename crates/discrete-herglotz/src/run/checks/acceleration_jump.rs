@@ -39,11 +39,11 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         let start = legendre_inverse(lagrangian, *t, from, &first.v).ok()?;
         let end = legendre_inverse(lagrangian, t + span, to, &start.v).ok()?;
         // Substeps back and forth leave the interval by up to half a step, but they do not leave the span of the run.
-        let aside = if self.info.substeps { 0.5 * self.h } else { 0.0 };
+        let excursion = if self.info.substeps { 0.5 * self.h } else { 0.0 };
         // If the conformal factor is exact, linear drag is resolved whatever its strength, and is left out.
         let exact_drag = self.info.exact_rate;
-        let before = if *step > 0 { aside } else { 0.0 };
-        let after = if step + steps < self.count { aside } else { 0.0 };
+        let before = if *step > 0 { excursion } else { 0.0 };
+        let after = if step + steps < self.count { excursion } else { 0.0 };
         let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); ACCELERATION_PARTS + 1], 0.0);
         for (i, acceleration) in accelerations.iter_mut().enumerate() {
             let at = (before + span + after) * (i as f64 / ACCELERATION_PARTS as f64) - before;

@@ -156,7 +156,7 @@ fn compensated_sums_keep_the_floor() -> Outcome {
     Ok(())
 }
 
-/// An unbounded motion halts at its last finite state, also within a chunk of steps, and stays there.
+/// An unbounded motion stops at its last finite state, also within a chunk of steps, and stays there.
 #[test]
 fn a_run_away_halts_at_its_last_finite_state() -> Outcome {
     struct Hill;
@@ -171,9 +171,9 @@ fn a_run_away_halts_at_its_last_finite_state() -> Outcome {
     let mut motion =
         Splitting::new(&Hill, &SplittingScheme::KAHAN_LI_6, 0.001, 0.0, PhasePoint::new([1.0], [0.0], 0.0))?;
     let cause = StepError::NonFinite;
-    let halt = motion.advance(5000);
-    let taken = halt.err().map_or(0, |halt| halt.taken);
-    assert_eq!(halt, Err(StepFailure { taken, cause }));
+    let failure = motion.advance(5000);
+    let taken = failure.err().map_or(0, |failure| failure.taken);
+    assert_eq!(failure, Err(StepFailure { taken, cause }));
     assert!(taken > 900 && ChartVector::from(motion.state()).is_finite(), "{taken}");
     let before = motion.state();
     assert_eq!(motion.advance(1), Err(StepFailure { taken: 0, cause }));
