@@ -12,8 +12,8 @@ use contact_geom::nalgebra::SVector;
 /// so that a point near the predicted one needs four.
 const MAX_CORRECTIONS: u32 = 8;
 
-/// The cosine of the angle between neighbouring tangents, 26 degrees, below which the step is
-/// halved. A larger angle indicates a corner or another branch.
+/// The cosine of the angle between neighbouring tangents, 26 degrees, below which the step is halved. A larger angle
+/// indicates a corner or another branch.
 const MIN_TANGENT_COSINE: f64 = 0.9;
 
 /// The shortest step, relative to the first one: the branch ends where twenty halvings find no further path.

@@ -133,8 +133,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { known: known.iter().map(|path| path.points.clone()).collect(), length, ..self })
     }
 
-    /// Searches for a critical path; the status of the result is [`PathStatus::Found`](super::PathStatus::Found) if it was
-    /// found.
+    /// Searches for a critical path; the status of the result is [`PathStatus::Found`](super::PathStatus::Found) if it
+    /// was found.
     ///
     /// With deflation, a search that fails from its initial path is repeated from paths on both sides of the known
     /// ones.

@@ -20,14 +20,15 @@
 //! | Claims, `run/checks/claims.rs` | runs of a Lagrangian whose claims are not proved | Steps that rely on a false claim solve other equations, which all measures above take for right |
 //! | Rest, `run/checks/rest.rs` | all runs | The motion has decayed until products of its numbers underflow, so that defects relative to it are undefined |
 //!
-//! Members of an ensemble in SIMD lanes are checked by one bound on the first or third of these measures
-//! (`ensemble/splitting.rs`, `ensemble/gauss`); a member that exceeds it is suspect, and has a run of its own with all
-//! of them. Paths of a boundary-value problem are checked by the second differences of their velocities and by the
-//! effect of the truncation error (`boundary/path_check.rs`).
+//! Members of an ensemble in SIMD lanes are checked by one bound on the second differences of the velocity, or on the
+//! tail of the stage polynomials (`ensemble/splitting.rs`, `ensemble/gauss/step.rs`), and by the energies of their
+//! ends; a member that exceeds a bound is suspect, and has a run of its own with all measures. Paths of a
+//! boundary-value problem are checked by the second differences of their velocities and by the effect of the truncation
+//! error (`boundary/path_check.rs`).
 //!
 //! For a requested accuracy the steps are not given but found: trial runs with k, 2k and k + 1 steps must agree, and
-//! every step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the measures above
-//! are not taken again; only collocation keeps those that its steps take anyway.
+//! every step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the run with the
+//! selected steps takes no measure again but claims, rest, and for collocation those that its steps take anyway.
 
 pub(crate) mod monitor;
 pub(crate) mod thresholds;

@@ -199,11 +199,11 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
         let allowed = MAX_PREDICTED_ERROR * goal;
         let agreed = error <= MAX_DISTANCE_OF_AGREEING_RUNS * goal
             || (error <= MAX_PREDICTIVE_DISTANCE && beyond <= allowed && round_off <= allowed);
-        let mut hidden = None;
+        let mut disagreement = None;
         if falls && agreed {
-            hidden = disagreement_of_other_nodes(trials, stages, k, compared, goal, fine)?;
+            disagreement = disagreement_of_other_nodes(trials, stages, k, compared, goal, fine)?;
         }
-        if falls && agreed && hidden.is_none() {
+        if falls && agreed && disagreement.is_none() {
             return Ok(Converged {
                 k,
                 errors: [error, beyond],
@@ -215,15 +215,15 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
                 irregular: irregular || narrow_features > 0 || fall > MAX_DEFECT_ORDER * s,
             });
         }
-        irregular |= !falls || hidden.is_some();
+        irregular |= !falls || disagreement.is_some();
         let apart = error;
-        let error = max_or_nan(error, hidden.unwrap_or(0.0));
+        let error = max_or_nan(error, disagreement.unwrap_or(0.0));
         stagnations = if error < 0.5 * best { 0 } else { stagnations + 1 };
         cause = if !falls && agreed {
             SelectionFailure::DefectBetweenNodes { defect: fine.defect, order }
         } else if !falls {
             SelectionFailure::Order { order }
-        } else if let Some(distance) = hidden {
+        } else if let Some(distance) = disagreement {
             SelectionFailure::FeatureAtNodes { distance }
         } else if before.is_nan() {
             // The first two runs do not determine an order, and are the last ones if others would cost too much.
@@ -248,7 +248,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
 
 /// The distance between the end of a run with k + 1 steps and that of two runs that agree, if it is too large. The
 /// nodes of both of these lie on the ends of the k steps, and so on any kink or pulse that begins at one of them.
-/// `None` if the third run agrees too, or if nothing can be hidden: kinks of a formula that is proved end steps.
+/// `None` if the third run agrees too, or if no feature can be hidden: kinks of a formula that is proved end steps.
 pub(crate) fn disagreement_of_other_nodes<L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, '_, L, N>,
     stages: usize,

@@ -1,6 +1,6 @@
 //! Checks along a run: whether its steps resolve the motion, and whether the claims of structure hold.
 //!
-//! [`crate::resolution`] contains the monitor of the steps.
+//! [`crate::resolution`] lists the measures, with their thresholds, and contains the monitor of the steps.
 
 pub(crate) mod acceleration_jump;
 pub(crate) mod claims;
