@@ -231,7 +231,7 @@ fn causes() {
     // Blow-up of z in a finite time.
     let pole = Bench { c: -1.0, ..FREE };
     let cause = refused(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0);
-    let Some(InputError::Accuracy { cause: SelectionFailure::Halted { t, .. }, .. }) = cause else {
+    let Some(InputError::Accuracy { cause: SelectionFailure::StepFailed { t, .. }, .. }) = cause else {
         panic!("{cause:?}")
     };
     // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has

@@ -333,9 +333,9 @@ fn selection_failures() {
         SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
         SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
         SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
-        SelectionFailure::Misfit { .. } => failure(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        SelectionFailure::Hidden { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
-        SelectionFailure::Halted { .. } => failure(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
+        SelectionFailure::DefectBetweenNodes { .. } => failure(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
+        SelectionFailure::FeatureAtNodes { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
+        SelectionFailure::StepFailed { .. } => failure(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
         SelectionFailure::Unresolved { .. } => failure(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
         SelectionFailure::Budget => failure(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
     });

@@ -77,7 +77,9 @@ fn jumps_of_the_potential_are_refused() {
         };
         let reported = matches!(
             cause,
-            SelectionFailure::Order { .. } | SelectionFailure::Misfit { .. } | SelectionFailure::Unresolved { .. }
+            SelectionFailure::Order { .. }
+                | SelectionFailure::DefectBetweenNodes { .. }
+                | SelectionFailure::Unresolved { .. }
         );
         assert!(reported, "{place}, {height}: {cause:?}");
     }
@@ -146,7 +148,7 @@ fn singularities_end_the_search_soon() {
             matches!(
                 refused,
                 Some(InputError::Accuracy {
-                    cause: SelectionFailure::Halted { .. } | SelectionFailure::Unresolved { .. },
+                    cause: SelectionFailure::StepFailed { .. } | SelectionFailure::Unresolved { .. },
                     ..
                 })
             ),

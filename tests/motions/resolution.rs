@@ -63,7 +63,8 @@ fn no_run_passes_a_centre_of_force() -> Outcome {
                 let h = 0.2 * 40f64.powf(-k as f64 / 40.0);
                 let steps = (3.0 / h) as usize;
                 for scheme in &SplittingScheme::ALL {
-                    let motion = Splitting::new(&kepler, scheme, h * scheme.stages() as f64, 0.0, start)?.watched();
+                    let motion = Splitting::new(&kepler, scheme, h * scheme.stages() as f64, 0.0, start)?
+                        .with_resolution_check();
                     all += 1;
                     if !is_reported(motion, 1 + steps / scheme.stages()) {
                         missed.push((scheme.name(), gamma, aside, h));
@@ -98,7 +99,10 @@ fn the_edge_of_stability_is_flagged() -> Outcome {
     for k in 0..10 {
         // The frequency at this amplitude is about 1.6.
         let h = 0.75 + 0.05 * f64::from(k);
-        assert!(is_reported(Splitting::new(&hard, &SplittingScheme::STRANG, h, 0.0, start)?.watched(), 2000), "{h}");
+        assert!(
+            is_reported(Splitting::new(&hard, &SplittingScheme::STRANG, h, 0.0, start)?.with_resolution_check(), 2000),
+            "{h}"
+        );
         let strang = Strang::new(&hard, h, 0.0, &start)?;
         assert!(is_reported(Flow::new(&strang, 0.0, start)?, 2000), "as a flow {h}");
     }
@@ -117,7 +121,11 @@ fn assert_resolved<L: Lagrangian<N>, const N: usize>(l: &L, h: f64, t0: f64, sta
     for scheme in &SplittingScheme::ALL {
         let stages = scheme.stages();
         let h = h * stages as f64;
-        assert_not_flagged(scheme.name(), Splitting::new(l, scheme, h, t0, start)?.watched(), steps / stages);
+        assert_not_flagged(
+            scheme.name(),
+            Splitting::new(l, scheme, h, t0, start)?.with_resolution_check(),
+            steps / stages,
+        );
     }
     assert_rules_resolve(l, h, t0, start, steps)
 }
@@ -174,7 +182,7 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
     // such a beginning for a turn.
     let rest = PhasePoint::new([0.0], [0.0], 0.0);
     for scheme in &SplittingScheme::ALL {
-        let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.watched();
+        let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.with_resolution_check();
         assert_not_flagged(scheme.name(), motion, 10_000 / scheme.stages());
     }
     let midpoint = Midpoint::new(&Pulse, 0.01)?;
@@ -204,8 +212,8 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
 #[test]
 fn the_unresolved_step_is_that_of_its_number() -> Outcome {
     let (kepler, start) = (Kepler::<2> { mu: 1.0, gamma: 0.0 }, PhasePoint::new([1.0, 0.0], [0.0, 0.0], 0.0));
-    let mut motion = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
-    let mut at_once = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
+    let mut motion = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.with_resolution_check();
+    let mut at_once = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.with_resolution_check();
     let seen = (0..200).find(|_| motion.advance(1).is_ok() && motion.unresolved().is_some());
     assert_eq!(at_once.advance(200), Ok(()));
     let found = at_once.unresolved();

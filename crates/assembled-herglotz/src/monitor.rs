@@ -5,7 +5,7 @@ use crate::system::{AssembledSystem, State};
 use contact_geom::numbers::max_or_nan;
 use discrete_herglotz::{
     UnresolvedStep,
-    checks::{EnergyDrift, EnergyLook},
+    checks::{EnergyDrift, EnergySample},
 };
 
 /// The number of steps between two energy checks in long runs. A check costs about five of the least expensive steps,
@@ -97,7 +97,7 @@ impl EnergyMonitor {
         if let Some(known) = known {
             let Energies { kinetic, total, terms } = energies(known == Known::Bounded);
             if total.is_finite() && kinetic.is_finite() {
-                let look = EnergyLook { total, kinetic, terms, log_factor: 0.0, taken: 0 };
+                let look = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
                 monitor.known = Some((known, EnergyDrift::new(order, &look)));
                 monitor.start = [total, kinetic + terms];
             }
@@ -137,7 +137,7 @@ impl EnergyMonitor {
         // A decrease of the bounded energy is not a drift.
         let [start, start_terms] = self.start;
         let (found, log_factor) = if bounded { (max_or_nan(total, start), 0.0) } else { (total, log_factor) };
-        let look = EnergyLook { total: found, kinetic, terms, log_factor, taken };
+        let look = EnergySample { total: found, kinetic, terms, log_factor, taken };
         let rounding = |sigma: f64| f64::EPSILON * (kinetic + terms + start_terms * sigma);
         self.looked = taken;
         let Some(defect) = drift.defect(&look, rounding) else { return };

@@ -314,7 +314,7 @@ pub enum SelectionFailure {
         "between the nodes of their steps the motion misses its equations by {defect:.1e} of its size, which shorter steps better only \
          with order {order:.1}: a kink, a jump or something narrow lies there; ask for less, or smooth the Lagrangian"
     )]
-    Misfit {
+    DefectBetweenNodes {
         /// The largest defect of the finer run, relative to the largest momentum.
         defect: f64,
         /// The order with which it decreases.
@@ -326,7 +326,7 @@ pub enum SelectionFailure {
          Lagrangian",
         how_far(*distance)
     )]
-    Hidden {
+    FeatureAtNodes {
         /// The distance between the final states; infinite where the run with one more step does not resolve the
         /// motion.
         distance: f64,
@@ -335,7 +335,7 @@ pub enum SelectionFailure {
     #[error(
         "the motion cannot be followed beyond t = {t}, however short the steps: end the span before it (the last attempt: {cause})"
     )]
-    Halted {
+    StepFailed {
         /// The time that is reached.
         t: f64,
         /// The cause of the last failure.
@@ -476,12 +476,12 @@ mod tests {
     fn an_accuracy_says_what_was_not_reached() {
         let said =
             |reached: f64, cause: SelectionFailure| InputError::Accuracy { wanted: 1e-9, reached, cause }.to_string();
-        let defect = SelectionFailure::Misfit { defect: 3e-4, order: 0.5 };
+        let defect = SelectionFailure::DefectBetweenNodes { defect: 3e-4, order: 0.5 };
         let table = [
             (said(1e-16, defect), "1e-9 is not certain, though trial runs agree to 1.0e-16: between the nodes"),
             (said(1e-16, defect), "misses its equations by 3.0e-4 of its size"),
             (
-                said(1e-16, SelectionFailure::Hidden { distance: 2e-3 }),
+                said(1e-16, SelectionFailure::FeatureAtNodes { distance: 2e-3 }),
                 "with one step more ends 2.0e-3 away from them: a kink",
             ),
             (

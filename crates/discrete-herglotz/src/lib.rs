@@ -45,7 +45,7 @@ pub mod theory;
 /// suspect intervals, and jumps of L.
 pub mod checks {
     pub use crate::integration::{SuspectInterval, check_claims};
-    pub use crate::run::{EnergyDrift, EnergyLook};
+    pub use crate::run::{EnergyDrift, EnergySample};
     pub use crate::switching::jumps_between;
 }
 

@@ -23,7 +23,7 @@ pub const TESTS: &[InputTest] = &[
             "Ensemble::run",
             "Ensemble::rows_every",
             "Ensemble::accuracy",
-            "Ensemble::unwatched",
+            "Ensemble::without_resolution_check",
             "Ensemble::observe",
             "ObservedEnsemble::run",
             "Problem::ensemble",
@@ -98,7 +98,9 @@ fn ensembles(report: &mut Report) {
     let of = |count| by.map_or(of(count), |by| of(count).by(by));
     report.check(matches!(ends(&of(1).threads(0), until), Err(EnsembleError::Threads)), || "no thread".into());
     report.check(ends(&of(1).rows_every(0), until).is_err(), || "rows every 0 steps".into());
-    report.check(ends(&of(1).rows_every(usize::MAX).unwatched(), until).is_ok(), || "rows of the ends alone".into());
+    report.check(ends(&of(1).rows_every(usize::MAX).without_resolution_check(), until).is_ok(), || {
+        "rows of the ends alone".into()
+    });
     for wanted in EXTREME {
         // An error that cannot be reached is refused; a requested error above that of any steps may be reached.
         let ended = ends(&of(2).accuracy(wanted), until);

@@ -99,7 +99,7 @@ fn integrators(report: &mut Report) {
         report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
     }
     let rule = QuadratureMethod::<MidpointRule>::default();
-    for wants in [StepperOptions::default(), StepperOptions { action: true, watched: true }] {
+    for wants in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
         one(report, &rule, wants);
         one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), wants);
         for by in BY.into_iter().flatten() {
@@ -135,7 +135,7 @@ fn saved(report: &mut Report) {
     let start: PhasePoint<1> = *tame().state();
     for by in BY.into_iter().flatten() {
         let stepper =
-            || Integrator::stepper(&by, &tame(), 0.1, StepperOptions { action: true, watched: true }).unwrap();
+            || Integrator::stepper(&by, &tame(), 0.1, StepperOptions { action: true, check_resolution: true }).unwrap();
         let mut first = stepper();
         report.check(first.advance(3).is_ok(), || format!("{by}: three steps"));
         let words = first.save().unwrap();

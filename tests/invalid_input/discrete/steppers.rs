@@ -8,7 +8,7 @@ use contact_geom::systems::{Kepler, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, PhasePoint};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, SplittingScheme, Stepper,
-    checks::{EnergyDrift, EnergyLook},
+    checks::{EnergyDrift, EnergySample},
     gauss::{Gauss, GaussRoute},
     rules::{Composition, Flow, Midpoint},
     splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, Splitting},
@@ -59,7 +59,7 @@ pub const TESTS: &[InputTest] = &[
             "Splitting::new",
             "Splitting::without_action",
             "Splitting::compensated",
-            "Splitting::watched",
+            "Splitting::with_resolution_check",
             "ActionSplitting::new",
             "ActionSplitting::with_flow",
             "ActionSplitting::compensated",
@@ -87,17 +87,17 @@ pub const TESTS: &[InputTest] = &[
 
 /// Where an energy is not a number or is extreme, there is no defect, or one above 1.
 fn drifts(report: &mut Report) {
-    let tame = EnergyLook { total: 1.0, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken: 0 };
+    let tame = EnergySample { total: 1.0, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken: 0 };
     for value in EXTREME {
         let wild = [
-            EnergyLook { total: value, ..tame },
-            EnergyLook { kinetic: value, ..tame },
-            EnergyLook { terms: value, ..tame },
+            EnergySample { total: value, ..tame },
+            EnergySample { kinetic: value, ..tame },
+            EnergySample { terms: value, ..tame },
         ];
         for (start, wild) in wild.iter().flat_map(|w| [(tame, *w), (*w, tame), (*w, *w)]) {
             for log_factor in [0.0, -1.0, value] {
                 let mut drift = EnergyDrift::new(2, &start);
-                let found = drift.defect(&EnergyLook { log_factor, taken: 100, ..wild }, |_| 0.0);
+                let found = drift.defect(&EnergySample { log_factor, taken: 100, ..wild }, |_| 0.0);
                 report.check(found.is_none_or(|defect| defect > 1.0), || format!("{start:?}, {wild:?}: {found:?}"));
             }
         }
@@ -136,7 +136,7 @@ fn splittings(report: &mut Report) {
     let scheme = SplittingScheme::BLANES_MOAN_6;
     constructor(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
     constructor(report, |h, t, x| {
-        Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.watched().compensated().without_action())
+        Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.with_resolution_check().compensated().without_action())
     });
     let scheme = SplittingScheme::YOSHIDA_4;
     let system = QuadraticInZ::default();

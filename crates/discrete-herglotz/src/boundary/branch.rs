@@ -8,13 +8,20 @@ use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
-/// The limit of corrections for a point of a branch; with more the step is halved.
-const CORRECTIONS: u32 = 8;
-/// The cosine of the angle between neighbouring tangents below which the step is halved. A larger angle indicates a
-/// corner or another branch.
-const STRAIGHT: f64 = 0.9;
-/// The shortest step, relative to the first one.
-const SHORTEST: f64 = 1e-6;
+/// The largest number of corrections for a point of a branch; with more the step is halved: convergence is quadratic,
+/// so that a point near the predicted one needs four.
+const MAX_CORRECTIONS: u32 = 8;
+
+/// The cosine of the angle between neighbouring tangents, 26 degrees, below which the step is halved. A larger angle
+/// indicates a corner or another branch.
+const MIN_TANGENT_COSINE: f64 = 0.9;
+
+/// The shortest step, relative to the first one: the branch ends where twenty halvings find no further path.
+const MIN_STEP_RATIO: f64 = 1e-6;
+
+/// The factor by which the step grows after each path: less than the two by which it is halved, so that a step that
+/// fails is not tried again at once.
+const STEP_GROWTH: f64 = 1.3;
 
 /// A point of a branch, or a direction: the positions of a path and a parameter. The inner product of the positions is
 /// the mean over the points, so that it does not depend on the number of steps.
@@ -121,7 +128,7 @@ pub fn branch<D: DiscreteLagrangian<N>, const N: usize>(
     // The first step changes the parameter by `step`, or less where the range is shorter.
     let first_length = step.min(span.abs()) / tangent.parameter.abs();
     let mut length = first_length;
-    while paths.len() < most && length > SHORTEST * first_length {
+    while paths.len() < most && length > MIN_STEP_RATIO * first_length {
         let Some((next, direction)) = follower.next(&at, &tangent, length)? else {
             length *= 0.5;
             continue;
@@ -145,7 +152,7 @@ pub fn branch<D: DiscreteLagrangian<N>, const N: usize>(
             break;
         }
         (at, tangent) = (next, direction);
-        length *= 1.3;
+        length *= STEP_GROWTH;
     }
     Ok(paths)
 }
@@ -195,13 +202,13 @@ impl<F> Follower<F> {
         let problem = self.of(parameter)?;
         let equations = problem.equations();
         let mut nodes = problem.nodes(problem.moved(q.to_vec()));
-        let mut sweep = BlockElimination::new(&equations);
-        let Ok(measured) = sweep.forward(&equations, &mut nodes) else { return Ok(None) };
+        let mut elimination = BlockElimination::new(&equations);
+        let Ok(measured) = elimination.forward(&equations, &mut nodes) else { return Ok(None) };
         if measured.regularity.is_nan() || measured.regularity <= 0.0 {
             return Ok(None);
         }
         let mut change = nodes.q.clone();
-        sweep.backward(&equations, &nodes.q, &mut change);
+        elimination.backward(&equations, &nodes.q, &mut change);
         // The difference from the given path includes the motion of the prescribed ends.
         for (to, q) in change.iter_mut().zip(q) {
             *to -= q;
@@ -258,7 +265,7 @@ impl<F> Follower<F> {
     {
         let mut x = at.clone();
         x.add(tangent, length);
-        for _ in 0..CORRECTIONS {
+        for _ in 0..MAX_CORRECTIONS {
             let Some(Corrections { change, slope }) = self.corrections(&x)? else { return Ok(None) };
             // The correction `change + slope dparameter` that is orthogonal to the tangent. The error of `slope` is of
             // first order in `change`, and its product with `dparameter` of second order.
@@ -274,7 +281,7 @@ impl<F> Follower<F> {
             whole.add(&slope, along);
             if whole.dot(&whole).sqrt() <= f64::EPSILON.sqrt() * size {
                 let Some(direction) = self.tangent(&x, Some(tangent))? else { return Ok(None) };
-                return Ok((direction.dot(tangent) >= STRAIGHT).then_some((x, direction)));
+                return Ok((direction.dot(tangent) >= MIN_TANGENT_COSINE).then_some((x, direction)));
             }
         }
         Ok(None)

@@ -1,7 +1,7 @@
 //! The result of a search for a critical path.
 
 use super::block_elimination::{Measured, Nodes};
-use super::judge::Judgement;
+use super::path_check::PathCheck;
 use crate::{StepError, UnresolvedStep, theory::DiscretePath};
 use contact_geom::nalgebra::SVector;
 
@@ -140,7 +140,7 @@ impl<const N: usize> CriticalPath<N> {
         }
     }
 
-    pub(super) fn judged(self, Judgement { unresolved, error_estimate }: Judgement) -> Self {
+    pub(super) fn with_check(self, PathCheck { unresolved, error_estimate }: PathCheck) -> Self {
         CriticalPath { unresolved, error_estimate, ..self }
     }
 }

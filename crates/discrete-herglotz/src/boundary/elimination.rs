@@ -6,7 +6,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 /// The threshold of pivoting: a pivot from the equations of the next point is chosen if it exceeds that of this point
 /// by this factor. It bounds the growth, and away from conjugate points no row is exchanged between points, so that the
 /// elimination costs no more than without pivoting.
-const THRESHOLD: f64 = 16.0;
+const PIVOT_RATIO: f64 = 16.0;
 
 /// N equations in the corrections of the positions of three consecutive points, and of the first point for a periodic
 /// path: `here dq_k + next dq_{k+1} + after dq_{k+2} + first dq_0 = rhs`.
@@ -202,7 +202,7 @@ impl<const N: usize> Panel<N> {
                 (other, most) = (i, size);
             }
         }
-        let cross = most > THRESHOLD * best;
+        let cross = most > PIVOT_RATIO * best;
         let size = if cross { most } else { best };
         if !(size > 0.0 && size.is_finite()) {
             return Err(NoPivot);

@@ -8,8 +8,8 @@ mod deflation;
 mod elimination;
 mod end;
 mod index;
-mod judge;
 mod newton;
+mod path_check;
 mod problem;
 mod thomas;
 

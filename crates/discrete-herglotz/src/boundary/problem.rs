@@ -42,8 +42,12 @@ pub struct BoundaryPath<D, const N: usize> {
     length: f64,
 }
 
-/// The limit of initial paths next to known ones in a search.
-const RESTARTS: usize = 8;
+/// The largest number of initial paths next to known ones in a search: both sides of four arcs of one path.
+const MAX_RESTARTS: usize = 8;
+
+/// The distance of two paths, in units of the deflation length, at which they coincide: there the deflated residual is
+/// a million times the residual.
+const MAX_COINCIDENCE: f64 = 1e-3;
 
 fn finite<const N: usize>(what: &'static str, x: &SVector<f64, N>) -> Result<(), InputError> {
     match x.iter().enumerate().find(|(_, c)| !c.is_finite()) {
@@ -129,7 +133,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(BoundaryPath { known: known.iter().map(|path| path.points.clone()).collect(), length, ..self })
     }
 
-    /// Searches for a critical path; the status of the result tells whether it was found.
+    /// Searches for a critical path; the status of the result is [`PathStatus::Found`](super::PathStatus::Found) if it
+    /// was found.
     ///
     /// With deflation, a search that fails from its initial path is repeated from paths on both sides of the known
     /// ones.
@@ -141,8 +146,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
             return first;
         }
         let mut iterations = first.iterations;
-        let beside = self.known.iter().rev().flat_map(|known| self.arcs().map(move |arc| self.beside(known, &arc)));
-        for start in beside.take(RESTARTS) {
+        let shifted = self.known.iter().rev().flat_map(|known| self.arcs().map(move |arc| self.shifted(known, &arc)));
+        for start in shifted.take(MAX_RESTARTS) {
             let next = from(start);
             iterations += next.iterations;
             if next.is_found() {
@@ -198,8 +203,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
             Some(path) => self.moved(path.points().to_vec()),
             None => self.straight(),
         };
-        if self.known.iter().any(|known| square(&points, known) <= (1e-3 * self.length).powi(2)) {
-            self.beside(&points, &SVector::from_element(self.length))
+        if self.known.iter().any(|known| square(&points, known) <= (MAX_COINCIDENCE * self.length).powi(2)) {
+            self.shifted(&points, &SVector::from_element(self.length))
         } else {
             points
         }
@@ -208,13 +213,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     /// The heights of arcs on both sides: in all coordinates together, and in each coordinate alone.
     fn arcs(&self) -> impl Iterator<Item = SVector<f64, N>> {
         let together = SVector::from_element(self.length);
-        let alone =
+        let single =
             (0..if N > 1 { N } else { 0 }).map(|i| SVector::from_fn(|j, _| if i == j { self.length } else { 0.0 }));
-        std::iter::once(together).chain(alone).flat_map(|arc| [arc, -arc])
+        std::iter::once(together).chain(single).flat_map(|arc| [arc, -arc])
     }
 
     /// A path shifted by a sine arc with fixed ends.
-    fn beside(&self, points: &[SVector<f64, N>], arc: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
+    fn shifted(&self, points: &[SVector<f64, N>], arc: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
         let at = |k: usize| {
             let inside = k > 0 && k < self.steps;
             if inside { (std::f64::consts::PI * k as f64 / self.steps as f64).sin() } else { 0.0 }
@@ -282,10 +287,10 @@ fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), Inpu
 /// The memory in bytes that is available without swapping; the size of the address space where the system does not
 /// report it.
 fn available_memory() -> usize {
-    let told = || {
+    let reported = || {
         let text = std::fs::read_to_string("/proc/meminfo").ok()?;
         let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
         line.trim().strip_suffix("kB")?.trim().parse::<usize>().ok()?.checked_mul(1024)
     };
-    told().unwrap_or(isize::MAX as usize)
+    reported().unwrap_or(isize::MAX as usize)
 }

@@ -8,10 +8,11 @@ use contact_geom::{DiscretePoint, SecondDiscreteJet};
 
 /// The smallest admissible pivot, relative to its diagonal entry before the elimination. This bounds the loss of digits
 /// in a correction; the residuals that measure the path are not affected.
-const LEAST_PIVOT: f64 = 1.0 / 8192.0;
+const MIN_PIVOT: f64 = 1.0 / 8192.0;
+
 /// The smallest regularity of the last block at which the loss of digits in the elimination cannot hide that the ends
 /// are conjugate.
-const REGULAR: f64 = 1e-6;
+const MIN_REGULARITY: f64 = 1e-6;
 
 /// The reason why a path needs the general elimination.
 enum PivotFailure {
@@ -150,7 +151,8 @@ impl<const N: usize> BlockElimination<N> {
         }
         measured.log_factor += measured.factors.ln();
         // Paths with non-finite values or a small regularity are left to the general elimination.
-        let sound = measured.squares.sum().is_finite() && x.z[of.steps].is_finite() && measured.regularity >= REGULAR;
+        let sound =
+            measured.squares.sum().is_finite() && x.z[of.steps].is_finite() && measured.regularity >= MIN_REGULARITY;
         Ok(if sound { Ok(measured) } else { Err(PivotFailure::Pivot) })
     }
 }
@@ -192,7 +194,7 @@ fn reduce<const N: usize>(
     for j in 0..N {
         let pivot = block[(j, j)];
         let size = pivot.abs();
-        sound &= size >= LEAST_PIVOT * diagonal[j] && size > 0.0 && size < f64::INFINITY;
+        sound &= size >= MIN_PIVOT * diagonal[j] && size > 0.0 && size < f64::INFINITY;
         let inverse = 1.0 / pivot;
         let others = SVector::<f64, N>::from_fn(|i, _| block[(i, j)]);
         // Whole columns are written at a time: a separate write of one entry would delay the reads of its column.

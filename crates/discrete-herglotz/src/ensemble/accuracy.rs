@@ -5,6 +5,15 @@ use crate::ensemble::step_control::StepControl;
 use crate::{GaussCollocation, Run};
 use contact_geom::Lagrangian;
 
+/// The number of stages if no integrator is given.
+const DEFAULT_STAGES: usize = 8;
+
+/// The number of stages for errors below [`SMALL_ERROR`], for which the higher order takes fewer evaluations.
+const STAGES_FOR_SMALL_ERRORS: usize = 12;
+
+/// See [`STAGES_FOR_SMALL_ERRORS`].
+const SMALL_ERROR: f64 = 1e-10;
+
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// Requests an error of (q, p) at the end, relative to its size there. If no integrator is given, contact Gauss
     /// collocation is used, with 8 stages, or with 12 for errors below 1e-10.
@@ -19,8 +28,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         fn within<'p, 'o, L: Lagrangian<N>, const N: usize>(run: Run<'p, 'o, L, N>, wanted: f64) -> Run<'p, 'o, L, N> {
             run.accuracy(wanted)
         }
-        let stages = if wanted < 1e-10 { 12 } else { 8 };
+        let stages = if wanted < SMALL_ERROR { STAGES_FOR_SMALL_ERRORS } else { DEFAULT_STAGES };
         let of = if self.integrator.is_some() { self } else { self.by(GaussCollocation { stages }) };
-        Ensemble { length: Some(StepControl::For(wanted, within)), ..of }
+        Ensemble { length: Some(StepControl::Accuracy(wanted, within)), ..of }
     }
 }

@@ -5,7 +5,7 @@ use crate::ensemble::member::{Member, Tally};
 use crate::ensemble::shards;
 use crate::ensemble::single::Common;
 use crate::ensemble::step_control::StepControl;
-use crate::ensemble::task::{SHARD, Task};
+use crate::ensemble::task::{MEMBERS_PER_SHARD, Task};
 use crate::numbers::instructions::Instructions;
 use crate::run::rows;
 use crate::{InputError, Integrator, Interrupt, Problem, Rows, Start, Steps, Until};
@@ -14,8 +14,13 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// The number of members of an ensemble that get all checks of a run before it starts.
-const SAMPLE: usize = 4;
+/// The number of steps for which one is added to the largest number of the checked members: an eighth, since other
+/// members may need more. The few that need still more have a run of their own.
+const STEPS_PER_EXTRA_STEP: usize = 8;
+
+/// The largest number of members of an ensemble that get all checks of a run before it starts: errors that all members
+/// share, or that depend on the index, show in them, and the checks of all members would cost as much as their steps.
+const MAX_CHECKED_MEMBERS: usize = 4;
 
 /// The Lagrangian and the start of a member, as a function of its index.
 type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
@@ -70,7 +75,7 @@ pub struct Ensemble<'a, L, const N: usize> {
     pub(crate) action: bool,
     /// The number of steps from one recorded row to the next.
     pub(crate) rows: Option<usize>,
-    pub(crate) watched: bool,
+    pub(crate) check_resolution: bool,
     pub(crate) threads: Option<usize>,
     pub(crate) instructions: Instructions,
     pub(crate) checkpoint: Option<PathBuf>,
@@ -121,7 +126,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             length: None,
             action: true,
             rows: None,
-            watched: true,
+            check_resolution: true,
             threads: None,
             instructions: Instructions::new(),
             checkpoint: None,
@@ -152,8 +157,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 
     /// Omits the check in lanes whether the steps resolve the motion. For steps that are known not to resolve it, each
     /// member would otherwise have a run of its own.
-    pub fn unwatched(self) -> Self {
-        Ensemble { watched: false, ..self }
+    pub fn without_resolution_check(self) -> Self {
+        Ensemble { check_resolution: false, ..self }
     }
 
     /// Records states of each member in its [rows](Member::rows): the start, the state after every `steps` steps, and
@@ -171,8 +176,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     }
 
     /// Sets a function that is called on the calling thread with the completed fraction of the members.
-    pub fn progress(self, tell: impl Fn(f64) + 'a) -> Self {
-        Ensemble { progress: Some(Box::new(tell)), ..self }
+    pub fn progress(self, report: impl Fn(f64) + 'a) -> Self {
+        Ensemble { progress: Some(Box::new(report)), ..self }
     }
 
     /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
@@ -219,9 +224,9 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     }
 
     /// Reports how many of the shards are completed.
-    pub(crate) fn tell(&self, done: usize, shards: usize) {
-        if let Some(tell) = &self.progress {
-            tell(done as f64 / shards as f64);
+    pub(crate) fn report_progress(&self, done: usize, shards: usize) {
+        if let Some(report) = &self.progress {
+            report(done as f64 / shards as f64);
         }
     }
 
@@ -236,7 +241,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 
     /// Members distributed over the ensemble, among them the first and the last.
     pub(crate) fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
-        let (count, sample) = (self.count, self.count.min(SAMPLE));
+        let (count, sample) = (self.count, self.count.min(MAX_CHECKED_MEMBERS));
         (0..sample).map(move |i| i * (count - 1) / (sample - 1).max(1))
     }
 
@@ -256,7 +261,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
             match common.plan(integrator, lagrangian, start, self.interrupt) {
-                Ok(plan) if planned.is_some_and(|(_, most): (usize, (f64, usize))| plan.1 <= most.1) => {}
+                Ok(plan) if planned.is_some_and(|(_, largest): (usize, (f64, usize))| plan.1 <= largest.1) => {}
                 Ok(plan) => planned = Some((index, plan)),
                 Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)) => {
                     return Err(EnsembleError::Member { index, cause });
@@ -266,19 +271,23 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
         let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
         let refused = |cause| EnsembleError::Member { index, cause };
-        if length.wanted().is_some() && integrator.batch_kernel().is_some() {
-            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
+        if length.requested_error().is_some() && integrator.batch_kernel().is_some() {
+            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(STEPS_PER_EXTRA_STEP)));
             let (lagrangian, start) = (self.members)(index);
             plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
         }
-        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD))).map_err(refused)?;
-        let (members, count, instructions, watched) =
-            (&*self.members, self.count, self.instructions, self.watched && length.wanted().is_none());
+        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(MEMBERS_PER_SHARD))).map_err(refused)?;
+        let (members, count, instructions, check_resolution) = (
+            &*self.members,
+            self.count,
+            self.instructions,
+            self.check_resolution && length.requested_error().is_none(),
+        );
         let mut task = Task {
             members,
             count,
             instructions,
-            watched,
+            check_resolution,
             integrator,
             common,
             plan,

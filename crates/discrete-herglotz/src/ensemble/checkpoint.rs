@@ -2,7 +2,7 @@
 
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Ending, Member};
-use crate::ensemble::task::{SHARD, Shard};
+use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard};
 use crate::numbers::state_words::digest;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};
@@ -18,10 +18,11 @@ const MAGIC: u64 = u64::from_le_bytes(*b"ensemble");
 const VERSION: u64 = 2;
 
 /// The number of words before the shards: these two, the fingerprint, and their digest.
-const HEAD: usize = 4;
+const HEADER_WORDS: usize = 4;
 
-/// The largest number of words of a shard; a larger number means that the file is damaged.
-const LONGEST: u64 = 1 << 31;
+/// The largest number of words of a shard; a larger number, of more than sixteen gigabytes, means that the file is
+/// damaged.
+const MAX_SHARD_WORDS: u64 = 1 << 31;
 
 /// The completed shards, in any order. A shard is appended as a whole, with its length before it and a digest at its
 /// end. If a write was cut off, the incomplete shard is the last in the file, and is computed again.
@@ -50,11 +51,11 @@ impl Shards {
             shards.append(&head)?;
             return Ok(shards);
         }
-        let found = shards.words(HEAD).map_err(|cause| shards.error(cause))?;
+        let found = shards.words(HEADER_WORDS).map_err(|cause| shards.error(cause))?;
         let cause = match found.as_slice() {
             [MAGIC, VERSION, other, sum] if *sum == digest(&[MAGIC, VERSION, *other]) => {
                 if *other == fingerprint {
-                    shards.whole = 8 * HEAD as u64;
+                    shards.whole = 8 * HEADER_WORDS as u64;
                     shards.find(count).map_err(|cause| shards.error(cause))?;
                     return Ok(shards);
                 }
@@ -128,7 +129,7 @@ impl Shards {
     /// The words of the next shard; `None` at the end of the file, or if the shard is incomplete.
     fn next_words(&mut self) -> Result<Option<Vec<u64>>, CheckpointError> {
         let [count] = self.words(1)?[..] else { return Ok(None) };
-        if count > LONGEST {
+        if count > MAX_SHARD_WORDS {
             return Err(CheckpointError::Damaged);
         }
         let end = self.whole + 8 * (count + 2);
@@ -181,8 +182,8 @@ pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard
     shard.load(from)?;
     batch_kernel.load(from)?;
     count.load(from)?;
-    let first = shard.checked_mul(SHARD)?;
-    if count > SHARD {
+    let first = shard.checked_mul(MEMBERS_PER_SHARD)?;
+    if count > MEMBERS_PER_SHARD {
         return None;
     }
     let mut members = Vec::with_capacity(count);

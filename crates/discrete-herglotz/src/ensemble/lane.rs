@@ -9,7 +9,20 @@ pub(crate) struct LaneOptions {
     /// The number of steps from one row to the next, if rows are recorded.
     pub rows: Option<usize>,
     /// Whether members are flagged whose steps may not resolve the motion.
-    pub watched: bool,
+    pub check_resolution: bool,
+}
+
+/// Whether the state of a lane is the result of its member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LaneStatus {
+    /// It is, if it is finite.
+    Valid,
+    /// The equations of a step could not be solved.
+    Failed,
+    /// The steps were interrupted.
+    Interrupted,
+    /// Its distance from the result with twice as many steps exceeds the requested error.
+    Inaccurate,
 }
 
 /// A member in a lane.
@@ -21,6 +34,8 @@ pub(crate) struct Lane<const N: usize> {
     pub rows: Option<Vec<Row<N>>>,
     /// Whether a step may not have resolved the motion.
     pub suspect: bool,
+    /// Whether the state is the result. If it is not, the member has a run of its own.
+    pub status: LaneStatus,
     /// Whether the rows include the action.
     action: bool,
 }
@@ -33,11 +48,11 @@ impl<const N: usize> Lane<N> {
             rows.push(row(t0, state, action));
             rows
         });
-        Lane { state, rows, suspect: false, action }
+        Lane { state, rows, suspect: false, status: LaneStatus::Valid, action }
     }
 
     /// Updates the state, and records a row if rows are recorded.
-    pub fn reach(&mut self, t: f64, state: PhasePoint<N>) {
+    pub fn record(&mut self, t: f64, state: PhasePoint<N>) {
         self.state = state;
         if let Some(rows) = &mut self.rows {
             rows.push(row(t, state, self.action));
@@ -49,7 +64,7 @@ fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bo
     Row { t, q, v: None, p, z: action.then_some(z), energy: None, log_factor: None, columns: Vec::new() }
 }
 
-/// Flags members as not completed: each then has a run of its own, which reports how far it came.
-pub(crate) fn interrupted<const N: usize>(some: &mut [Lane<N>]) {
-    some.iter_mut().for_each(|lane| lane.state.z = f64::NAN);
+/// Flags members as interrupted: each then has a run of its own, which reports how far it came.
+pub(crate) fn interrupt<const N: usize>(members: &mut [Lane<N>]) {
+    members.iter_mut().for_each(|lane| lane.status = LaneStatus::Interrupted);
 }

@@ -3,9 +3,9 @@
 mod accuracy;
 pub(crate) mod builder;
 mod checkpoint;
+mod convergence;
 mod error;
 mod gauss;
-mod judge;
 mod lane;
 mod member;
 mod observed;

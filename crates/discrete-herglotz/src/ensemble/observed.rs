@@ -8,8 +8,9 @@ use crate::{InputError, Observer, Until};
 use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 
-/// The number of members that are computed and handed on together.
-const SHARD: usize = 16;
+/// The number of members that are computed and handed on together: fewer than in lanes, since a member with an observer
+/// takes longer.
+const MEMBERS_PER_OBSERVED_SHARD: usize = 16;
 
 /// An [`Ensemble`] with an observer for each member, created by [`Ensemble::observe`].
 ///
@@ -30,22 +31,22 @@ const SHARD: usize = 16;
 pub struct ObservedEnsemble<'a, L, F, T, const N: usize> {
     of: Ensemble<'a, L, N>,
     observer: F,
-    seen: T,
+    extract: T,
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
-    /// Adds an [`Observer`] for each member, a function of its index. `seen` extracts a result from the observer at the
-    /// end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
+    /// Adds an [`Observer`] for each member, a function of its index. `extract` returns a result from the observer at
+    /// the end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
     ///
     /// Each member has a run of its own, distributed over the threads, since observers may request quantities of a run
     /// (the velocity, the energy, the last step with dense output) that lanes do not have. To record states after a
     /// number of steps in lanes, use [`rows_every`](Self::rows_every).
-    pub fn observe<O: Observer<N>, S: Send, F, T>(self, observer: F, seen: T) -> ObservedEnsemble<'a, L, F, T, N>
+    pub fn observe<O: Observer<N>, S: Send, F, T>(self, observer: F, extract: T) -> ObservedEnsemble<'a, L, F, T, N>
     where
         F: Fn(usize) -> Result<O, InputError> + Sync,
         T: Fn(O) -> S + Sync,
     {
-        ObservedEnsemble { of: self, observer, seen }
+        ObservedEnsemble { of: self, observer, extract }
     }
 }
 
@@ -71,16 +72,16 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
         let threads = self.of.some_threads()?;
         let task = self.of.task(until)?;
         let count = self.of.count;
-        let shards = count.div_ceil(SHARD);
-        let (observer, seen) = (&self.observer, &self.seen);
+        let shards = count.div_ceil(MEMBERS_PER_OBSERVED_SHARD);
+        let (observer, extract) = (&self.observer, &self.extract);
         let work = |shard: usize| -> Vec<(Member<N>, Option<S>)> {
-            let range = shard * SHARD..count.min((shard + 1) * SHARD);
+            let range = shard * MEMBERS_PER_OBSERVED_SHARD..count.min((shard + 1) * MEMBERS_PER_OBSERVED_SHARD);
             let member = |index: usize| match observer(index) {
                 Err(cause) => (Member { index, ending: Err(cause), rows: Vec::new() }, None),
                 Ok(mut observer) => {
-                    let member = task.by_itself(index, Some(&mut observer));
-                    let seen = member.ending.is_ok().then(|| seen(observer));
-                    (member, seen)
+                    let member = task.run_single(index, Some(&mut observer));
+                    let result = member.ending.is_ok().then(|| extract(observer));
+                    (member, result)
                 }
             };
             range.map(member).collect()
@@ -88,12 +89,12 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
         let mut tally = Tally::default();
         let mut done = 0;
         shards::in_order(threads, shards, work, |members| {
-            for (member, seen) in members {
+            for (member, result) in members {
                 tally.add(&member);
-                fold(&member, seen);
+                fold(&member, result);
             }
             done += 1;
-            self.of.tell(done, shards);
+            self.of.report_progress(done, shards);
             ControlFlow::Continue(())
         });
         Ok(tally)

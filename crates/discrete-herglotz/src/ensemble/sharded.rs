@@ -5,8 +5,8 @@ use crate::ensemble::builder::Ensemble;
 use crate::ensemble::checkpoint::{self, Shards};
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
-use crate::ensemble::shards::WINDOW_OF_A_THREAD;
-use crate::ensemble::task::{SHARD, Shard, Task};
+use crate::ensemble::shards::MAX_SHARDS_PER_THREAD;
+use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard, Task};
 use contact_geom::Lagrangian;
 use std::collections::VecDeque;
 
@@ -71,7 +71,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> ShardedEnsemble<'_, '_, L, N> {
 
     /// The number of shards.
     pub fn count(&self) -> usize {
-        self.task.count.div_ceil(SHARD)
+        self.task.count.div_ceil(MEMBERS_PER_SHARD)
     }
 
     /// Computes the members of a shard on this thread, and returns their results as words of 64 bits, for
@@ -123,7 +123,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     /// results that wait for a slow shard need memory: the bound is eight shards for each worker. With a checkpoint
     /// they wait in its file, and there is no bound.
     pub fn bound(&self, workers: usize) -> usize {
-        let window = WINDOW_OF_A_THREAD.saturating_mul(workers.max(1));
+        let window = MAX_SHARDS_PER_THREAD.saturating_mul(workers.max(1));
         if self.file.is_some() { usize::MAX } else { self.handed_on.saturating_add(window) }
     }
 
@@ -198,8 +198,8 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
             fold(member);
         }
         self.handed_on += 1;
-        if let Some(tell) = self.progress {
-            tell(self.handed_on as f64 / sharded.count() as f64);
+        if let Some(report) = self.progress {
+            report(self.handed_on as f64 / sharded.count() as f64);
         }
     }
 }

@@ -3,8 +3,9 @@
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The number of shards per thread that may be completed or in progress while an earlier shard is not completed.
-pub(crate) const WINDOW_OF_A_THREAD: usize = 8;
+/// The number of shards per thread that may be completed or in progress while an earlier shard is not completed: it
+/// bounds the memory, and is large enough that no thread waits for a shard that takes several times longer.
+pub(crate) const MAX_SHARDS_PER_THREAD: usize = 8;
 
 /// The state that the threads share.
 struct Window<R> {
@@ -74,8 +75,8 @@ impl<R> Drop for AtTheEnd<'_, R> {
 }
 
 /// Computes a number of shards on several threads, the calling thread among them, and hands on each result in the order
-/// of the shards, on the calling thread, until `hand_on` breaks. At most [`WINDOW_OF_A_THREAD`] results per thread are
-/// kept at a time.
+/// of the shards, on the calling thread, until `hand_on` breaks. At most [`MAX_SHARDS_PER_THREAD`] results per thread
+/// are kept at a time.
 ///
 /// The calling thread computes too: a thread that only waits to hand on results would displace the others after each
 /// shard.
@@ -88,7 +89,7 @@ pub(crate) fn in_order<R: Send>(
     let window = Window { next: 0, handed_on: 0, done: Vec::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
     let threads = threads.min(count);
-    let most = WINDOW_OF_A_THREAD * threads;
+    let most = MAX_SHARDS_PER_THREAD * threads;
     std::thread::scope(|scope| {
         for _ in 1..threads {
             scope.spawn(|| {

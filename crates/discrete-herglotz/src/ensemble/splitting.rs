@@ -1,10 +1,10 @@
 //! Splittings for many motions in SIMD lanes.
 
-use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
-use crate::integration::interrupt::BETWEEN;
+use crate::ensemble::lane::{Lane, LaneOptions, interrupt};
+use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
-use crate::resolution::monitor::ROUNDED;
+use crate::resolution::thresholds::{DRIFT_MARGIN_IN_LANES, POSITION_ROUND_OFF};
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
@@ -19,7 +19,7 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
-    look: DefectSample,
+    check: DriftCheck,
     h: f64,
     t0: f64,
     steps: usize,
@@ -32,7 +32,7 @@ pub(crate) struct SplittingPacks<'a, L, const N: usize> {
 /// flags as unresolved satisfy `omega^2 (s1^2 + s2^2) > 1` for an oscillation of frequency omega (see
 /// `resolution/monitor.rs`). In the longest drift, of length s, the change of the force times s then exceeds the
 /// fraction `s^2/(s1^2+s2^2)` of the momentum. A member for which this holds has a run of its own, which decides.
-struct DefectSample {
+struct DriftCheck {
     /// The index of the drift, and its length.
     stage: usize,
     span: f64,
@@ -40,14 +40,11 @@ struct DefectSample {
     turn: f64,
 }
 
-/// The fraction of the bound above which a step is suspect, for motions that do not turn uniformly.
-const MARGIN: f64 = 0.8;
-
 /// The factor by which the square of the largest momentum for this comparison decreases from step to step: a force that
 /// acts near a turning point is compared with the momenta of neighbouring steps.
-const KEPT: f64 = 0.9;
+const MOMENTUM_MEMORY: f64 = 0.9;
 
-impl DefectSample {
+impl DriftCheck {
     fn new(table: &SubstepTable) -> Self {
         let squares = || table.joined.iter().map(|stage| stage.span * stage.span);
         let (mut stage, mut longest) = (0, 0.0);
@@ -57,8 +54,8 @@ impl DefectSample {
             }
         }
         let pairs = squares().zip(squares().cycle().skip(1)).map(|(a, b)| a + b);
-        let turn = MARGIN * longest / max_abs_or_nan(pairs);
-        DefectSample { stage, span: longest.sqrt(), turn: turn * turn }
+        let turn = DRIFT_MARGIN_IN_LANES * longest / max_abs_or_nan(pairs);
+        DriftCheck { stage, span: longest.sqrt(), turn: turn * turn }
     }
 }
 
@@ -74,8 +71,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let form = SeparableForm::read(lagrangian, h, t0, state)?;
         let drag = Drag::of(&form, t0, state)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let look = DefectSample::new(&table);
-        Ok(SplittingPacks { form, drag, table, look, h, t0, steps, interrupt: None })
+        let check = DriftCheck::new(&table);
+        Ok(SplittingPacks { form, drag, table, check, h, t0, steps, interrupt: None })
     }
 
     /// Whether a single run would use compensated sums for a motion.
@@ -87,7 +84,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     /// finite at its start or at its end, its final state is not finite.
     pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
         let stride = options.rows.unwrap_or(self.steps);
-        match (action, options.watched) {
+        match (action, options.check_resolution) {
             (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
             (true, false) => instructions.dispatch(All::<_, N, true, false> { packs: self, lanes, stride }),
             (false, true) => instructions.dispatch(All::<_, N, false, true> { packs: self, lanes, stride }),
@@ -101,15 +98,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 const PACKS_IN_FLIGHT: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
-struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
+struct All<'s, 'a, L, const N: usize, const ACTION: bool, const CHECKED: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
     lanes: &'s mut [Lane<N>],
     /// The number of steps from one recorded state to the next.
     stride: usize,
 }
 
-impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> WithSimd
-    for All<'_, '_, L, N, ACTION, WATCH>
+impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const CHECKED: bool> WithSimd
+    for All<'_, '_, L, N, ACTION, CHECKED>
 {
     type Output = ();
 
@@ -119,16 +116,16 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
         // The registers of a pack share the constants that a stage reads; if a pack had more registers than the
         // processor, they would be spilled to memory.
         if const { N == 1 } {
-            packs.all::<S, 4, ACTION, WATCH>(lanes, stride);
+            packs.all::<S, 4, ACTION, CHECKED>(lanes, stride);
         } else {
-            packs.all::<S, 2, ACTION, WATCH>(lanes, stride);
+            packs.all::<S, 2, ACTION, CHECKED>(lanes, stride);
         }
     }
 }
 
 /// The state that a step advances, as [`Motion`](crate::splitting) for a single motion.
 #[derive(Clone, Copy)]
-struct Moving<S: Simd, const K: usize, const N: usize> {
+struct Pack<S: Simd, const K: usize, const N: usize> {
     q: SVector<SimdBatch<S, K>, N>,
     p: SVector<SimdBatch<S, K>, N>,
     /// The accumulated round-off of the damping of p.
@@ -141,21 +138,21 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     suspect: SimdBatch<S, K>,
 }
 
-impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
+impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
     /// The pack of some motions; lanes beyond the last motion repeat it.
     #[inline(always)]
-    fn from_lanes(some: &[Lane<N>]) -> Self {
+    fn from_lanes(members: &[Lane<N>]) -> Self {
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
-            SimdBatch::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state)))
+            SimdBatch::from_lanes(|i| members.get(i).or(members.last()).map_or(0.0, |lane| f(&lane.state)))
         };
         let (q, p) = (SVector::from_fn(|d, _| of(&|at| at.q[d])), SVector::from_fn(|d, _| of(&|at| at.p[d])));
-        Moving { q, p, z: of(&|at| at.z), ..Self::zero() }
+        Pack { q, p, z: of(&|at| at.z), ..Self::zero() }
     }
 
     #[inline(always)]
     fn zero() -> Self {
         let (zero, still) = (SimdBatch::splat(0.0), SVector::from_fn(|_, _| SimdBatch::splat(0.0)));
-        Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
+        Pack { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
     }
 
     /// The state in a lane.
@@ -172,49 +169,49 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
+    fn all<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
         lanes: &mut [Lane<N>],
         stride: usize,
     ) {
         let width = SimdBatch::<S, K>::COUNT;
-        for some in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
-            let mut moving = [Moving::zero(); PACKS_IN_FLIGHT];
-            let moving = &mut moving[..some.len().div_ceil(width)];
-            for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
-                *m = Moving::from_lanes(own);
+        for members in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
+            let mut in_flight = [Pack::zero(); PACKS_IN_FLIGHT];
+            let in_flight = &mut in_flight[..members.len().div_ceil(width)];
+            for (own, m) in members.chunks(width).zip(in_flight.iter_mut()) {
+                *m = Pack::from_lanes(own);
             }
-            let whole = self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
-                for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
-                    lane.reach(t, at.state(i));
+            let whole = self.take_steps::<S, K, ACTION, CHECKED>(in_flight, stride, |t, w, at| {
+                for (i, lane) in members.iter_mut().skip(w * width).take(width).enumerate() {
+                    lane.record(t, at.state(i));
                     lane.suspect = at.suspect.lanes()[i] != 0.0;
                 }
             });
             if !whole {
-                interrupted(some);
+                interrupt(members);
             }
         }
     }
 
-    /// Takes all steps, with the operations of a single run in the same order. `reach` is called after each stride and
+    /// Takes all steps, with the operations of a single run in the same order. `record` is called after each stride and
     /// at the end. Returns false if it was interrupted.
     #[inline(always)]
-    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
+    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
         &self,
-        moving: &mut [Moving<S, K, N>],
+        in_flight: &mut [Pack<S, K, N>],
         stride: usize,
-        mut reach: impl FnMut(f64, usize, &Moving<S, K, N>),
+        mut record: impl FnMut(f64, usize, &Pack<S, K, N>),
     ) -> bool {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
-        for m in moving.iter_mut() {
+        for m in in_flight.iter_mut() {
             self.take_force::<S, K, ACTION>(m, *t0);
         }
         let mut taken = 0;
         while taken < *steps {
             let next = taken.saturating_add(stride).min(*steps);
             for k in taken..next {
-                if k % BETWEEN == 0 && self.interrupt.is_some_and(Interrupt::is_wanted) {
+                if k % STEPS_BETWEEN_QUERIES == 0 && self.interrupt.is_some_and(Interrupt::is_requested) {
                     return false;
                 }
                 let t = t0 + k as f64 * h;
@@ -222,28 +219,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                 let stages = if k == 0 { &table.first } else { &table.joined };
                 for (i, stage) in stages.iter().enumerate() {
                     let time = t + stage.time;
-                    if WATCH && i == self.look.stage {
-                        for m in moving.iter_mut() {
+                    if CHECKED && i == self.check.stage {
+                        for m in in_flight.iter_mut() {
                             let before = m.force;
                             self.kick_and_drift::<S, K, ACTION>(m, stage);
                             self.take_force::<S, K, ACTION>(m, time);
-                            self.look_at(m, &before);
+                            self.check_drift(m, &before);
                         }
                         continue;
                     }
-                    for m in moving.iter_mut() {
+                    for m in in_flight.iter_mut() {
                         self.kick_and_drift::<S, K, ACTION>(m, stage);
                         self.take_force::<S, K, ACTION>(m, time);
                     }
                 }
             }
             taken = next;
-            for (w, m) in moving.iter().enumerate() {
+            for (w, m) in in_flight.iter().enumerate() {
                 // The step is completed on a copy, since the next step continues from the stage that it shares with
                 // this one.
                 let mut at = *m;
                 self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
-                reach(t0 + taken as f64 * h, w, &at);
+                record(t0 + taken as f64 * h, w, &at);
             }
         }
         true
@@ -251,23 +248,27 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Checks the drift, by the change from the force `before` it.
     #[inline(always)]
-    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
+    fn check_drift<S: Simd, const K: usize>(&self, m: &mut Pack<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
         let zero = SimdBatch::splat(0.0);
         let (mut turn, mut fast, mut wide) = (zero, zero, zero);
         for d in 0..N {
-            let change = (m.force[d] - before[d]) * self.look.span;
+            let change = (m.force[d] - before[d]) * self.check.span;
             turn = change.mul_add(change, turn);
             fast = m.p[d].mul_add(m.p[d], fast);
             wide = m.q[d].mul_add(m.q[d], wide);
         }
-        m.fast = fast.max(m.fast * KEPT);
+        m.fast = fast.max(m.fast * MOMENTUM_MEMORY);
         // A change that moves the position by less than its round-off does not count.
-        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.suspect, SimdBatch::splat(1.0));
-        m.suspect = turn.at_most(m.fast * self.look.turn, m.suspect, moves);
+        let moves = (turn * (self.h * self.h)).at_most(
+            wide * (POSITION_ROUND_OFF * POSITION_ROUND_OFF),
+            m.suspect,
+            SimdBatch::splat(1.0),
+        );
+        m.suspect = turn.at_most(m.fast * self.check.turn, m.suspect, moves);
     }
 
     #[inline(always)]
-    fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64) {
+    fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Pack<S, K, N>, t: f64) {
         let zero = SimdBatch::splat(0.0);
         let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
         let (value, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &rest);
@@ -279,7 +280,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, stage: &Stage) {
+    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Pack<S, K, N>, stage: &Stage) {
         let kick = SimdBatch::splat(stage.kick);
         if ACTION {
             m.z += kick * m.value;

@@ -8,9 +8,10 @@ type Within<L, const N: usize> = for<'p, 'o> fn(Run<'p, 'o, L, N>, f64) -> Run<'
 
 /// How the steps of the members are determined.
 pub(crate) enum StepControl<L, const N: usize> {
+    /// These steps.
     Given(Steps),
     /// For a requested error, as a function pointer: trial runs are not compiled into programs that request none.
-    For(f64, Within<L, N>),
+    Accuracy(f64, Within<L, N>),
 }
 
 impl<L, const N: usize> Clone for StepControl<L, N> {
@@ -26,11 +27,12 @@ impl<L: Lagrangian<N>, const N: usize> StepControl<L, N> {
     pub fn of<'p, 'o>(&self, run: Run<'p, 'o, L, N>) -> Run<'p, 'o, L, N> {
         match self {
             StepControl::Given(steps) => run.steps(*steps),
-            StepControl::For(wanted, within) => within(run, *wanted),
+            StepControl::Accuracy(wanted, within) => within(run, *wanted),
         }
     }
 
-    pub fn wanted(&self) -> Option<f64> {
-        if let StepControl::For(wanted, _) = self { Some(*wanted) } else { None }
+    /// The requested error, if one is requested.
+    pub fn requested_error(&self) -> Option<f64> {
+        if let StepControl::Accuracy(wanted, _) = self { Some(*wanted) } else { None }
     }
 }

@@ -1,7 +1,7 @@
 //! An ensemble after its checks, which is computed shard by shard.
 
 use crate::ensemble::gauss::GaussPacks;
-use crate::ensemble::lane::{Lane, LaneOptions};
+use crate::ensemble::lane::{Lane, LaneOptions, LaneStatus};
 use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::single::Common;
 use crate::ensemble::splitting::SplittingPacks;
@@ -17,7 +17,7 @@ use std::ops::Range;
 
 /// The number of members that are computed, saved and handed on together: whole packs of one to four registers of at
 /// most eight lanes.
-pub(crate) const SHARD: usize = 384;
+pub(crate) const MEMBERS_PER_SHARD: usize = 384;
 
 /// How the members of one Lagrangian are advanced.
 pub(crate) enum Kernel<'a, L, const N: usize> {
@@ -28,7 +28,7 @@ pub(crate) enum Kernel<'a, L, const N: usize> {
 
 impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
     /// Whether a motion needs a run of its own, since sums in lanes would lose the increments of its steps.
-    pub(crate) fn leaves(&self, state: &PhasePoint<N>) -> bool {
+    pub(crate) fn needs_single_run(&self, state: &PhasePoint<N>) -> bool {
         match self {
             Kernel::Splitting(packs) => packs.is_tiny(state),
             // The collocation kernel uses compensated sums.
@@ -50,7 +50,7 @@ pub(crate) struct Task<'e, 'a, L, const N: usize> {
     pub members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
     pub count: usize,
     pub instructions: Instructions,
-    pub watched: bool,
+    pub check_resolution: bool,
     pub integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
     pub common: Common<L, N>,
     /// The step size and the number of steps.
@@ -74,7 +74,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// for twice as many steps.
     pub(crate) fn kernels_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> [Kernel<'a, L, N>; 2] {
         let (h, steps) = self.plan;
-        let finer = self.common.length.wanted().map(|_| self.kernel_of(lagrangian, state, (0.5 * h, 2 * steps)));
+        let finer =
+            self.common.length.requested_error().map(|_| self.kernel_of(lagrangian, state, (0.5 * h, 2 * steps)));
         [self.kernel_of(lagrangian, state, self.plan), finer.unwrap_or(Kernel::OneByOne)]
     }
 
@@ -110,7 +111,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let Common { t0, action, length, .. } = self.common;
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
         words.extend([self.plan.1, self.common.rows.unwrap_or(0)].map(|x| x as u64));
-        words.push(length.wanted().unwrap_or(0.0).to_bits());
+        words.push(length.requested_error().unwrap_or(0.0).to_bits());
         words.extend(self.integrator.info().name.bytes().map(u64::from));
         for index in sample {
             let (lagrangian, start) = (self.members)(index);
@@ -128,19 +129,19 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 
     /// The indices of the members of a shard; empty if there is no such shard.
     pub(crate) fn members_of(&self, shard: usize) -> Range<usize> {
-        let first = shard.saturating_mul(SHARD).min(self.count);
-        first..self.count.min(first.saturating_add(SHARD))
+        let first = shard.saturating_mul(MEMBERS_PER_SHARD).min(self.count);
+        first..self.count.min(first.saturating_add(MEMBERS_PER_SHARD))
     }
 
     /// Runs the members again that have not completed.
     pub(crate) fn run_again(&self, shard: &mut Shard<N>) {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
-            *member = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
+            *member = self.run_single(member.index, None::<&mut Rows<'_, N>>);
         }
     }
 
     /// Runs a member with a run of its own, and with an observer if there is one.
-    pub(crate) fn by_itself(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
+    pub(crate) fn run_single(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
         let (lagrangian, start) = (self.members)(index);
         self.common.run(self.integrator, lagrangian, (index, start), observer, self.interrupt)
     }
@@ -174,7 +175,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         if !matches!(kernel, Kernel::OneByOne) {
             for (place, (_, start)) in starts.iter().enumerate() {
                 if let Some(state) = start.state(lagrangian, t0)
-                    && !kernel.leaves(&state)
+                    && !kernel.needs_single_run(&state)
                 {
                     places.push(place);
                     states.push(state);
@@ -183,15 +184,15 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         let most_rows = rows.map(|_| self.common.rows_of(steps));
         let mut lanes: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, most_rows, action)).collect();
-        let mut done = [false; SHARD];
+        let mut done = [false; MEMBERS_PER_SHARD];
         let mut batch_kernel = 0;
-        let options = LaneOptions { rows, watched: self.watched };
+        let options = LaneOptions { rows, check_resolution: self.check_resolution };
         forget_branches();
-        if let Some(wanted) = length.wanted() {
+        if let Some(wanted) = length.requested_error() {
             let mut ends: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, None, false)).collect();
-            finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, watched: false });
+            finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, check_resolution: false });
             kernel.run(self.instructions, &mut lanes, action, options);
-            refuse_beyond(wanted, &mut lanes, &ends);
+            flag_inaccurate(wanted, &mut lanes, &ends);
         } else {
             kernel.run(self.instructions, &mut lanes, action, options);
         }
@@ -199,15 +200,16 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             let order = self.integrator.info().order;
             let structure = lagrangian.structure();
             let dissipates = structure.autonomous && structure.has_constant_rate() && (structure.z_free || action);
-            for ((place, from), Lane { state, rows, suspect, .. }) in places.into_iter().zip(&states).zip(lanes) {
-                if ChartVector::from(state).is_finite() {
+            for ((place, from), Lane { state, rows, suspect, status, .. }) in places.into_iter().zip(&states).zip(lanes)
+            {
+                if status == LaneStatus::Valid && ChartVector::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
-                    let watched = self.watched && dissipates;
-                    let suspect = suspect || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
+                    let check_resolution = self.check_resolution && dissipates;
+                    let suspect = suspect || check_resolution && may_drift(lagrangian, order, (t0, from), (t, &state));
                     let member = &mut members[place];
                     let mut unresolved = None;
-                    if suspect && self.watched {
-                        let own = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
+                    if suspect && self.check_resolution {
+                        let own = self.run_single(member.index, None::<&mut Rows<'_, N>>);
                         match own.ending {
                             Ok(ending) if ending.status == Status::Completed => unresolved = ending.unresolved,
                             _ => {
@@ -243,16 +245,15 @@ impl<const N: usize> Start<N> {
     }
 }
 
-/// Refuses members whose distance from the result with twice as many steps exceeds the requested error: their state is
-/// set to NaN.
-fn refuse_beyond<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], finer: &[Lane<N>]) {
+/// Flags members whose distance from the result with twice as many steps exceeds the requested error.
+fn flag_inaccurate<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], finer: &[Lane<N>]) {
     let square = |x: &PhasePoint<N>| x.q.norm_squared() + x.p.norm_squared();
-    for (Lane { state: x, .. }, Lane { state: fine, .. }) in lanes.iter_mut().zip(finer) {
+    for (Lane { state: x, status, .. }, Lane { state: fine, .. }) in lanes.iter_mut().zip(finer) {
         let apart = square(&PhasePoint { q: x.q - fine.q, p: x.p - fine.p, z: 0.0 });
         // Written so that a NaN is not within the bound.
         let within = apart <= wanted * wanted * square(fine);
         if !within {
-            x.z = f64::NAN;
+            *status = LaneStatus::Inaccurate;
         }
     }
 }

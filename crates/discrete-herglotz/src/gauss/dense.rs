@@ -121,7 +121,7 @@ mod tests {
     use contact_geom::numbers::max_or_nan;
     use std::array::from_fn;
 
-    /// The states of the sketch agree with those of the curve to a few units of round-off of each term.
+    /// The states between the parts agree with those of the curve to a few units of round-off of each term.
     #[test]
     fn a_sketch_is_on_the_curve() {
         for s in 1..=MAX_STAGES {
@@ -131,10 +131,10 @@ mod tests {
             (solved.v, solved.force) = ([stages(0.1), stages(0.7)], [stages(1.9), stages(2.3)]);
             (solved.rate, solved.l) = (stages(3.1), stages(0.4));
             let curve = solved.curve(s, 0.5, 0.3, PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2));
-            let mut sketch = Vec::new();
-            curve.sketch(&mut sketch);
-            assert_eq!(sketch.len() + 1, curve.parts());
-            for (i, found) in sketch.iter().enumerate() {
+            let mut states = Vec::new();
+            curve.states_between_parts(&mut states);
+            assert_eq!(states.len() + 1, curve.parts());
+            for (i, found) in states.iter().enumerate() {
                 let at = curve.at_fraction((i + 1) as f64 / curve.parts() as f64);
                 let off =
                     max_or_nan((found.q - at.q).amax(), max_or_nan((found.p - at.p).amax(), (found.z - at.z).abs()));

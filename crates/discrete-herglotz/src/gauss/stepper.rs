@@ -8,7 +8,7 @@ use crate::gauss::dense::{SolvedStep, StepStart};
 use crate::gauss::initial_mass::InitialMass;
 use crate::gauss::integrator::check_step;
 use crate::gauss::limits::{FIRST_NEWTON_PAUSE, MAX_LINEAR_DIMENSION};
-use crate::gauss::resolution::sequence::{FEW_STAGES, Sequence};
+use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::linear::Linear;
@@ -25,6 +25,7 @@ use crate::gauss::work_summary::work_summary;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
+use crate::resolution::thresholds::FEW_STAGES;
 use crate::solve::mass_matrix::is_identity;
 use crate::{
     DenseStep, InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions, UnresolvedStep,
@@ -99,7 +100,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     /// The last mean velocities: present for few stages, where the defect between the nodes is no measure of
     /// resolution, and when suspect intervals are requested.
     sequence: Option<Box<Sequence<N>>>,
-    watch: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor<N>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
@@ -113,7 +114,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         problem: &Problem<'a, L, N>,
         stages: usize,
         h: f64,
-        StepperOptions { action, watched }: StepperOptions,
+        StepperOptions { action, check_resolution }: StepperOptions,
     ) -> Result<Self, InputError> {
         check_step(stages, h)?;
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
@@ -162,8 +163,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             pauses: FIRST_NEWTON_PAUSE,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW_STAGES || watched).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
-            watch: ResolutionMonitor::new(&state.q, &start.v, h),
+            sequence: (s <= FEW_STAGES || check_resolution)
+                .then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
+            monitor: ResolutionMonitor::new(&state.q, &start.v, h),
         })
     }
 
@@ -262,10 +264,10 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
             }
             let defect = with_route!(&*run.route, route => route.defect());
             if defect > 1.0 && !run.is_at_rest(t + h) {
-                run.watch.note(run.k, defect);
+                run.monitor.note(run.k, defect);
             }
             if run.sequence.is_some() {
-                run.follow();
+                run.update_sequence();
             }
             run.k += 1;
         }
@@ -362,11 +364,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// The first unresolved step that was recorded in the run; if there is none, the result of a defect sample of the
     /// last step alone. Further steps are sampled only if this is called more often.
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.mark()
+        self.find_unresolved()
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.suspect.take()
+        self.monitor.suspect.take()
     }
 }
 

@@ -6,7 +6,7 @@ use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, Vel
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
 /// of round-off, since the constants of a Lagrangian are rounded.
-pub(crate) const PROBE: f64 = 1e-12;
+pub(crate) const MAX_CLAIM_DEFECT: f64 = 1e-12;
 
 /// The structure that a Lagrangian claims, verified at an initial point and at a point near it, the second at a time
 /// near the initial time. Methods that skip work rely on it. A structure that is proved is not verified.
@@ -27,17 +27,17 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     }
     // At the start derivatives may vanish by symmetry, as at an equilibrium, or for a cosine at t = 0; near it they do
     // not.
-    let aside = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
-    let beside = VelocityPoint {
-        q: start.q.map_with_location(|i, _, q| aside(q, i)),
-        v: start.v.map_with_location(|i, _, v| aside(v, N + i)),
-        z: aside(start.z, 2 * N),
+    let shifted = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
+    let nearby = VelocityPoint {
+        q: start.q.map_with_location(|i, _, q| shifted(q, i)),
+        v: start.v.map_with_location(|i, _, v| shifted(v, N + i)),
+        z: shifted(start.z, 2 * N),
     };
-    let at_both = [(t, start), (aside(t, 2 * N + 1), &beside)].map(|(t, x)| structure.defects(lagrangian, t, x));
+    let at_both = [(t, start), (shifted(t, 2 * N + 1), &nearby)].map(|(t, x)| structure.defects(lagrangian, t, x));
     if at_both.iter().all(Option::is_none) {
         return Err(GeometryError::Undefined { what: "the Lagrangian" }.into());
     }
-    match at_both.into_iter().flatten().flatten().find(|d| d.size > PROBE) {
+    match at_both.into_iter().flatten().flatten().find(|d| d.size > MAX_CLAIM_DEFECT) {
         Some(Defect { claim, size }) => Err(InputError::FalseClaim { claim, size }),
         None => Ok(structure),
     }
@@ -56,7 +56,7 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     }
     let structure = lagrangian.structure();
     let x = legendre_inverse(lagrangian, t, state, guess).ok()?;
-    structure.defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
+    structure.defects(lagrangian, t, &x)?.find(|d| d.size > MAX_CLAIM_DEFECT)
 }
 
 /// Verifies the claims at an initial point at this number of times in a span. A false claim on the time dependence
@@ -79,7 +79,7 @@ pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
         // Multiples of the golden ratio modulo 1, which do not coincide with the zeros of a periodic function.
         let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();
         let defects = structure.defects(lagrangian, t, start).into_iter().flatten();
-        if let Some(Defect { claim, size }) = { defects }.find(|d| d.size > PROBE) {
+        if let Some(Defect { claim, size }) = { defects }.find(|d| d.size > MAX_CLAIM_DEFECT) {
             return Err(InputError::FalseClaim { claim, size });
         }
     }

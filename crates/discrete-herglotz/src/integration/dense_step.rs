@@ -73,16 +73,16 @@ impl<const N: usize> DenseStep<N> {
         self.h
     }
 
-    /// The number of parts into which [`sketch`](Self::sketch) divides the step.
+    /// The number of parts into which [`states_between_parts`](Self::states_between_parts) divides the step.
     pub(crate) fn parts(&self) -> usize {
         self.s + 2
     }
 
     /// Appends the states between the parts of the step.
-    pub(crate) fn sketch(&self, to: &mut Vec<PhasePoint<N>>) {
+    pub(crate) fn states_between_parts(&self, to: &mut Vec<PhasePoint<N>>) {
         let table = integrals_to_parts(self.s);
         let along = |series: &Series| {
-            let mut sums = [0.0; BETWEEN_PARTS];
+            let mut sums = [0.0; MAX_STATES_BETWEEN_PARTS];
             for (row, c) in table.iter().zip(&series.0).take(self.s) {
                 for (sum, integral) in sums.iter_mut().zip(row) {
                     *sum += self.h * c * integral;
@@ -147,15 +147,15 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
 }
 
 /// The largest number of states between the parts of a step.
-const BETWEEN_PARTS: usize = MAX_STAGES + 1;
+const MAX_STATES_BETWEEN_PARTS: usize = MAX_STAGES + 1;
 
 /// The integrals of the Legendre polynomials to the ends of the first s + 1 of the s + 2 parts of a step: `[k][i]` is
 /// the integral of `P_k` to the end of part i.
-fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
-    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
+fn integrals_to_parts(s: usize) -> &'static [[f64; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES] {
+    static TABLES: [OnceLock<Box<[[f64; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
         [const { OnceLock::new() }; MAX_STAGES];
     TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| {
-        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MAX_STAGES]);
+        let mut table = Box::new([[0.0; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES]);
         for i in 0..=s {
             let fraction = (i + 1) as f64 / (s + 2) as f64;
             let p = polynomials(s, fraction);

@@ -60,7 +60,7 @@ pub struct StepperOptions {
     pub action: bool,
     /// Whether the stepper checks that its steps resolve the motion, if the check takes time; see
     /// [`Stepper::unresolved`] and [`Stepper::suspect_interval`].
-    pub watched: bool,
+    pub check_resolution: bool,
 }
 
 /// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of

@@ -2,11 +2,11 @@
 
 use std::fmt::{Debug, Formatter};
 
-/// What ends an interrupted run, as reported by its [`Status`](crate::Status).
+/// The cause of the end of an interrupted run, as reported by its [`Status`](crate::Status).
 pub const INTERRUPTION: &str = "an interruption";
 
 /// The number of steps between two queries: some hundred microseconds of short steps.
-pub(crate) const BETWEEN: usize = 256;
+pub(crate) const STEPS_BETWEEN_QUERIES: usize = 256;
 
 /// A predicate that is queried periodically during a computation and ends it when it becomes true, for example after
 /// Ctrl-C.
@@ -16,11 +16,11 @@ pub struct Interrupt<'a>(&'a (dyn Fn() -> bool + Sync));
 impl<'a> Interrupt<'a> {
     /// An interrupt that ends the computation once this returns true. It is queried every few hundred steps, on the
     /// threads of the runs.
-    pub fn when(is_wanted: &'a (dyn Fn() -> bool + Sync)) -> Self {
-        Interrupt(is_wanted)
+    pub fn when(is_requested: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Interrupt(is_requested)
     }
 
-    pub(crate) fn is_wanted(self) -> bool {
+    pub(crate) fn is_requested(self) -> bool {
         (self.0)()
     }
 }

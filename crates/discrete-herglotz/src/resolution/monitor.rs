@@ -1,6 +1,9 @@
 //! Detection of steps that do not resolve the motion.
 
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::resolution::thresholds::{
+    MAX_RATIONAL_FACTOR, MIN_RELATIVE_DISPLACEMENT, MIN_SUSPECT_DIFFERENCE, MIN_SUSPECT_GROWTH, POSITION_ROUND_OFF,
+};
 use crate::{UnresolvedStep, integration::SuspectInterval};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
@@ -28,24 +31,18 @@ pub(crate) struct ResolutionMonitor<const N: usize> {
     pub floor: f64,
 }
 
-/// The threshold for the first suspect interval: a second difference of the velocity, in units of the velocity. A
-/// smooth oscillation reaches it with 28 steps per period.
-const SHARP: f64 = 0.05;
-
-/// A change of position below this fraction of the position is round-off.
-pub(crate) const ROUNDED: f64 = 1e-10;
-
 /// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of
 /// the initial position, so that it also holds where the motion has come to rest near the origin.
 pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
-    let reach = max_or_nan(size(q), size(v) * h.abs());
-    if reach.is_finite() { ROUNDED * reach } else { 0.0 }
+    let extent = max_or_nan(size(q), size(v) * h.abs());
+    if extent.is_finite() { POSITION_ROUND_OFF * extent } else { 0.0 }
 }
 
 impl<const N: usize> ResolutionMonitor<N> {
     /// A monitor for a motion from a position and a velocity, with steps of length h.
     pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
-        ResolutionMonitor { first: None, suspect: None, sharpest: SHARP * SHARP, floor: rounding(q, v, h) }
+        let sharpest = MIN_SUSPECT_DIFFERENCE * MIN_SUSPECT_DIFFERENCE;
+        ResolutionMonitor { first: None, suspect: None, sharpest, floor: rounding(q, v, h) }
     }
 
     /// Records the first step with a defect above one.
@@ -59,12 +56,11 @@ impl<const N: usize> ResolutionMonitor<N> {
         }
     }
 
-    /// Records a suspect interval with this sharpness. The next one needs a second difference twice as large, which
-    /// bounds their number.
+    /// Records a suspect interval with this sharpness; the next one needs a larger second difference.
     #[cold]
     #[inline(never)]
     pub fn suspect(&mut self, sharpness: f64, suspect: SuspectInterval<N>) {
-        self.sharpest = 4.0 * sharpness;
+        self.sharpest = MIN_SUSPECT_GROWTH * MIN_SUSPECT_GROWTH * sharpness;
         self.suspect = Some(suspect);
     }
 }
@@ -90,7 +86,7 @@ pub(crate) fn sharper<const N: usize>(
 #[cold]
 #[inline(never)]
 fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64, floor: f64) -> Option<f64> {
-    let moves = size(turn) * h.abs() > max_or_nan(ROUNDED * size(q), floor);
+    let moves = size(turn) * h.abs() > max_or_nan(POSITION_ROUND_OFF * size(q), floor);
     moves.then(|| turn.dot(turn) / velocity.dot(velocity))
 }
 
@@ -122,9 +118,7 @@ pub(crate) fn defect<const N: usize>(
 
 /// The defect of two second differences of opposite directions among three velocities; `None` where it is at most one.
 ///
-/// Differences that change q by less than 1/256 of its size are ignored: in a motion that has come to rest the
-/// velocities are round-off, and where velocity and force vanish together the substeps of a long scheme have such
-/// differences from their own errors.
+/// Differences that change q by less than [`MIN_RELATIVE_DISPLACEMENT`] of its size are ignored.
 #[inline(never)]
 pub(crate) fn turning<const N: usize>(
     changes: [&SVector<f64, N>; 2],
@@ -135,19 +129,16 @@ pub(crate) fn turning<const N: usize>(
 ) -> Option<f64> {
     let change = size(changes[0]) + size(changes[1]);
     let velocity = max_abs_or_nan(velocities.map(size));
-    (change > velocity && change * h.abs() > max_or_nan(LEAST * size(q), floor)).then(|| change / velocity)
+    (change > velocity && change * h.abs() > max_or_nan(MIN_RELATIVE_DISPLACEMENT * size(q), floor))
+        .then(|| change / velocity)
 }
 
-/// The smallest relative change of position that counts in [`turning`], and in the comparison of a step with two half
-/// steps.
-pub(crate) const LEAST: f64 = 1.0 / 256.0;
-
 /// The defect of a rational conformal factor, which approximates an exponential: it exceeds one where a step contracts
-/// or expands by more than a factor of three. At `x = 1/2`, where `(1 + x)/(1 - x) = 3`, its relative error is about a
-/// tenth.
+/// or expands by more than [`MAX_RATIONAL_FACTOR`].
 #[inline(always)]
 pub(crate) fn factor_defect(sigma: f64) -> Option<f64> {
-    if (1.0 / 3.0..=3.0).contains(&sigma) { None } else { Some(sigma.ln().abs() / 3.0f64.ln()) }
+    let resolved = (1.0 / MAX_RATIONAL_FACTOR..=MAX_RATIONAL_FACTOR).contains(&sigma);
+    if resolved { None } else { Some(sigma.ln().abs() / MAX_RATIONAL_FACTOR.ln()) }
 }
 
 saved!([const N: usize] SuspectInterval<N> { step, steps, t, from, to });

@@ -2,7 +2,7 @@
 
 use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
-use crate::rules::flow::account_of;
+use crate::rules::flow::work_summary_of;
 use crate::{
     DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, SplittingScheme, StepError, StepFailure, Stepper,
     UnresolvedStep, integration::SuspectInterval, solve::Solver,
@@ -48,7 +48,7 @@ pub struct Composition<D, const N: usize> {
     change: SVector<f64, N>,
     /// The state before the last step.
     before: PhasePoint<N>,
-    watch: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor<N>,
 }
 
 /// One substep: the index of its rule, and the earlier of its two times, relative to the start of the step.
@@ -123,7 +123,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             acceleration: SVector::zeros(),
             change: SVector::zeros(),
             before: state,
-            watch: ResolutionMonitor::new(&state.q, &SVector::zeros(), h),
+            monitor: ResolutionMonitor::new(&state.q, &SVector::zeros(), h),
         };
         if let Some(first) = composition.substeps.first().copied() {
             let guess = SVector::zeros();
@@ -153,22 +153,22 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// Takes one step; the state changes only if every substep succeeds.
     fn step(&mut self) -> Result<(), StepError> {
         let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
-        let mut sharpest = self.watch.sharpest;
+        let mut sharpest = self.monitor.sharpest;
         for i in 0..self.substeps.len() {
             let substep = self.substeps[i];
             let next = self.substep(&substep, &state, &velocity)?;
             sigma *= if substep.back { 1.0 / next.sigma } else { next.sigma };
-            self.watch(&substep, &velocity, &next, &mut sharpest);
+            self.check_substep(&substep, &velocity, &next, &mut sharpest);
             // Newton's method evaluates once in each iteration and once at the solution.
             self.evaluations += u64::from(next.iterations) + 1;
             (state, velocity) = (next.end, next.velocity);
         }
-        if sharpest > self.watch.sharpest
+        if sharpest > self.monitor.sharpest
             && let Some(step) = self.taken.checked_sub(1)
         {
             // The cause of a change of the first mean velocity may lie in the previous step.
             let t = self.t0 + step as f64 * self.h;
-            self.watch.suspect(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
+            self.monitor.suspect(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
         }
         self.before = self.state;
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
@@ -181,7 +181,13 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// Checks whether a substep resolves the motion, by the conformal factor of its rule and by the second differences
     /// of the mean velocities, scaled to the length of the substep. Differences are compared from the second step on.
     #[inline(always)]
-    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &DiscreteStep<N>, sharpest: &mut f64) {
+    fn check_substep(
+        &mut self,
+        substep: &Substep,
+        before: &SVector<f64, N>,
+        next: &DiscreteStep<N>,
+        sharpest: &mut f64,
+    ) {
         let now = &next.velocity;
         let acceleration = (now - before) / substep.apart;
         let last = std::mem::replace(&mut self.acceleration, acceleration);
@@ -189,19 +195,20 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         let last = std::mem::replace(&mut self.change, change);
         if self.taken > 0 {
             let found = if change.dot(&last) < 0.0 {
-                turning([&last, &change], [before, now, now], &next.end.q, substep.length, self.watch.floor)
+                turning([&last, &change], [before, now, now], &next.end.q, substep.length, self.monitor.floor)
             } else {
                 None
             };
             if let Some(defect) = found {
-                self.watch.note(self.taken, defect);
+                self.monitor.note(self.taken, defect);
             }
-            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.watch.floor, *sharpest) {
+            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.monitor.floor, *sharpest)
+            {
                 *sharpest = sharpness;
             }
         }
         if let Some(defect) = self.rules[substep.rule].defect([now; 4], &next.end, next.sigma) {
-            self.watch.note(self.taken, defect);
+            self.monitor.note(self.taken, defect);
         }
     }
 }
@@ -212,7 +219,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        account_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
+        work_summary_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {
@@ -250,12 +257,14 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.watch.first
+        self.monitor.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.suspect.take()
+        self.monitor.suspect.take()
     }
 }
 
-saved!([D, const N: usize] Composition<D, N> { taken, state, velocity, sigma, evaluations, acceleration, change, before, watch });
+saved!([D, const N: usize] Composition<D, N> {
+    taken, state, velocity, sigma, evaluations, acceleration, change, before, monitor
+});

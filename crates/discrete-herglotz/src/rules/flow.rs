@@ -56,7 +56,7 @@ pub struct Flow<D, const N: usize> {
     evaluations: u64,
     /// The state before the last step.
     before: PhasePoint<N>,
-    watch: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor<N>,
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
@@ -82,9 +82,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         // Checked first, because a singular Lagrangian is the cause of a first step that fails.
         ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
         let first = first.map_err(InputError::first_step)?;
-        let (velocities, watch) =
+        let (velocities, monitor) =
             ([first.velocity; 3], ResolutionMonitor::new(&state.q, &first.velocity, ld.step_size()));
-        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, watch })
+        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, monitor })
     }
 
     /// A flow from two positions `q0, q1` and the action `z0`: the state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -102,7 +102,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// The first step so far that was flagged as unresolved: for example with fewer than six steps per period of the
     /// velocity, or a conformal factor outside of `[1/3, 3]`.
     pub fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.watch.first
+        self.monitor.first
     }
 
     /// The current state `(q, p, z)`.
@@ -136,17 +136,17 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         };
         let velocities = [&earlier, &before, &latest, &next.velocity];
         if let Some(defect) = self.ld.defect(velocities, &next.end, next.sigma) {
-            self.suspect(defect, velocities, &next);
+            self.record_defect(defect, velocities, &next);
         }
         // The second difference is valid from the third step on.
         let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
-        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.watch.floor, self.watch.sharpest)
+        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.monitor.floor, self.monitor.sharpest)
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // The cause of a change of the mean velocities lies in this step or the previous one.
             let suspect =
                 SuspectInterval { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
-            self.watch.suspect(sharpness, suspect);
+            self.monitor.suspect(sharpness, suspect);
         }
         // After two steps, the velocity before the first is extrapolated linearly.
         self.velocities = match self.k {
@@ -166,11 +166,11 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// factor counts there.
     #[cold]
     #[inline(never)]
-    fn suspect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {
-        let still = at_rest(velocities, self.ld.step_size(), self.watch.floor);
+    fn record_defect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {
+        let still = at_rest(velocities, self.ld.step_size(), self.monitor.floor);
         let of_factor = || self.ld.defect([&SVector::zeros(); 4], &next.end, next.sigma);
         if let Some(defect) = if still { of_factor() } else { Some(defect) } {
-            self.watch.note(self.k - 1, defect);
+            self.monitor.note(self.k - 1, defect);
         }
     }
 
@@ -197,7 +197,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        account_of(self.ld.is_explicit(), "step")
+        work_summary_of(self.ld.is_explicit(), "step")
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {
@@ -238,16 +238,16 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.watch.first
+        self.monitor.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.watch.suspect.take()
+        self.monitor.suspect.take()
     }
 }
 
 /// The work summary of the steps or substeps of discrete Lagrangians.
-pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
+pub(crate) fn work_summary_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
     let solved = if explicit {
         [
             PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),
@@ -263,4 +263,4 @@ pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
     solved.into_iter().chain([action]).collect()
 }
 
-saved!([D, const N: usize] Flow<D, N> { t0, k, state, velocities, sigma, evaluations, before, watch });
+saved!([D, const N: usize] Flow<D, N> { t0, k, state, velocities, sigma, evaluations, before, monitor });

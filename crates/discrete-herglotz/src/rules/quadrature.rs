@@ -15,7 +15,7 @@ use contact_geom::{
 use std::marker::PhantomData;
 
 /// The round-off allowed in a residual, in units of the round-off of the terms of L: a few nodes with a few units each.
-const ROUNDINGS: f64 = 64.0;
+const RESIDUAL_ROUNDINGS: f64 = 64.0;
 
 /// A quadrature rule for the action of one step.
 pub trait Rule: 'static {
@@ -314,7 +314,8 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
 ) -> [f64; 2] {
     let (of_value, once) = gradient_rounding(lagrangian, t, x);
     let of_action = value_rounding(of_value, &once.x, &x.q);
-    [h.abs() * (max_abs(&once.x) + max_abs(p) * once.z) + max_abs(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
+    [h.abs() * (max_abs(&once.x) + max_abs(p) * once.z) + max_abs(&once.y), h.abs() * of_action]
+        .map(|e| RESIDUAL_ROUNDINGS * e)
 }
 
 /// The node, or its reflection for the adjoint rule.

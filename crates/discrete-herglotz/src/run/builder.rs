@@ -77,7 +77,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// stage equations are iterated in the accelerations only; and in the transformed time of the Lagrangian if this
     /// takes far fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
-        Run { length: Some(StepControl::For(wanted, accuracy::choose)), ..self }
+        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps)), ..self }
     }
 
     /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are then those of the
@@ -151,7 +151,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             return Err(InputError::Scale { index, scale: scales[index] });
         }
         let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs, scales: self.scales };
-        let terminal = if let StepControl::For(..) = length { self.observers.terminal() } else { None };
+        let terminal = if let StepControl::Accuracy(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;
         Ok(plan)

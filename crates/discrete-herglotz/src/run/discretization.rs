@@ -1,20 +1,24 @@
 //! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
-use crate::gauss::FEW_STAGES;
 use crate::numbers::state_words::digest;
-use crate::run::motion::{Motion, Near};
+use crate::resolution::thresholds::FEW_STAGES;
+use crate::run::motion::{Motion, NearbyVelocity};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, Shared, StepSelection};
-use crate::switching::{has_switching_functions, of_integrator};
+use crate::switching::has_switching_functions;
+use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
-/// For a linear motion a collocation step is multiplication by one matrix, which is computed in double-double
-/// precision. It is always computed up to the first number of unknowns of a step; for more unknowns only from a number
-/// of steps on that is the cube of the unknowns divided by the second number.
-const MATRIX: (usize, usize) = (32, 1024);
+/// The largest number of unknowns of a step for which the matrix of a linear motion is always computed. A collocation
+/// step is then multiplication by this matrix, which is computed in double-double precision.
+const MAX_UNKNOWNS_OF_SMALL_MATRIX: usize = 32;
+
+/// For more unknowns, the ratio of the cube of their number to the smallest number of steps for which the matrix is
+/// computed: it costs as much as so many steps.
+const CUBED_UNKNOWNS_PER_STEP: usize = 1024;
 
 /// A problem with the integrator and the steps that are selected for it.
 pub(crate) struct Discretization<'p, L, const N: usize> {
@@ -52,14 +56,15 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
     /// since the matrix of a step would cost more than the iterations.
     pub fn problem_for_steps(&self) -> Problem<'p, L, N> {
         let unknowns = self.info.collocation.unwrap_or(0) * N;
-        let by_matrix = unknowns <= MATRIX.0 || unknowns.pow(3) / MATRIX.1 <= self.count;
+        let by_matrix =
+            unknowns <= MAX_UNKNOWNS_OF_SMALL_MATRIX || unknowns.pow(3) / CUBED_UNKNOWNS_PER_STEP <= self.count;
         let structure = self.problem.structure;
         Problem { structure: Structure { quadratic: structure.quadratic && by_matrix, ..structure }, ..*self.problem }
     }
 
     /// A stepper at the start of the run.
-    pub fn stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        self.stepper_of(&self.problem_for_steps(), self.h, watched)
+    pub fn stepper(&self, check_resolution: bool) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.stepper_of(&self.problem_for_steps(), self.h, check_resolution)
     }
 
     /// A stepper at the start of a problem, with step size h. If the Lagrangian has switching functions, steps end on
@@ -68,9 +73,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         &self,
         problem: &Problem<'p, L, N>,
         h: f64,
-        watched: bool,
+        check_resolution: bool,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        let options = StepperOptions { action: self.needs.action, watched };
+        let options = StepperOptions { action: self.needs.action, check_resolution };
         if const { L::HINTS.switching_functions } && self.switches && !self.info.divides {
             return of_integrator(self.integrator.clone(), problem, h, options);
         }
@@ -113,7 +118,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         &self,
         (t0, from): &(f64, PhasePoint<N>),
         t: f64,
-        near: Near<N>,
+        near: NearbyVelocity<N>,
         curve: Option<&DenseStep<N>>,
     ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
         let v = self.velocity(*t0, from, near)?;
@@ -143,19 +148,19 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
-    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError> {
+    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<SVector<f64, N>, StepError> {
         // For a constant mass the velocity is unique.
         let near = near.filter(|_| !self.problem.structure.constant_mass);
         legendre_inverse(self.problem.lagrangian, t, state, &near.unwrap_or(self.problem.start.v)).map(|x| x.v)
     }
 
-    fn energy(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<f64, StepError> {
+    fn energy(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<f64, StepError> {
         let v = self.velocity(t, state, near)?;
         let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
         if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
     }
 
-    fn rates(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<PhasePoint<N>, StepError> {
+    fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError> {
         let v = self.velocity(t, state, near)?;
         let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
         Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
@@ -178,7 +183,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
         &self,
         from: &(f64, PhasePoint<N>),
         t: f64,
-        near: Near<N>,
+        near: NearbyVelocity<N>,
         curve: Option<&DenseStep<N>>,
     ) -> Result<(PhasePoint<N>, f64), StepError> {
         let run = self.step_to(from, t, near, curve)?;

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 
 /// The number of bisections of a failed step: the part of it that can be taken is then known to the round-off of the
 /// step.
-const BISECTIONS: usize = 48;
+const MAX_BISECTIONS: usize = 48;
 
 /// The end of the run within the failed step, and the logarithm of the conformal factor there. All observers see the
 /// part of the step that contains the end. `None` if no observer ends the run there.
@@ -28,7 +28,7 @@ pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
     let (mut possible, mut impossible) = (0.0, 1.0);
     let mut ending = None;
     let mut terminal = observers.terminal()?;
-    for _ in 0..BISECTIONS {
+    for _ in 0..MAX_BISECTIONS {
         let fraction = 0.5 * (possible + impossible);
         let Ok(part) = steps.step_to(&from, from.0 + fraction * whole, stepper.last_velocity(), None) else {
             impossible = fraction;

@@ -1,7 +1,7 @@
 //! The main loop of a run.
 
 use crate::run::checks::rest::{REST, is_at_rest};
-use crate::run::checks::{Checks, TakenSteps, alone};
+use crate::run::checks::{Checks, TakenSteps, single_step_stop};
 use crate::run::end_within_step::end_within_step;
 use crate::run::findings::Findings;
 use crate::run::motion::Motion;
@@ -35,12 +35,12 @@ pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
         run.over = plan.steps.is_over(run.taken, run.stepper.time());
         let (stepper, taken, over) = (&mut *run.stepper, run.taken, run.over);
         let mut step = TakenSteps { stepper, before, first, taken, over };
-        let (before, probed) = (step.single().copied(), step.probed());
+        let (before, is_full_check) = (step.single().copied(), step.are_fully_checked());
         if let Some(false_claim) = run.checks.check(&mut step) {
             run.status = Some(false_claim);
             break;
         }
-        let at_rest = run.is_at_rest(probed);
+        let at_rest = run.is_at_rest(is_full_check);
         run.over |= at_rest;
         run.observe(first, before, at_rest);
     }
@@ -117,17 +117,17 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
 
     /// The number of steps after which an observer or a check is due next.
     fn next(&self) -> usize {
-        let seen = alone(self.taken, self.next_seen(self.taken));
-        seen.min(self.checks.next(self.taken)).min(self.plan.steps.most())
+        let observed = single_step_stop(self.taken, self.next_observed(self.taken));
+        observed.min(self.checks.next(self.taken)).min(self.plan.steps.most())
     }
 
-    fn next_seen(&self, taken: usize) -> usize {
+    fn next_observed(&self, taken: usize) -> usize {
         self.observers.next(taken).max(taken + 1)
     }
 
     /// Whether the state before the next step is needed.
     fn needs_start(&self) -> bool {
-        self.checks.needs_start(self.taken) || self.next_seen(self.taken) == self.taken + 1
+        self.checks.needs_start(self.taken) || self.next_observed(self.taken) == self.taken + 1
     }
 
     fn advance(&mut self, chunk: usize) -> Result<(), StepError> {
@@ -155,17 +155,17 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
 
     /// Whether the motion is at rest: at the end of the plan if the plan found a time of rest, otherwise at the steps
     /// at which all claims are checked.
-    fn is_at_rest(&self, probed: bool) -> bool {
+    fn is_at_rest(&self, is_full_check: bool) -> bool {
         if self.over {
             return self.plan.rests_until.is_some();
         }
         let steps = &self.plan.steps;
-        probed && is_at_rest(steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
+        is_full_check && is_at_rest(steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
     }
 
     /// Calls the observers at the end of the last step, if they are due.
     fn observe(&mut self, first: usize, before: Option<(f64, PhasePoint<N>)>, at_rest: bool) {
-        if self.taken >= self.next_seen(first) || self.over {
+        if self.taken >= self.next_observed(first) || self.over {
             let (findings, last) = (self.checks.findings, self.over && !at_rest);
             let end = self.plan.view(&*self.stepper, before, findings, (self.taken, last));
             let stop = self.observers.step(&end).break_value();
@@ -204,7 +204,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         let Findings { log_factor, unresolved, .. } = checks.findings;
         Outcome {
             status: status.unwrap_or(Status::Completed),
-            unresolved: crate::error::first(unresolved, checks.found_by(&*stepper)),
+            unresolved: crate::error::first(unresolved, checks.unresolved_by(&*stepper)),
             steps: taken,
             t,
             q: state.q,

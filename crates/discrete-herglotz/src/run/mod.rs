@@ -19,7 +19,7 @@ mod resume_state;
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use builder::Run;
 pub(crate) use checks::energy::may_drift;
-pub use checks::energy_drift::{EnergyDrift, EnergyLook};
+pub use checks::energy_drift::{EnergyDrift, EnergySample};
 pub use observers::checkpoint::Checkpoint;
 #[cfg(feature = "csv")]
 pub use observers::csv_rows::CsvRows;

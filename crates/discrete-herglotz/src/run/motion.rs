@@ -5,18 +5,18 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
-pub(crate) type Near<const N: usize> = Option<SVector<f64, N>>;
+pub(crate) type NearbyVelocity<const N: usize> = Option<SVector<f64, N>>;
 
 /// Quantities of a motion that observers compute from its states.
 pub(crate) trait Motion<const N: usize> {
     /// The velocity at a state; if several velocities have its momentum, the one close to `near`.
-    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError>;
+    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<SVector<f64, N>, StepError>;
 
     /// The energy at a state.
-    fn energy(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<f64, StepError>;
+    fn energy(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<f64, StepError>;
 
     /// The derivatives `(qdot, pdot, zdot)` at a state.
-    fn rates(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<PhasePoint<N>, StepError>;
+    fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError>;
 
     /// A digest that identifies the run.
     fn fingerprint(&self) -> u64;
@@ -27,7 +27,7 @@ pub(crate) trait Motion<const N: usize> {
         &self,
         from: &(f64, PhasePoint<N>),
         t: f64,
-        near: Near<N>,
+        near: NearbyVelocity<N>,
         curve: Option<&DenseStep<N>>,
     ) -> Result<(PhasePoint<N>, f64), StepError>;
 }

@@ -1,7 +1,7 @@
 //! The plan of a run: its steps, its route, and what they compute and skip.
 
 use crate::integration::check_claims::violated_claim;
-use crate::run::checks::next_probe;
+use crate::run::checks::next_full_check;
 use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
 use crate::run::observers::step_view::StepView;
@@ -11,8 +11,9 @@ use contact_geom::{Defect, Lagrangian, PhasePoint, Structure};
 use std::cell::Cell;
 use std::fmt::{Display, Formatter};
 
-/// The number of initial steps along which the claims of structure are checked before a run.
-const FIRST_STEPS: usize = 64;
+/// The number of initial steps along which the claims of structure are checked before a run, so that a false claim that
+/// shows only in motion is an error of the input and not of the run: seven checks, at powers of two.
+const MAX_STEPS_CHECKED_FIRST: usize = 64;
 
 /// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
 /// `Display` output lists what will be computed and what is skipped.
@@ -108,8 +109,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let Discretization { problem, count, t_end, .. } = self.steps;
         let mut stepper = self.stepper()?;
         let mut taken = 0;
-        while taken < count.min(FIRST_STEPS) {
-            let steps = next_probe(taken).min(count) - taken;
+        while taken < count.min(MAX_STEPS_CHECKED_FIRST) {
+            let steps = next_full_check(taken).min(count) - taken;
             match stepper.advance_until(steps, t_end) {
                 Ok(done) if done > 0 => taken += done,
                 _ => break,

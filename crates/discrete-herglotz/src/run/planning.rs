@@ -4,12 +4,19 @@ use crate::integration::check_claims::check_claims_over;
 use crate::run::Plan;
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
-use crate::run::request::{MOST_STEPS, Request, Shared, StepControl, StepSelection, Steps};
+use crate::run::request::{MAX_STEPS, Request, Shared, StepControl, StepSelection, Steps};
 use crate::{GaussCollocation, InputError};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
+/// The number of times in the span at which the claims of structure are checked before a run with given steps.
+const CHECKED_TIMES: usize = 16;
+
+/// The same before trial runs, which check the equations of motion along the whole span.
+const CHECKED_TIMES_BEFORE_TRIAL_RUNS: usize = 4;
+
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
+    /// The plan of the request, after all checks of its input.
     pub(crate) fn plan(
         &self,
         length: StepControl<'p, L, N>,
@@ -23,7 +30,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             return self.plan_of_the_start(length);
         }
         // After the motion has come to rest, errors relative to it are undefined.
-        if let StepControl::For(..) = length
+        if let StepControl::Accuracy(..) = length
             && let Some(t_end) = self.time_of_rest()
         {
             let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
@@ -42,16 +49,16 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
                 return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
             }
         }
-        // Trial runs check the equations of motion along the whole span.
-        let times = if let StepControl::For(..) = length { 4 } else { 16 };
+        let accuracy = matches!(length, StepControl::Accuracy(..));
+        let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
         check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
-        let choice = match length {
-            StepControl::For(wanted, choose) => choose(self, wanted, terminal)?,
+        let selection = match length {
+            StepControl::Accuracy(wanted, select_steps) => select_steps(self, wanted, terminal)?,
             StepControl::Given(steps) => self.given(steps)?,
             StepControl::Exactly(count, h) => StepSelection { h, ..self.given(Steps::Count(count))? },
         };
-        check_count(choice.count as f64)?;
-        let plan = Plan::new(self, &choice)?;
+        check_count(selection.count as f64)?;
+        let plan = Plan::new(self, &selection)?;
         // If an accuracy was requested, the trial runs have made these checks.
         if plan.error().is_none() {
             plan.check_first_steps()?;
@@ -62,11 +69,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     /// The plan of a run that ends at its start time: no step is taken.
     fn plan_of_the_start(&self, length: StepControl<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
         let (integrator, error) = match (length, &self.integrator) {
-            (StepControl::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
+            (StepControl::Accuracy(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
                 return Err(InputError::Tolerance { wanted });
             }
-            (StepControl::For(..), None) => (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0)),
-            (StepControl::For(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
+            (StepControl::Accuracy(..), None) => {
+                (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0))
+            }
+            (StepControl::Accuracy(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
             (StepControl::Given(steps), _) => (self.given(steps)?.integrator, None),
             (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
         };
@@ -97,8 +106,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             (Steps::Size(h), _) => {
                 let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
                 check_count(count)?;
-                let choice = of(count as usize, integrator);
-                Ok(if rate.is_some() { StepSelection { h: h.copysign(span), ..choice } } else { choice })
+                let selection = of(count as usize, integrator);
+                Ok(if rate.is_some() { StepSelection { h: h.copysign(span), ..selection } } else { selection })
             }
         }
     }
@@ -123,9 +132,9 @@ const SIZED: &str =
     "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
 
 fn check_count(count: f64) -> Result<(), InputError> {
-    if count <= MOST_STEPS {
+    if count <= MAX_STEPS {
         return Ok(());
     }
     let remedy = "take longer steps, or a shorter span";
-    Err(InputError::TooMany { what: "the number of steps", found: count, most: MOST_STEPS, remedy })
+    Err(InputError::TooMany { what: "the number of steps", found: count, most: MAX_STEPS, remedy })
 }

@@ -32,7 +32,7 @@ pub(crate) type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + '
 
 /// The step-size selection for an accuracy, as a function pointer: it is not compiled into programs that request no
 /// accuracy.
-pub(crate) type ChooseSteps<'p, L, const N: usize> =
+pub(crate) type SelectSteps<'p, L, const N: usize> =
     for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<StepSelection<'p, L, N>, InputError>;
 
 /// How the steps of a run are determined.
@@ -40,7 +40,8 @@ pub(crate) enum StepControl<'p, L, const N: usize> {
     Given(Steps),
     /// This number of steps of exactly this size.
     Exactly(usize, f64),
-    For(f64, ChooseSteps<'p, L, N>),
+    /// The steps that trial runs select for this error.
+    Accuracy(f64, SelectSteps<'p, L, N>),
 }
 
 impl<L, const N: usize> Clone for StepControl<'_, L, N> {
@@ -81,4 +82,4 @@ impl<L, const N: usize> Clone for StepSelection<'_, L, N> {
 }
 
 /// The largest number of steps: up to it `t0 + k h` resolves times to a thousandth of a step.
-pub(crate) const MOST_STEPS: f64 = (1u64 << 42) as f64;
+pub(crate) const MAX_STEPS: f64 = (1u64 << 42) as f64;

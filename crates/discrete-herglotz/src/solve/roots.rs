@@ -29,10 +29,10 @@ pub(crate) fn bracketed_root_within<E>(
         let middle = 0.5 * (a + b);
         let radius = (half_width * f64::powi(2.0, bisections + 1 - j) - 0.5 * (b - a)).max(0.0);
         let secant = (above * a - below * b) / (above - below);
-        let aside = (middle - secant).signum();
+        let direction = (middle - secant).signum();
         let shift = truncation * (b - a).powi(2);
-        let truncated = if shift <= (middle - secant).abs() { secant + aside * shift } else { middle };
-        let x = if (truncated - middle).abs() <= radius { truncated } else { middle - aside * radius };
+        let truncated = if shift <= (middle - secant).abs() { secant + direction * shift } else { middle };
+        let x = if (truncated - middle).abs() <= radius { truncated } else { middle - direction * radius };
         let value = f(x)?;
         if value == 0.0 {
             return Ok(x);

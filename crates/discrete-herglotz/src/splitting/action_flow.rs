@@ -1,6 +1,6 @@
 //! Flows of `z' = f(z)`, the part of a splitting that acts on the action.
 
-use super::separable::{FALSE_CLAIM, without_symmetry};
+use super::separable::{MAX_HYPOTHESIS_DEFECT, without_symmetry};
 use crate::InputError;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -145,28 +145,28 @@ fn is_rate_of<const N: usize>(
     t: f64,
     state: &PhasePoint<N>,
 ) -> bool {
-    beside(state.z).all(|z| {
+    nearby_actions(state.z).all(|z| {
         let given = lagrangian.gradient(t, &VelocityPoint { q: state.q, v: SVector::zeros(), z }).z;
-        (with_slope(|z| flow.rate(z), z).1 - given).abs() <= FALSE_CLAIM * (1.0 + given.abs())
+        (with_slope(|z| flow.rate(z), z).1 - given).abs() <= MAX_HYPOTHESIS_DEFECT * (1.0 + given.abs())
     })
 }
 
 /// Whether the maps are the flow of the rate near an action: `phi_s' f = f o phi_s`, and
 /// `phi_s - phi_(-s) = 2 s f` for small s up to higher order.
 pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
-    beside(z).all(|z| {
+    nearby_actions(z).all(|z| {
         let (rate, slope) = with_slope(|z| flow.rate(z), z);
         let scale = 1.0 / (1.0 + slope.abs());
         let (end, stretch) = with_slope(|z| flow.over(0.1 * scale).apply(z), z);
         let s = 1e-4 * scale;
         let change = flow.over(s).apply(z) - flow.over(-s).apply(z);
         let size = 1.0 + rate.abs();
-        (stretch * rate - flow.rate(end)).abs() <= FALSE_CLAIM * size
+        (stretch * rate - flow.rate(end)).abs() <= MAX_HYPOTHESIS_DEFECT * size
             && (change - 2.0 * s * rate).abs() <= 1e-6 * s * size
     })
 }
 
 /// An action and one value on either side of it.
-fn beside(z: f64) -> impl Iterator<Item = f64> {
+fn nearby_actions(z: f64) -> impl Iterator<Item = f64> {
     [0.0, -0.1, 0.1].into_iter().enumerate().map(move |(i, d)| z + d * without_symmetry(i))
 }

@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The number of nodes of the quadrature along a drift. Its order 12 is higher than that of every scheme here.
-const NODES: usize = 6;
+const QUADRATURE_NODES: usize = 6;
 
 /// The rate `gamma(t) = L_z` of a linear drag.
 #[derive(Clone, Copy, Debug)]
@@ -53,10 +53,10 @@ impl<const N: usize> Drag<N> {
         if s == 0.0 {
             return Drift { length: 0.0, damping: 0.0, lift: 0.0 };
         }
-        let g = Coefficients::of(NODES);
-        let rates: [f64; NODES] = std::array::from_fn(|j| self.rate(lagrangian, t + g.c[j].0 * s));
+        let g = Coefficients::of(QUADRATURE_NODES);
+        let rates: [f64; QUADRATURE_NODES] = std::array::from_fn(|j| self.rate(lagrangian, t + g.c[j].0 * s));
         let (mut growth, mut length) = (0.0, 0.0);
-        for i in 0..NODES {
+        for i in 0..QUADRATURE_NODES {
             growth += s * g.b[i].0 * rates[i];
             let so_far: f64 = rates.iter().zip(&g.a[i]).map(|(rate, a)| s * a.0 * rate).sum();
             length += s * g.b[i].0 * so_far.exp();
@@ -126,6 +126,6 @@ mod tests {
         for _ in 0..10 {
             motion.advance(1).unwrap();
         }
-        assert_eq!((system.gradients.get(), system.rates.get()), (0, 10 * super::NODES));
+        assert_eq!((system.gradients.get(), system.rates.get()), (0, 10 * super::QUADRATURE_NODES));
     }
 }

@@ -41,17 +41,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        StepperOptions { action, watched }: StepperOptions,
+        StepperOptions { action, check_resolution }: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
-            return Ok(Box::new(if watched { splitting.with_suspects() } else { splitting }));
+            return Ok(Box::new(if check_resolution { splitting.with_suspects() } else { splitting }));
         }
         // The problem has already verified the claims of its Lagrangian.
         let form = SeparableForm::read_of(lagrangian, h, t0, &state, true)?;
         let splitting = Splitting::of(form, self, h, t0, state)?.compensated_where_tiny();
-        let splitting = if watched { splitting.watched() } else { splitting };
+        let splitting = if check_resolution { splitting.with_resolution_check() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
     }
 

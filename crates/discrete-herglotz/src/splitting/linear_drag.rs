@@ -45,7 +45,7 @@ pub struct Splitting<'a, L, const N: usize> {
     progress: SplittingRun<N>,
     action: bool,
     compensated: bool,
-    watched: bool,
+    check_resolution: bool,
 }
 
 /// The stages of a step, scaled to the length of the step and with the drifts for the drag.
@@ -100,7 +100,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         let kick = form.first_kick(t0, &state.q, 0.0)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
         let progress = SplittingRun::new(h, t0, scheme.stages(), state, kick);
-        Ok(Splitting { form, drag, table, progress, action: true, compensated: false, watched: false })
+        Ok(Splitting { form, drag, table, progress, action: true, compensated: false, check_resolution: false })
     }
 
     /// The same without the action: z keeps its initial value and is not computed.
@@ -124,8 +124,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved). The
     /// check adds a sixth to the time of a Kepler orbit, a third to that of a pendulum and up to twice the time of an
     /// oscillator; it is intended for motions that are not known in advance.
-    pub fn watched(self) -> Self {
-        Splitting { watched: true, ..self }
+    pub fn with_resolution_check(self) -> Self {
+        Splitting { check_resolution: true, ..self }
     }
 }
 
@@ -154,13 +154,13 @@ impl SubstepTable {
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        let Splitting { form, drag, table, progress, action, compensated, watched } = self;
+        let Splitting { form, drag, table, progress, action, compensated, check_resolution } = self;
         let maps = StepMaps { form, drag, table };
         match (*action, *compensated) {
-            (false, false) => maps.advance::<false, false>(progress, steps, *watched),
-            (false, true) => maps.advance::<false, true>(progress, steps, *watched),
-            (true, false) => maps.advance::<true, false>(progress, steps, *watched),
-            (true, true) => maps.advance::<true, true>(progress, steps, *watched),
+            (false, false) => maps.advance::<false, false>(progress, steps, *check_resolution),
+            (false, true) => maps.advance::<false, true>(progress, steps, *check_resolution),
+            (true, false) => maps.advance::<true, false>(progress, steps, *check_resolution),
+            (true, true) => maps.advance::<true, true>(progress, steps, *check_resolution),
         }
     }
 
@@ -201,11 +201,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.progress.watch.first
+        self.progress.monitor.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.progress.watch.suspect.take()
+        self.progress.monitor.suspect.take()
     }
 }
 
@@ -221,9 +221,9 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         &self,
         progress: &mut SplittingRun<N>,
         steps: usize,
-        watched: bool,
+        check_resolution: bool,
     ) -> Result<(), StepFailure> {
-        match (self.drag, watched) {
+        match (self.drag, check_resolution) {
             (Drag::Constant(_), false) => {
                 progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, false, false>(at, n))
             }
@@ -241,13 +241,13 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
 
     /// The motion after this number of further steps, and its completed state.
     #[inline(never)]
-    fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const WATCHED: bool>(
+    fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const CHECKED: bool>(
         &self,
         from: &SplittingRun<N>,
         steps: usize,
     ) -> Reached<N> {
         let StepMaps { form, table, .. } = self;
-        let (mut m, mut seen) = (from.motion, from.seen());
+        let (mut m, mut checks) = (from.motion, from.checks());
         let first = usize::from(from.taken == 0);
         for (stages, range) in [(&table.first, 0..first), (&table.joined, first..steps)] {
             for k in range {
@@ -260,15 +260,15 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
                     } else {
                         m.force = form.force(t + stage.time, &m.q.value, 0.0);
                     }
-                    if WATCHED {
-                        m.look::<true>(&momentum, &force, stage.span, &mut seen);
+                    if CHECKED {
+                        m.check_drift::<true>(&momentum, &force, stage.span, &mut checks);
                     }
                 }
             }
         }
         let mut end = m;
         self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut end, from.time_after(steps - 1), &table.closing);
-        Reached { motion: m, state: end.state(), seen }
+        Reached { motion: m, state: end.state(), checks }
     }
 
     /// `sigma_d` of the step from the time t. It is computed on request, since for a time-dependent drag it costs as

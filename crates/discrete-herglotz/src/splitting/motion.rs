@@ -79,30 +79,32 @@ impl<const N: usize> CompensatedState<N> {
     /// Checks the drift over the time s that starts with the given momentum and force and ends with the stored ones, by
     /// the measures of a [`ResolutionMonitor`] for steps as long as the drift.
     #[inline(always)]
-    pub(super) fn look<const DOUBTS: bool>(
+    pub(super) fn check_drift<const SUSPECTS: bool>(
         &mut self,
         momentum: &SVector<f64, N>,
         force: &SVector<f64, N>,
         s: f64,
-        seen: &mut DriftLooks,
+        checks: &mut DriftChecks,
     ) {
         let now = (self.force - force) * s;
         let before = std::mem::replace(&mut self.change, now);
         if now.dot(&before) < 0.0 {
             let momenta = [momentum, &self.p.value, &(self.p.value + self.force * s)];
-            if let Some(defect) = turning([&before, &now], momenta, &self.q.value, s, seen.floor) {
-                seen.defect = max_or_nan(seen.defect, defect);
+            if let Some(defect) = turning([&before, &now], momenta, &self.q.value, s, checks.floor) {
+                checks.defect = max_or_nan(checks.defect, defect);
             }
         }
-        if DOUBTS && let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, seen.floor, seen.sharpest) {
-            seen.sharpest = sharpness;
+        if SUSPECTS
+            && let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, checks.floor, checks.sharpest)
+        {
+            checks.sharpest = sharpness;
         }
     }
 }
 
 /// The results of the checks of drifts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DriftLooks {
+pub(super) struct DriftChecks {
     /// The largest defect; 0 if none exceeds one.
     defect: f64,
     /// The largest sharpness so far, or the threshold if none exceeds it.
@@ -116,11 +118,12 @@ pub(super) struct Reached<const N: usize> {
     pub(super) motion: CompensatedState<N>,
     /// The completed state of the motion.
     pub(super) state: PhasePoint<N>,
-    pub(super) seen: DriftLooks,
+    pub(super) checks: DriftChecks,
 }
 
-/// The number of steps between two checks that the motion is finite.
-const CHUNK: usize = 256;
+/// The number of steps between two checks that the motion is finite: the checks then take no measurable time, and the
+/// repetition of a chunk in which one fails is short.
+const MAX_UNCHECKED_STEPS: usize = 256;
 
 /// The progress of a run.
 #[derive(Clone, Debug)]
@@ -134,13 +137,13 @@ pub(super) struct SplittingRun<const N: usize> {
     /// The state after the steps taken: the motion, completed by the part of the last step that is combined with the
     /// next.
     pub(super) state: PhasePoint<N>,
-    pub(super) watch: ResolutionMonitor<N>,
+    pub(super) monitor: ResolutionMonitor<N>,
 }
 
 impl<const N: usize> SplittingRun<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
-        let watch = ResolutionMonitor::new(&state.q, &SVector::zeros(), h);
-        SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, watch }
+        let monitor = ResolutionMonitor::new(&state.q, &SVector::zeros(), h);
+        SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, monitor }
     }
 
     /// The time after this number of further steps.
@@ -156,8 +159,8 @@ impl<const N: usize> SplittingRun<N> {
 
     /// The initial value of the check results for the next steps.
     #[inline(always)]
-    pub(super) fn seen(&self) -> DriftLooks {
-        DriftLooks { defect: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
+    pub(super) fn checks(&self) -> DriftChecks {
+        DriftChecks { defect: 0.0, sharpest: self.monitor.sharpest, floor: self.monitor.floor }
     }
 
     /// Takes steps in chunks. A chunk that ends with a non-finite value, or that contains the first unresolved step or
@@ -167,14 +170,14 @@ impl<const N: usize> SplittingRun<N> {
         steps: usize,
         after: impl Fn(&Self, usize) -> Reached<N>,
     ) -> Result<(), StepFailure> {
-        let (mut taken, mut longest) = (0, CHUNK);
+        let (mut taken, mut longest) = (0, MAX_UNCHECKED_STEPS);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let Reached { motion, state, seen: DriftLooks { defect, sharpest, .. } } = after(self, chunk);
+            let Reached { motion, state, checks: DriftChecks { defect, sharpest, .. } } = after(self, chunk);
             // A non-finite value in the motion makes this state or the next one non-finite.
             let finite = ChartVector::from(state).is_finite() && motion.sigma.is_finite();
-            let defect = (defect > 0.0 && self.watch.first.is_none()).then_some(defect);
-            let sharper = sharpest > self.watch.sharpest;
+            let defect = (defect > 0.0 && self.monitor.first.is_none()).then_some(defect);
+            let sharper = sharpest > self.monitor.sharpest;
             if chunk > 1 && (!finite || defect.is_some() || sharper) {
                 longest = 1;
                 continue;
@@ -183,12 +186,12 @@ impl<const N: usize> SplittingRun<N> {
                 return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
             if let Some(defect) = defect {
-                self.watch.note(self.taken, defect);
-                longest = CHUNK;
+                self.monitor.note(self.taken, defect);
+                longest = MAX_UNCHECKED_STEPS;
             } else if sharper {
                 let (t, from) = (self.time_after(0), self.state);
-                self.watch.suspect(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
-                longest = CHUNK;
+                self.monitor.suspect(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
+                longest = MAX_UNCHECKED_STEPS;
             }
             (self.motion, self.state) = (motion, state);
             self.taken += chunk;
@@ -200,4 +203,4 @@ impl<const N: usize> SplittingRun<N> {
 
 saved!([const N: usize] CompensatedVector<N> { value, carry });
 saved!([const N: usize] CompensatedState<N> { q, p, z, force, value, change, sigma });
-saved!([const N: usize] SplittingRun<N> { taken, motion, state, watch });
+saved!([const N: usize] SplittingRun<N> { taken, motion, state, monitor });

@@ -162,23 +162,23 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.progress.watch.first
+        self.progress.monitor.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
-        self.progress.watch.suspect.take()
+        self.progress.monitor.suspect.take()
     }
 }
 
 /// The motion after this number of further steps, and its state.
 #[inline(never)]
-fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
+fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const SUSPECTS: bool>(
     form: &SeparableForm<&L, N>,
     table: &DragTable<C>,
     from: &SplittingRun<N>,
     steps: usize,
 ) -> Reached<N> {
-    let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);
+    let (mut m, mut checks, (z, constant)) = (from.motion, from.checks(), table.rest);
     for k in 0..steps {
         let t = from.time_after(k);
         m.sigma = 1.0;
@@ -192,13 +192,13 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, 
             m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
             let force = m.force;
             (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);
-            m.look::<DOUBTING>(&momentum, &force, stage.length, &mut seen);
+            m.check_drift::<SUSPECTS>(&momentum, &force, stage.length, &mut checks);
             m.value -= constant;
             m.kick::<true, COMPENSATED>(stage.half);
         }
         apply::<C, N, COMPENSATED>(&mut m, &table.closing);
     }
-    Reached { motion: m, state: m.state(), seen }
+    Reached { motion: m, state: m.state(), checks }
 }
 
 /// Applies a map of the flow of f, and multiplies `sigma` by its factor.

@@ -1,13 +1,14 @@
 //! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
-use crate::integration::check_claims::PROBE;
+use crate::integration::check_claims::MAX_CLAIM_DEFECT;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
-/// The bound on a quantity that vanishes if a hypothesis holds: the round-off for a true one, with some margin.
-pub(super) const FALSE_CLAIM: f64 = 1e-9;
+/// The bound on a quantity that vanishes if a hypothesis holds: the round-off for a true one, with a margin of some
+/// million for its derivatives.
+pub(super) const MAX_HYPOTHESIS_DEFECT: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, evaluated once.
 #[derive(Clone, Debug)]
@@ -48,7 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         for x in probes(state).into_iter().filter(|_| !check_claims) {
             // The point near the given state may lie outside of the domain of L.
             let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
-            if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
+            if let Some(Defect { claim, size }) = defects.find(|d| d.size > MAX_CLAIM_DEFECT) {
                 return Err(InputError::FalseClaim { claim, size });
             }
         }
@@ -78,9 +79,9 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
                 v: SVector::from_element(Dual::constant(0.0)),
                 z: Dual::constant(state.z),
             };
-            let clock = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
-            let rate = self.lagrangian.gradient(clock, &still).z;
-            if rate.d[0].is_nan() || rate.d[0].abs() > FALSE_CLAIM * (1.0 + rate.re.abs()) {
+            let time = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
+            let rate = self.lagrangian.gradient(time, &still).z;
+            if rate.d[0].is_nan() || rate.d[0].abs() > MAX_HYPOTHESIS_DEFECT * (1.0 + rate.re.abs()) {
                 return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
             }
         }
@@ -156,9 +157,9 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
 /// The position of the state, and one near it in case that of the state is special; with generic velocities.
 fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
     let v = SVector::from_fn(|i, _| without_symmetry(i));
-    let beside =
+    let nearby =
         SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
-    [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
+    [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: nearby, v, z: state.z + without_symmetry(2 * N) }]
 }
 
 /// Generic numbers between 0.3 and 1.3.

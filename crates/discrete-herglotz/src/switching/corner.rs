@@ -11,17 +11,29 @@ use contact_geom::{
 
 /// The distance from the surface at which L is evaluated on one side, relative to the position and to its change in a
 /// step: far larger than the round-off of a position, and small enough that continuous functions change little over it.
-const BESIDE: f64 = 1e-9;
+const SURFACE_DISTANCE: f64 = 1e-9;
 
-/// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms.
-const ROUNDINGS: f64 = 256.0;
+/// A second distance, in units of [`SURFACE_DISTANCE`]: closer to the surface a jump keeps its size, while the
+/// difference of a continuous function decreases to this fraction.
+const NEAR_DISTANCE: f64 = 0.125;
+
+/// The part of a difference that a jump keeps at [`NEAR_DISTANCE`] at least.
+const MIN_KEPT_JUMP: f64 = 0.7;
+
+/// The size of a correction, relative to the number, below which corrections that no longer decrease are the round-off
+/// of the extrapolation to the surface.
+const STAGNATION_ROUND_OFF: f64 = 1e-10;
+
+/// The least difference of L between both sides that counts as a jump, in units of the round-off of its terms: for the
+/// sums in L and the extrapolation.
+const JUMP_ROUNDINGS: f64 = 256.0;
 
 /// The step, relative to the coordinates, of the differences for the normal of a surface. With differences of order six
 /// the error is the round-off of the function divided by this, 1e-13.
-const DIFFERENCE: f64 = 1e-3;
+const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// The limit of Newton iterations for one number or one velocity.
-const ITERATIONS: usize = 60;
+/// The largest number of Newton iterations for one number or one velocity: bisection would need as many.
+const MAX_ITERATIONS: usize = 60;
 
 /// The behaviour of a motion at a zero of a switching function.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +85,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
     /// The velocity of a momentum, by Newton's method from a guess, and the energy.
     fn velocity(&self, p: &SVector<f64, N>, guess: &SVector<f64, N>) -> Result<(SVector<f64, N>, f64), StepError> {
         let (mut v, mut before) = (*guess, f64::INFINITY);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let mut change = self.momentum(&v) - p;
             linear::solve(&mut self.mass(&v), &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
             v -= change;
@@ -83,13 +95,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
             }
             // The corrections decrease down to the round-off of the extrapolation.
             if size <= f64::EPSILON * max_abs_or_nan(v.iter().copied())
-                || (size >= before && size <= 1e-10 * max_abs_or_nan(v.iter().copied()))
+                || (size >= before && size <= STAGNATION_ROUND_OFF * max_abs_or_nan(v.iter().copied()))
             {
                 return Ok((v, p.dot(&v) - self.value(&v)));
             }
             before = size;
         }
-        Err(StepError::NotConverged { residual: before, iterations: ITERATIONS as u32 })
+        Err(StepError::NotConverged { residual: before, iterations: MAX_ITERATIONS as u32 })
     }
 }
 
@@ -111,7 +123,7 @@ fn slope<const N: usize>(
 }
 
 /// Solves the corner conditions at a zero of a switching function, for a motion that arrives from its current side;
-/// `reach` is a bound for the change of position in a step.
+/// `max_displacement` is a bound for the change of position in a step.
 ///
 /// # Errors
 /// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion
@@ -121,26 +133,28 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     surfaces: &mut Surfaces,
     index: usize,
     at: &TimedState<N>,
-    reach: f64,
+    max_displacement: f64,
 ) -> Result<Corner<N>, StepError> {
     let (x, side) = (at.point(), surfaces.side(index));
-    let scale = |q: f64| if max_or_nan(q.abs(), reach) > 0.0 { max_or_nan(q.abs(), reach) } else { 1.0 };
+    let scale =
+        |q: f64| if max_or_nan(q.abs(), max_displacement) > 0.0 { max_or_nan(q.abs(), max_displacement) } else { 1.0 };
     let mut of = |along: &dyn Fn(f64) -> (f64, VelocityPoint<N>), distance: f64| {
         slope(lagrangian, surfaces, index, along, distance)
     };
     let moved =
         |i: usize, by: f64| VelocityPoint { q: SVector::from_fn(|j, _| x.q[j] + if i == j { by } else { 0.0 }), ..x };
-    let normal: SVector<f64, N> = SVector::from_fn(|i, _| of(&|by| (at.t, moved(i, by)), DIFFERENCE * scale(x.q[i])));
+    let normal: SVector<f64, N> =
+        SVector::from_fn(|i, _| of(&|by| (at.t, moved(i, by)), DIFFERENCE_STEP * scale(x.q[i])));
     let faster =
         |i: usize, by: f64| VelocityPoint { v: SVector::from_fn(|j, _| x.v[j] + if i == j { by } else { 0.0 }), ..x };
     let unit = |v: f64| if v == 0.0 { 1.0 } else { v.abs() };
-    let along_v = max_abs_or_nan((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE * unit(x.v[i]))));
-    let along_z = of(&|by| (at.t, VelocityPoint { z: x.z + by, ..x }), DIFFERENCE * unit(x.z));
-    let rate_t = of(&|by| (at.t + by, x), DIFFERENCE * unit(at.t));
+    let along_v = max_abs_or_nan((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE_STEP * unit(x.v[i]))));
+    let along_z = of(&|by| (at.t, VelocityPoint { z: x.z + by, ..x }), DIFFERENCE_STEP * unit(x.z));
+    let rate_t = of(&|by| (at.t + by, x), DIFFERENCE_STEP * unit(at.t));
 
     let size = normal.norm();
-    let beside = |toward: f64, of: f64| {
-        let length = BESIDE * scale(max_abs_or_nan(x.q.iter().copied()));
+    let one_sided = |toward: f64, of: f64| {
+        let length = SURFACE_DISTANCE * scale(max_abs_or_nan(x.q.iter().copied()));
         OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
     };
     if size == 0.0 {
@@ -153,12 +167,11 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
             Ok(Corner::Continuous)
         };
     }
-    // Closer to the surface a jump keeps its size, while the difference of a continuous function decreases.
-    let jump = |of: f64| beside(-1.0, of).value(&x.v) - beside(1.0, of).value(&x.v);
-    let (wide, near) = (jump(1.0), jump(0.125));
-    let (old, new) = (beside(1.0, 0.125), beside(-1.0, 0.125));
+    let jump = |of: f64| one_sided(-1.0, of).value(&x.v) - one_sided(1.0, of).value(&x.v);
+    let (wide, near) = (jump(1.0), jump(NEAR_DISTANCE));
+    let (old, new) = (one_sided(1.0, NEAR_DISTANCE), one_sided(-1.0, NEAR_DISTANCE));
     let terms = old.value(&x.v).abs() + at.state.p.dot(&x.v).abs();
-    if near.abs() <= ROUNDINGS * f64::EPSILON * terms || near.abs() < 0.7 * wide.abs() {
+    if near.abs() <= JUMP_ROUNDINGS * f64::EPSILON * terms || near.abs() < MIN_KEPT_JUMP * wide.abs() {
         return Ok(Corner::Continuous);
     }
     if !near.is_finite() {
@@ -199,7 +212,7 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
     approach: f64,
 ) -> Result<Option<SVector<f64, N>>, StepError> {
     let (mut v, mut before) = (*guess, f64::INFINITY);
-    for _ in 0..ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         let p = at.state.p + normal * lambda;
         let energy_here;
         (v, energy_here) = side.velocity(&p, &v)?;
@@ -211,13 +224,13 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
         let size = (change * normal.norm()).abs();
         lambda -= change;
         let scale = max_or_nan(max_abs_or_nan(p.iter().copied()), (lambda * normal.norm()).abs());
-        if size <= f64::EPSILON * scale || (size >= before && size <= 1e-10 * scale) {
+        if size <= f64::EPSILON * scale || (size >= before && size <= STAGNATION_ROUND_OFF * scale) {
             return Ok(Some(at.state.p + normal * lambda));
         }
         before = size;
     }
     // Neither a root nor the minimum of the energy was found, so that a reflection cannot be concluded.
-    Err(StepError::NotConverged { residual: before, iterations: ITERATIONS as u32 })
+    Err(StepError::NotConverged { residual: before, iterations: MAX_ITERATIONS as u32 })
 }
 
 /// Whether L or its momenta jump across a surface that does not depend on the position but on the velocity or z.
@@ -229,7 +242,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
 ) -> bool {
     let x = at.point();
     let speed = max_abs_or_nan(x.v.iter().copied());
-    let length = |of: f64| BESIDE * of * if speed > 0.0 { speed } else { 1.0 };
+    let length = |of: f64| SURFACE_DISTANCE * of * if speed > 0.0 { speed } else { 1.0 };
     let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
     let here = |by: f64| lagrangian.value(at.t, &x.q, &moved(by).v, moved(by).z);
     let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(lagrangian, index, (at.t, &moved(by)));
@@ -241,7 +254,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
         let [a, b] = [length(of), -length(of)].map(|by| lagrangian.gradient(at.t, &moved(by)).y);
         max_or_nan(max_abs_or_nan((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
     };
-    let (wide, near) = (jump(1.0), jump(0.125));
+    let (wide, near) = (jump(1.0), jump(NEAR_DISTANCE));
     let terms = here(0.0).abs() + max_abs_or_nan(at.state.p.iter().copied());
-    near > ROUNDINGS * f64::EPSILON * terms && near >= 0.7 * wide
+    near > JUMP_ROUNDINGS * f64::EPSILON * terms && near >= MIN_KEPT_JUMP * wide
 }

@@ -1,8 +1,8 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
-use super::{Reach, SwitchingStepper};
-use crate::gauss::GaussStepper;
-use crate::gauss::info;
+use crate::gauss::{GaussStepper, info};
+use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
@@ -48,7 +48,7 @@ impl DividedGauss {
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
         let make =
             move |problem: &Problem<'a, L, N>, h: f64, _: bool| GaussStepper::new(problem, self.stages, h, options);
-        Ok(SwitchingStepper::new(problem, h, Reach::Inside, make)?.dividing(self.most_misfit))
+        Ok(SwitchingStepper::new(problem, h, EvaluationRange::Within, make)?.dividing(self.most_misfit))
     }
 }
 

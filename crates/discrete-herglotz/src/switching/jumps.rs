@@ -19,7 +19,7 @@ pub fn jumps_between<const N: usize>(
     };
     let curve = StepCurve { from: of(from), to: of(to), dense: None };
     let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
-    let reach = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
+    let max_displacement = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
     let parts = curve.parts();
     for part in 1..=parts {
         let ends = [part - 1, part].map(|part| part as f64 / parts as f64);
@@ -27,9 +27,9 @@ pub fn jumps_between<const N: usize>(
         for index in 0..surfaces.sides.len() {
             let after = sign(surfaces.value(lagrangian, index, (t, &x)));
             if surfaces.side(index) * after < 0.0 {
-                let about = surfaces.change(lagrangian, &curve, index, ends).about;
+                let estimate = surfaces.change(lagrangian, &curve, index, ends).estimate;
                 if !matches!(
-                    corner(lagrangian, &mut surfaces, index, &of(curve.at(about)), reach),
+                    corner(lagrangian, &mut surfaces, index, &of(curve.at(estimate)), max_displacement),
                     Ok(Corner::Continuous)
                 ) {
                     return true;

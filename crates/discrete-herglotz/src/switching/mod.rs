@@ -9,10 +9,9 @@
 mod corner;
 mod divided;
 mod jumps;
-mod stepper;
+pub(crate) mod stepper;
 mod surfaces;
 
 pub use divided::DividedGauss;
 pub use jumps::jumps_between;
-pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;

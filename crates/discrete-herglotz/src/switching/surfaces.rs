@@ -8,11 +8,17 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use std::convert::Infallible;
 
-/// The number of parts in which a step without dense output is searched for sign changes.
-const PARTS: usize = 8;
+/// The number of parts in which a step without dense output is searched for sign changes: twice those of a search for
+/// events, since a sign change that is missed spoils the step.
+const DEFAULT_PARTS: usize = 8;
 
-/// The limit of halvings of the part after a zero, in the search for a point where the function still has its old sign.
-const HALVINGS: i32 = 30;
+/// The largest number of halvings of the part after a zero, in the search for a point where the function still has its
+/// old sign: down to the round-off of half of the digits of the time.
+const MAX_HALVINGS: i32 = 30;
+
+/// The distance over which the slope of a function at its zero is computed, as a fraction of the interval in which the
+/// zero lies: an error of 1e-8, by the central difference, is enough for Newton's method.
+const SLOPE_DISTANCE: f64 = 1e-4;
 
 /// Whether a Lagrangian has switching functions.
 ///
@@ -58,7 +64,7 @@ pub(super) struct StepCurve<const N: usize> {
 
 impl<const N: usize> StepCurve<N> {
     pub(super) fn parts(&self) -> usize {
-        self.dense.as_ref().map_or(PARTS, DenseStep::parts)
+        self.dense.as_ref().map_or(DEFAULT_PARTS, DenseStep::parts)
     }
 
     pub fn span(&self) -> f64 {
@@ -82,12 +88,12 @@ impl<const N: usize> StepCurve<N> {
 }
 
 /// A sign change on the curve of a step: the index of the function, the fractions of the step between which it lies,
-/// and the approximate fraction `about`.
+/// and the approximate fraction `estimate`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SignChange {
     pub index: usize,
     pub ends: [f64; 2],
-    pub about: f64,
+    pub estimate: f64,
     /// The time derivative of the function there.
     pub slope: f64,
 }
@@ -131,15 +137,15 @@ impl Surfaces {
         }
     }
 
-    /// Whether a surface lies within the fraction `beside` of a step before its start or after its end, where the curve
-    /// is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
+    /// Whether a surface lies within the fraction `extension` of a step before its start or after its end, where the
+    /// curve is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
         curve: &StepCurve<N>,
-        beside: f64,
+        extension: f64,
     ) -> bool {
-        [-beside, 1.0 + beside].into_iter().any(|fraction| {
+        [-extension, 1.0 + extension].into_iter().any(|fraction| {
             let span = curve.span();
             let x = hermite(&curve.from.point(), &curve.to.point(), span, fraction * span);
             self.values.clear();
@@ -177,7 +183,7 @@ impl Surfaces {
                 let of = |i: &usize| self.side(*i) * sign(self.values.get(*i).copied().unwrap_or(0.0)) < 0.0;
                 let indices: Vec<usize> = (0..self.sides.len()).filter(of).collect();
                 let changes = indices.into_iter().map(|index| self.change(lagrangian, curve, index, [from, fraction]));
-                return changes.min_by(|a, b| a.about.total_cmp(&b.about));
+                return changes.min_by(|a, b| a.estimate.total_cmp(&b.estimate));
             }
         }
         None
@@ -199,17 +205,17 @@ impl Surfaces {
         let (mut before, after) = (toward(from), toward(to));
         if before.is_nan() || before <= 0.0 {
             // The part begins at a zero: find a point where the function still has the sign of its side.
-            let inside = (1..=HALVINGS).map(|k| from + (to - from) * f64::powi(2.0, -k));
+            let inside = (1..=MAX_HALVINGS).map(|k| from + (to - from) * f64::powi(2.0, -k));
             match inside.map(|x| (x, toward(x))).find(|(_, value)| *value > 0.0) {
                 Some(place) => (from, before) = place,
-                None => return SignChange { index, ends: [from, to], about: from, slope: 0.0 },
+                None => return SignChange { index, ends: [from, to], estimate: from, slope: 0.0 },
             }
         }
         let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(x)));
-        let about = found.unwrap_or(from);
-        let beside = 1e-4 * (to - from);
-        let slope = (toward(about + beside) - toward(about - beside)) / (2.0 * beside * curve.span());
-        SignChange { index, ends: [from, to], about, slope: side * slope }
+        let estimate = found.unwrap_or(from);
+        let distance = SLOPE_DISTANCE * (to - from);
+        let slope = (toward(estimate + distance) - toward(estimate - distance)) / (2.0 * distance * curve.span());
+        SignChange { index, ends: [from, to], estimate, slope: side * slope }
     }
 }
 

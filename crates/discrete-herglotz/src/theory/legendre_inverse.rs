@@ -8,8 +8,9 @@ use crate::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
 
-/// After this number of corrections that do not decrease, the remaining ones are taken for round-off.
-const STALLED: u32 = 8;
+/// After this number of corrections that do not decrease, the remaining ones are taken for round-off: an iteration that
+/// still converges has no more than a few.
+const MAX_STALLED_CORRECTIONS: u32 = 8;
 
 /// The inverse Legendre transformation `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method
 /// from a guess of the velocity; the inverse of [`legendre`](contact_geom::legendre).
@@ -61,7 +62,7 @@ pub fn legendre_inverse<const N: usize>(
         stalled += u32::from(stalls);
         // Where the terms of the gradient cancel, its size does not show its round-off: a stalled iteration is accepted
         // at half of the digits.
-        let left = stalled >= STALLED && size <= f64::EPSILON.sqrt() * scale;
+        let left = stalled >= MAX_STALLED_CORRECTIONS && size <= f64::EPSILON.sqrt() * scale;
         if last_correction(size, before, round_off) || (stalls && (held || size <= 64.0 * round_off || left)) {
             return Ok(x);
         }

@@ -11,6 +11,7 @@ use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::lanes::{Lanes, vector};
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{StageMap, Stages, blocks};
+use crate::resolution::thresholds::{MIN_EXACT_PRODUCT, VALUE_ROUND_OFF};
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -45,13 +46,10 @@ pub(crate) struct DefectSample {
     pub follows_a_jump: bool,
 }
 
-/// The threshold below which products of two numbers may have lost digits by underflow.
-pub(crate) const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
-
 impl DefectSample {
     /// Whether the defect may be due to underflow, as where a force grows from zero.
     pub fn is_underflown(&self) -> bool {
-        self.defect * self.size < UNDERFLOWN
+        self.defect * self.size < MIN_EXACT_PRODUCT
     }
 
     /// The jump of the values of L to the next step, beyond their round-off.
@@ -184,15 +182,12 @@ struct Between {
     integral: StageMap,
 }
 
-/// The relative round-off of a value of L: some hundred units, for the sums that it consists of.
-const ROUNDED: f64 = 256.0 * f64::EPSILON;
-
 fn beyond_rounding(defect: f64, size: f64) -> f64 {
     // Written so that a NaN is returned.
-    if defect <= ROUNDED * size { 0.0 } else { defect - ROUNDED * size }
+    if defect <= VALUE_ROUND_OFF * size { 0.0 } else { defect - VALUE_ROUND_OFF * size }
 }
 
-/// The number of sets of sample points.
+/// The largest number of sets of sample points: their union divides a step of s stages into 16 s parts.
 pub(crate) const SAMPLE_SETS: usize = 16;
 
 impl Between {
@@ -221,16 +216,16 @@ impl Between {
 
     fn new(s: usize, set: usize) -> Self {
         let g = Coefficients::of(s);
-        let golden = 0.618_033_988_749_894_9;
+        const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
         // Set 0: the Gauss points of s - 1 stages, which lie between those of s, and one point near the end of the
-        // step, where the defect is largest. The other sets are equidistant, each shifted by the golden ratio, so that
-        // the gaps of their union are shortest.
+        // step, where the defect is largest. The other sets are equidistant, each shifted by the GOLDEN_RATIO ratio, so
+        // that the gaps of their union are shortest.
         let inner = Coefficients::of(s.saturating_sub(1).max(1));
         let end = 0.5 * (1.0 + g.c[s - 1].0);
         let points = from_fn(|i| match set {
             0 if i + 1 < s => inner.c[i].0,
             0 => end,
-            _ => (i.min(s - 1) as f64 + (set as f64 * golden).fract()) / s as f64,
+            _ => (i.min(s - 1) as f64 + (set as f64 * GOLDEN_RATIO).fract()) / s as f64,
         });
         let [value, integral] = lagrange_rows(s, &points);
         Between { points: Stages(points), value: StageMap::new(&value, s), integral: StageMap::new(&integral, s) }

@@ -4,9 +4,6 @@ use crate::gauss::dense::StepStart;
 use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::SVector;
 
-/// The number of stages up to which the stage values of a step do not show whether it resolves the motion.
-pub(crate) const FEW_STAGES: usize = 2;
-
 /// The mean velocities of the last four steps, the last position, and the states after the last two steps.
 pub(crate) struct Sequence<const N: usize> {
     pub velocities: [SVector<f64, N>; 4],

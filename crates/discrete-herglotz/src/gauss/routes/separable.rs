@@ -6,7 +6,7 @@
 use crate::gauss::limits::{
     MAX_CHANGE_FOR_TAILS, MAX_PREDICTOR_ERROR, MIN_JACOBIAN_AGE, PREDICTOR_PAUSE, SLOW_NEWTON, TAIL_PERIOD,
 };
-use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, Tail};
+use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::position_newton::{PositionNewton, curvature};
@@ -18,6 +18,7 @@ use crate::numbers::lanes::{Lanes, branched, vector};
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{Stages, blocks};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding};
 use pulp::Simd;
@@ -291,7 +292,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if predicts && const { N == 1 } && iteration.first_change() > MAX_PREDICTOR_ERROR * self.largest_rest::<S>() {
             self.steps_without_predictor = PREDICTOR_PAUSE;
         }
-        let predicted_well = iteration.first() <= FORETOLD && !solved;
+        let predicted_well = iteration.first() <= MIN_CHECKED_CHANGE && !solved;
         let h = self.table.h;
         self.defect = if predicted_well { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
@@ -329,7 +330,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
         let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
         let of_acceleration = self.inverse_mass.as_ref().map_or(once.x, |inverse| inverse.abs() * once.x);
-        change <= ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
+        change <= COLLOCATION_ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
     }
 
     /// Corrects a fixed-point iteration by the simplified Newton method. Returns the largest change of the

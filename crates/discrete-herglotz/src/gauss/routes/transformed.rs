@@ -116,7 +116,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
 
     /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if the
     /// start of the last step is not known.
-    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
+    pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         let (general, from) = (&*self.general, self.from.as_ref()?);
         let value = |x: &[CompensatedSum; N]| SVector::from(x.map(|x| x.value));
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };

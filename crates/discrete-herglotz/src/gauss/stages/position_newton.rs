@@ -337,7 +337,8 @@ mod tests {
             let hill = Hill { count: AtomicUsize::new(0), claims };
             let start = PhasePoint::new([1.0], [0.5], 0.2);
             let problem = Problem::new(&hill, 0.0, Start::Momentum(start, [0.5].into())).unwrap();
-            let mut run = GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, watched: false }).unwrap();
+            let mut run =
+                GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, check_resolution: false }).unwrap();
             let halt = run.advance(3).unwrap_err();
             assert!(halt.taken == 0 && matches!(halt.cause, StepError::NotConverged { .. }), "{halt:?}");
             assert_eq!(run.state(), start);

@@ -1,13 +1,14 @@
 //! Whether the steps of a run resolve the motion.
 
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
-use crate::gauss::resolution::sequence::FEW_STAGES;
 use crate::gauss::resolution::sequence::Sequence;
-use crate::gauss::resolution::tail::ROUNDINGS;
 use crate::gauss::routes::StageRoute;
 use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::stepper::{GaussStepper, Route, with_route};
 use crate::resolution::monitor::{defect, sharper, size, value_rounding};
+use crate::resolution::thresholds::{
+    COLLOCATION_ROUNDINGS, FEW_STAGES, MAX_STEP_DEFECT, MAX_STEP_DEFECT_OF_FEW_STAGES,
+};
 use crate::{Stepper, UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
@@ -17,15 +18,11 @@ use contact_geom::{
 };
 use pulp::{Simd, WithSimd};
 
-/// The defect between the nodes above which a step of at least three stages does not resolve the motion: for harmonic
-/// motions the error of such a step is then 0.01 to 0.1.
-const UNRESOLVED: f64 = 0.1;
-
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if there is
     /// no solved step.
-    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
-        let curve = self.arch.dispatch(LookAtStages { run: self })?;
+    pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
+        let curve = self.arch.dispatch(CollectStages { run: self })?;
         let at = |set| {
             self.arch.dispatch(Compare { lagrangian: self.lagrangian, transformation: &Physical, curve: &curve, set })
         };
@@ -36,7 +33,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// step as unresolved; a second difference of the velocities that is larger than all before is recorded as a
     /// suspect interval.
     #[inline(never)]
-    pub(crate) fn follow(&mut self) {
+    pub(crate) fn update_sequence(&mut self) {
         let (end, h) = (self.values(), self.h);
         let q = SVector::from(end.q);
         let Some(Sequence { velocities, q: before, ends }) = self.sequence.as_deref_mut() else { return };
@@ -53,30 +50,29 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             _ => {}
         }
         let [a, b, c, d] = &*velocities;
-        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
+        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.monitor.floor, self.monitor.sharpest);
         let few = self.s <= FEW_STAGES;
-        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.watch.floor) {
+        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.monitor.floor) {
             // As for quadrature rules, the defect becomes known one step later.
-            self.watch.note(self.k.saturating_sub(1), defect);
+            self.monitor.note(self.k.saturating_sub(1), defect);
         }
         if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
             let t = self.t0 + step as f64 * h;
             let (from, to) = (self.phase(&from), self.phase(&end));
-            self.watch.suspect(sharpness, SuspectInterval { step, steps: 2, t, from, to });
+            self.monitor.suspect(sharpness, SuspectInterval { step, steps: 2, t, from, to });
         }
     }
 
     /// The first step that was flagged as unresolved; if there is none, the last step if its defect sample is too
     /// large.
-    pub(crate) fn mark(&self) -> Option<UnresolvedStep> {
+    pub(crate) fn find_unresolved(&self) -> Option<UnresolvedStep> {
         if self.of_sigma > 1.0 && self.k > 0 {
             return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
         }
-        self.watch.first.or_else(|| {
+        self.monitor.first.or_else(|| {
             let sets = with_route!(&*self.route, run => StageRoute::sample_sets(run));
-            let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
-            // For fewer stages the defect between the nodes is large even in resolved steps.
-            let allowed = if self.s > FEW_STAGES { UNRESOLVED } else { 1.0 };
+            let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.sample_defect(sets)?;
+            let allowed = if self.s > FEW_STAGES { MAX_STEP_DEFECT } else { MAX_STEP_DEFECT_OF_FEW_STAGES };
             // Written so that a NaN counts as a defect.
             if defect <= allowed {
                 return None;
@@ -97,8 +93,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let state = self.state();
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
         let (force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
-        size(&x.v) * self.h.abs() <= self.watch.floor
-            && size(&(force.x + state.p * force.z)) <= ROUNDINGS * size(&rounding.x)
+        size(&x.v) * self.h.abs() <= self.monitor.floor
+            && size(&(force.x + state.p * force.z)) <= COLLOCATION_ROUNDINGS * size(&rounding.x)
     }
 
     /// Bounds on the round-off in the defects of the momenta and of the action in the last step, from the round-off of
@@ -112,7 +108,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
         // The stages of the integrating factor amplify round-off the more, the more the factor changes in the step.
         let (of, h) = (|part: &SVector<f64, N>| max_abs_or_nan(part.iter().copied()), self.h.abs());
-        let carried = ROUNDINGS * (1.0 + self.sigma().ln().abs());
+        let carried = COLLOCATION_ROUNDINGS * (1.0 + self.sigma().ln().abs());
         // Zero where the bound is not finite. Subnormal numbers have lost digits, which the smallest normal number
         // bounds.
         [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
@@ -121,11 +117,11 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
 }
 
 /// Collects the stages of the last step as a [`Curve`] for defect samples.
-struct LookAtStages<'b, 'a, L, const N: usize> {
+struct CollectStages<'b, 'a, L, const N: usize> {
     run: &'b GaussStepper<'a, L, N>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> WithSimd for LookAtStages<'_, '_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> WithSimd for CollectStages<'_, '_, L, N> {
     type Output = Option<Curve<N>>;
 
     #[inline(always)]

@@ -16,7 +16,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         [self.pause, self.pauses].save(&mut to);
         self.newton_steps.save(&mut to);
         save_option(self.sequence.as_deref(), &mut to);
-        self.watch.save(&mut to);
+        self.monitor.save(&mut to);
         to
     }
 
@@ -35,6 +35,6 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         self.newton_steps.load(from)?;
         let start = self.from;
         self.sequence = load_option(from, || *Sequence::new(start))?.map(Box::new);
-        self.watch.load(from)
+        self.monitor.load(from)
     }
 }

@@ -71,7 +71,8 @@ fn instruction_sets() -> Vec<Arch> {
 fn follow(spring: OneSided, stages: usize, set: Arch, route: GaussRoute) -> (usize, u64) {
     let gauss = Gauss::new(spring, stages, 0.2).unwrap();
     let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
-    let mut run = GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, watched: false }).unwrap();
+    let mut run =
+        GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, check_resolution: false }).unwrap();
     assert_eq!(run.route(), route);
     run.arch = Instructions::only(set);
     let mut across = 0;
@@ -112,7 +113,8 @@ fn actions_that_follow_spare_iterations_and_change_nothing() {
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let [(with, a), (without, b)] = [true, false].map(|follows| {
             let mut run =
-                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, watched: false }).unwrap();
+                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, check_resolution: false })
+                    .unwrap();
             let Route::General(general) = &mut *run.route else { panic!("z does not drive the motion") };
             general.follows &= follows;
             run.advance(steps).unwrap();
@@ -139,7 +141,8 @@ fn lanes_have_no_value_to_branch_on() {
                 assert!(follow(spring, 8, set, route).0 >= 4);
                 continue;
             }
-            let mut run = GaussStepper::new(&problem, 8, 0.2, StepperOptions { action: true, watched: false }).unwrap();
+            let mut run =
+                GaussStepper::new(&problem, 8, 0.2, StepperOptions { action: true, check_resolution: false }).unwrap();
             run.arch = Instructions::only(set);
             assert_eq!(run.advance(3), Err(StepFailure { taken: 0, cause: StepError::Branched }), "{set:?}");
         }

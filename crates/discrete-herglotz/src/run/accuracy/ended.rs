@@ -1,25 +1,14 @@
 //! Runs that an observer ends: the time of the end, for trial runs.
 
+use crate::Status;
 use crate::run::accuracy::first_guess::first_guess;
+use crate::run::accuracy::limits::{EVENT_SEARCH, EVENT_SEARCH_BUDGET, EVENT_SEARCH_ERROR, MIN_EVENT_SEARCH_STEPS};
 use crate::run::integrate::integrate;
 use crate::run::request::{Request, StepSelection};
 use crate::run::{Plan, StepView, Stop, Terminal};
-use crate::{DividedGauss, Status};
 use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-
-/// The integrator of the search for the end: steps that resolve the motion, with an error of about the square of this
-/// defect.
-const SEARCH: DividedGauss = DividedGauss { stages: 8, most_misfit: 1e-5 };
-
-/// The smallest number of steps of the search, and the error of the linearised motion at the start that determines
-/// their number.
-const FEWEST: usize = 64;
-const ERROR: f64 = 1e-6;
-
-/// The budget of the search, in evaluations of L: about a second.
-const BUDGET: u64 = 1 << 24;
 
 /// The cause of the end of a search that exceeds its budget.
 const SPENT: &str = "the budget of the search";
@@ -28,12 +17,18 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
     pub(crate) fn time_of_end(&self, terminal: Terminal<'_, N>) -> Option<f64> {
         let request = Request { integrator: None, needs: terminal.needs(), ..*self };
-        let count = first_guess(self, SEARCH.stages, ERROR).max(FEWEST);
+        let count = first_guess(self, EVENT_SEARCH.stages, EVENT_SEARCH_ERROR).max(MIN_EVENT_SEARCH_STEPS);
         let h = self.span / count as f64;
-        let choice = StepSelection { integrator: Arc::new(SEARCH), count, h, error: Some(ERROR), ended: None };
-        let plan = Plan::new(&request, &choice).ok()?;
+        let selection = StepSelection {
+            integrator: Arc::new(EVENT_SEARCH),
+            count,
+            h,
+            error: Some(EVENT_SEARCH_ERROR),
+            ended: None,
+        };
+        let plan = Plan::new(&request, &selection).ok()?;
         let budget = |at: &StepView<'_, N>| match at.stepper.evaluations() {
-            spent if spent > BUDGET => ControlFlow::Break(Stop::here(SPENT)),
+            spent if spent > EVENT_SEARCH_BUDGET => ControlFlow::Break(Stop::here(SPENT)),
             _ => ControlFlow::Continue(()),
         };
         let outcome = integrate(&plan, &mut vec![terminal, Box::new(budget)], None).ok()?;
@@ -47,13 +42,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
 impl<'p, L: Lagrangian<N>, const N: usize> StepSelection<'p, L, N> {
     /// The same steps over a multiple of the span; an observer is expected to end the run after the original number of
     /// steps.
-    pub(crate) fn going_on(self, times: f64) -> Self {
-        let count = (self.count as f64 * times * (1.0 - 4.0 * f64::EPSILON)).ceil();
+    pub(crate) fn extended_by(self, factor: f64) -> Self {
+        let count = (self.count as f64 * factor * (1.0 - 4.0 * f64::EPSILON)).ceil();
         // In transformed time the step size is independent of the number of steps.
         let h = if self.integrator.info().in_transformed_time {
             self.h
         } else {
-            self.h * (self.count as f64 * times / count)
+            self.h * (self.count as f64 * factor / count)
         };
         StepSelection { h, count: count as usize, ended: Some(self.count), ..self }
     }

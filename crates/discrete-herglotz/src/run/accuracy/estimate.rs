@@ -1,43 +1,46 @@
 //! The error estimate of a run with given steps.
 
 use crate::Interrupt;
+use crate::run::accuracy::limits::MAX_UNCHECKED_STEPS;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
-use crate::run::motion::Near;
+use crate::run::motion::NearbyVelocity;
 use contact_geom::{Lagrangian, PhasePoint};
-
-/// The number of steps between two checks for an interrupt.
-const CHUNK: usize = 1024;
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// The distance of (q, p) and v from those of a run with twice as many steps of half the size, as in
     /// [`Track::distance_at_end`]: for a method of order p this is the error times `1 - 2^-p`. Infinite if the other
     /// run fails or is interrupted.
-    pub(crate) fn distance_from_halves(&self, taken: usize, t: f64, (end, near): (&PhasePoint<N>, Near<N>)) -> f64 {
+    pub(crate) fn distance_from_halves(
+        &self,
+        taken: usize,
+        t: f64,
+        (end, near): (&PhasePoint<N>, NearbyVelocity<N>),
+    ) -> f64 {
         let Ok(mut fine) = self.stepper_of(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
         let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
         let mut velocities = Velocities::new(self.problem, self.scales);
         let mut done = 0;
         while done < steps && (fine.time() - t) * self.h < 0.0 {
-            if self.problem.interrupt.is_some_and(Interrupt::is_wanted) {
+            if self.problem.interrupt.is_some_and(Interrupt::is_requested) {
                 return f64::INFINITY;
             }
             // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
-            match fine.advance_until((steps - done).min(CHUNK).min(done.max(1)), t) {
+            match fine.advance_until((steps - done).min(MAX_UNCHECKED_STEPS).min(done.max(1)), t) {
                 Ok(more) if more > 0 => done += more,
                 Ok(_) => break,
                 Err(_) => return f64::INFINITY,
             }
             velocities.at(fine.time(), &fine.state(), fine.last_velocity());
         }
-        let mut seen = |state: &PhasePoint<N>, near| {
+        let mut track = |state: &PhasePoint<N>, near| {
             let v = velocities.at(t, state, near);
             let (speed, scales) = (velocities.speed(done), self.scales);
             Track { speed, scales, ..Track::of_end(state, v) }
         };
-        let coarse = seen(end, near);
-        let distance = coarse.distance_at_end(&seen(&fine.state(), fine.last_velocity()));
+        let coarse = track(end, near);
+        let distance = coarse.distance_at_end(&track(&fine.state(), fine.last_velocity()));
         if distance.is_nan() { f64::INFINITY } else { distance }
     }
 }

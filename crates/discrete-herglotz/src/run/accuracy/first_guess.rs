@@ -1,6 +1,7 @@
 //! The number of steps with which the search for an accuracy starts.
 
 use crate::Problem;
+use crate::run::accuracy::limits::MAX_FIRST_GUESS;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use contact_geom::nalgebra::SMatrix;
@@ -30,8 +31,8 @@ pub(crate) fn first_guess<L: Lagrangian<N>, const N: usize>(
     let radians = 0.5 * radians;
     // The fixed-point iteration for the velocity contracts by the angle of its rotation in a step.
     let count = span.abs() * max_or_nan(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
-    // A stiff start need not be resolved, and a motion that is free at its start may be fast later.
-    if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
+    // A motion that is free at its start may be fast later.
+    if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 }
 }
 
 /// The largest absolute eigenvalue, estimated from the norm of the eighth power: too large by at most a factor

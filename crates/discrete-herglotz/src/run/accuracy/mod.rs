@@ -1,19 +1,25 @@
 //! Step-size selection for a requested error, by trial runs.
 
+mod comparison_grid;
 mod converge;
+mod defect_history;
 mod divided;
 mod ended;
+pub(crate) mod equilibrium_round_off;
 mod estimate;
+mod evaluation_cost;
 mod failure;
 mod first_guess;
-pub(crate) mod noise;
+mod limits;
 mod reference;
 mod rest;
 mod select;
 #[cfg(test)]
 mod tests;
 mod track;
+mod transformation_gain;
+mod trial_end;
 mod trial_runs;
 mod velocities;
 
-pub(crate) use select::choose;
+pub(crate) use select::select_steps;

@@ -1,13 +1,16 @@
 //! Step-size selection for any integrator, by comparison with a reference solution.
 
-use crate::run::accuracy::converge::{Converged, MAX_SEARCHES, chosen};
-use crate::run::accuracy::trial_runs::{TrialEnd, TrialRuns};
-use crate::run::request::{MOST_STEPS, Shared, StepSelection};
+use crate::run::accuracy::converge::{Converged, selected};
+use crate::run::accuracy::limits::{
+    FACTOR_AFTER_FAILURE, FEWER_STEPS, MAX_DISTANCE_FROM_REFERENCE, MAX_ITERATIONS, MAX_ROUND_OFF,
+    MAX_STAGNATING_RATIO, MAX_STAGNATIONS_FROM_REFERENCE, MIN_DISTANCE_FROM_REFERENCE, MORE_STEPS,
+    PREDICTED_DISTANCE_FROM_REFERENCE, PREDICTION_MARGIN, REFERENCE_STAGES,
+};
+use crate::run::accuracy::trial_end::TrialEnd;
+use crate::run::accuracy::trial_runs::TrialRuns;
+use crate::run::request::{MAX_STEPS, Shared, StepSelection};
 use crate::{InputError, SelectionFailure};
 use contact_geom::Lagrangian;
-
-/// The number of stages of the reference for other methods.
-pub(crate) const REFERENCE_STAGES: usize = 12;
 
 /// The steps of any integrator for the requested error, from runs that are compared with the reference.
 pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
@@ -16,26 +19,29 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
     found: &Converged<N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
     let wanted = trials.wanted;
-    let (order, marks) = (f64::from(integrator.info().order), &found.marks);
-    let whole = |count: f64| marks.whole(count);
+    let (order, grid) = (f64::from(integrator.info().order), &found.grid);
+    let whole = |count: f64| grid.whole(count);
+    let goal = PREDICTED_DISTANCE_FROM_REFERENCE * wanted;
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE_STAGES) as f64 / order.min(4.0));
-    let (mut best, mut strikes) = (f64::INFINITY, 0);
+    let (mut best, mut stagnations) = (f64::INFINITY, 0);
     let (mut cause, mut before) = (SelectionFailure::Budget, None);
     // The smallest number of steps that was found to be sufficient, with its error.
     let mut enough: Option<(usize, f64)> = None;
-    for _ in 0..MAX_SEARCHES {
-        if count as f64 > MOST_STEPS {
+    for _ in 0..MAX_ITERATIONS {
+        if count as f64 > MAX_STEPS {
             break;
         }
-        let factor = match trials.own(integrator, count, marks)? {
-            TrialEnd::Followed(track) => {
-                let error = track.distance(&found.truth);
-                if error <= 0.7 * wanted {
+        let factor = match trials.with_integrator(integrator, count, grid)? {
+            TrialEnd::Completed(track) => {
+                let error = track.distance(&found.reference);
+                if error <= MAX_DISTANCE_FROM_REFERENCE * wanted {
                     enough = Some((count, error));
                     // Fewer steps are tried if the order predicts that far fewer are sufficient.
-                    let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
-                    if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
+                    let factor = (error / goal).powf(1.0 / order).max(FEWER_STEPS[0]);
+                    let fewer = whole(count as f64 * factor);
+                    let enough_saved = fewer as f64 <= FEWER_STEPS[1] * count as f64;
+                    if error > MIN_DISTANCE_FROM_REFERENCE * wanted || !enough_saved || stagnations > 0 {
                         break;
                     }
                     count = fewer;
@@ -44,31 +50,33 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                 if enough.is_some() {
                     break;
                 }
-                strikes = if error < 0.7 * best { 0 } else { strikes + 1 };
+                stagnations = if error < MAX_STAGNATING_RATIO * best { 0 } else { stagnations + 1 };
                 // The reference has converged, so the cause is not chaos.
                 if let Some((n, other)) = before.replace((count, error)) {
                     let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
-                    let round_off = error < 1e-9 && shown < 0.5 * order;
+                    let round_off = error < MAX_ROUND_OFF && shown < 0.5 * order;
                     cause =
                         if round_off { SelectionFailure::RoundOff } else { SelectionFailure::Order { order: shown } };
                 }
                 best = best.min(error);
-                if strikes == 4 {
+                if stagnations == MAX_STAGNATIONS_FROM_REFERENCE {
                     break;
                 }
                 if error.is_finite() {
-                    (1.05 * (error / (0.5 * wanted)).powf(1.0 / order)).clamp(1.2, 32.0)
+                    (PREDICTION_MARGIN * (error / goal).powf(1.0 / order)).clamp(MORE_STEPS[0], MORE_STEPS[1])
                 } else {
-                    2.0
+                    FACTOR_AFTER_FAILURE
                 }
             }
-            TrialEnd::Halted { part, cause: halt } => {
+            TrialEnd::StepFailed { part, cause: failure } => {
                 if enough.is_some() {
                     break;
                 }
-                cause =
-                    SelectionFailure::Halted { t: trials.request.problem.t0 + part * trials.request.span, cause: halt };
-                2.0
+                cause = SelectionFailure::StepFailed {
+                    t: trials.request.problem.t0 + part * trials.request.span,
+                    cause: failure,
+                };
+                FACTOR_AFTER_FAILURE
             }
             _ => {
                 cause = SelectionFailure::Budget;
@@ -78,7 +86,7 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
         count = whole(count as f64 * factor);
     }
     match enough {
-        Some((count, error)) => Ok(chosen(trials, integrator, count, error, found)),
+        Some((count, error)) => Ok(selected(trials, integrator, count, error, found)),
         None => refuse(best, cause),
     }
 }

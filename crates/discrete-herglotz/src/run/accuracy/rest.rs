@@ -1,18 +1,13 @@
 //! Motions that have come to rest.
 
 use crate::run::accuracy::first_guess::first_guess;
+use crate::run::accuracy::limits::{
+    DEFAULT_STAGES, MAX_REST_SEARCH_STEPS, MIN_DECAY_TO_REST, REST_SEARCH_ERROR, STEPS_BETWEEN_REST_CHECKS,
+};
 use crate::run::checks::rest::{is_at_rest, rests_at_the_origin, starts_at_rest};
 use crate::run::request::Request;
 use crate::{GaussCollocation, Integrator, StepperOptions};
 use contact_geom::{Derivatives, Lagrangian};
-
-/// The decrease of the logarithm of the conformal factor that is at least required before a motion is at rest: the
-/// logarithm of the amplitude of oscillations decreases by half of it.
-const FALLS: f64 = 1000.0;
-
-/// The number of steps of the search for the time of rest, and between two checks.
-const SEARCHED: usize = 1 << 20;
-const STRIDE: usize = 64;
 
 impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
     /// The time at which the motion comes to rest, if it lies within the span; found with steps of eight stages, if the
@@ -20,18 +15,18 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
     #[inline(never)]
     pub(crate) fn time_of_rest(&self) -> Option<f64> {
         let problem = self.problem;
-        let fall = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
+        let change = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
         // Written so that a NaN counts as no decrease.
-        let falls = fall < -FALLS;
-        if !falls || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
+        let decays = change < -MIN_DECAY_TO_REST;
+        if !decays || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
             return None;
         }
-        let gauss = GaussCollocation { stages: 8 };
-        let h = self.span / first_guess(self, gauss.stages, 1e-3) as f64;
-        let options = StepperOptions { action: self.needs.action, watched: false };
+        let gauss = GaussCollocation { stages: DEFAULT_STAGES };
+        let h = self.span / first_guess(self, gauss.stages, REST_SEARCH_ERROR) as f64;
+        let options = StepperOptions { action: self.needs.action, check_resolution: false };
         let mut stepper = Integrator::stepper(&gauss, problem, h, options).ok()?;
-        for _ in 0..SEARCHED / STRIDE {
-            stepper.advance(STRIDE).ok()?;
+        for _ in 0..MAX_REST_SEARCH_STEPS / STEPS_BETWEEN_REST_CHECKS {
+            stepper.advance(STEPS_BETWEEN_REST_CHECKS).ok()?;
             let t = stepper.time();
             if (t - problem.t0).abs() >= self.span.abs() {
                 return None;

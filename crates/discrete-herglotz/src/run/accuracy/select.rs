@@ -1,31 +1,22 @@
 //! The selection of the integrator and of the number of steps for a requested error.
 
 use crate::gauss::MAX_STAGES;
-use crate::run::accuracy::converge::{Compared, Converged, Ended, chosen, converge};
+use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
 use crate::run::accuracy::divided::divided_steps;
 use crate::run::accuracy::first_guess::first_guess;
-use crate::run::accuracy::reference::{REFERENCE_STAGES, by_reference};
-use crate::run::accuracy::trial_runs::{SwitchReason, TrialRuns};
+use crate::run::accuracy::limits::{
+    DEFAULT_STAGES, ERROR_ORDER_OF_LONGER_STEPS, MAX_DEFECT_OF_LONGER_STEPS, MAX_STAGES_PER_ORDER,
+    MIN_OWN_REFERENCE_STAGES, MIN_PREDICTIVE_ERROR, MIN_STEP_FRACTION, MIN_STEPS_FOR_MAX_STAGES, PREDICTED_ERROR,
+    REFERENCE_ERROR, REFERENCE_STAGES, TARGET_ERROR, TRANSFORMED_STAGES,
+};
+use crate::run::accuracy::reference::by_reference;
+use crate::run::accuracy::trial_end::SwitchReason;
+use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::observers::observer::Terminal;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::{GaussCollocation, InputError, SelectionFailure, TransformedGauss};
 use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
-
-/// The number of stages from which on a Gauss method is its own reference.
-const OWN_REFERENCE_STAGES: usize = 6;
-
-/// The number of stages for short runs, and for Lagrangians whose steps are expensive.
-const DEFAULT_STAGES: usize = 8;
-
-/// The number of steps with [`DEFAULT_STAGES`] stages, estimated from the motion at its start, from which on the
-/// largest number of stages is the least expensive if only the accelerations are iterated: it halves the evaluations
-/// for an error, also in the trial runs, but its tables are four times as large.
-const MANY_STEPS: usize = 32;
-
-/// The number of stages in transformed time, for every error: the motion is smooth in this time, and longer steps with
-/// more stages would follow it, but their fixed-point iteration would not converge.
-const TRANSFORMED_STAGES: usize = 8;
 
 /// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
 /// expensive, for many steps of few stages the number of steps.
@@ -33,7 +24,11 @@ fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, w
     let structure = &request.problem.structure;
     let condensed = structure.separable && structure.has_constant_rate();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
-    if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MANY_STEPS { MAX_STAGES } else { DEFAULT_STAGES }
+    if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MIN_STEPS_FOR_MAX_STAGES {
+        MAX_STAGES
+    } else {
+        DEFAULT_STAGES
+    }
 }
 
 /// Selects the steps, and the integrator if the run gives none, so that the error of (q, p) relative to its size, and
@@ -48,7 +43,7 @@ fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, w
 /// cost little. The error of a run of the integrator is then its distance from the reference.
 ///
 /// If `terminal` ends the run, all these runs end there.
-pub(crate) fn choose<'p, L: Lagrangian<N>, const N: usize>(
+pub(crate) fn select_steps<'p, L: Lagrangian<N>, const N: usize>(
     request: &Request<'p, L, N>,
     wanted: f64,
     terminal: Option<Terminal<'_, N>>,
@@ -56,61 +51,61 @@ pub(crate) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    let choose = |request: &Request<'p, L, N>| {
-        choose_with(&mut TrialRuns::new(request, wanted)).map_err(|refused| request.by_rounding_of_velocity(refused))
+    let select = |request: &Request<'p, L, N>| {
+        select_within_budget(&mut TrialRuns::new(request, wanted))
+            .map_err(|refused| request.by_rounding_of_velocity(refused))
     };
     let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(terminal)) else {
-        return choose(request);
+        return select(request);
     };
     // The motion after this end is not computed.
     let span = t_end - request.problem.t0;
     let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
-    Ok(choose(&part)?.going_on(request.span / span))
+    Ok(select(&part)?.extended_by(request.span / span))
 }
 
 /// The selection with a given budget.
-pub(crate) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
+pub(crate) fn select_within_budget<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
     let wanted = trials.wanted;
-    let Some(integrator) = trials.request.integrator.clone() else { return choose_all(trials) };
+    let Some(integrator) = trials.request.integrator.clone() else { return select_integrator(trials) };
     let info = integrator.info();
     match info.collocation {
-        Some(stages) if stages >= OWN_REFERENCE_STAGES && info.in_transformed_time => {
+        Some(stages) if stages >= MIN_OWN_REFERENCE_STAGES && info.in_transformed_time => {
             Ok(in_transformed_time(trials, &integrator, stages)?)
         }
-        Some(stages) if stages >= OWN_REFERENCE_STAGES => Ok(by_equal_steps(trials, &integrator, stages)?),
+        Some(stages) if stages >= MIN_OWN_REFERENCE_STAGES => Ok(by_equal_steps(trials, &integrator, stages)?),
         _ => {
             let at = if info.in_transformed_time { Compared::Times } else { Compared::Tenths };
-            let found = converge(trials, REFERENCE_STAGES, wanted / 8.0, at)?;
+            let found = converge(trials, REFERENCE_STAGES, REFERENCE_ERROR * wanted, at)?;
             by_reference(trials, &integrator, &found)
         }
     }
 }
 
 /// The selection if no integrator is given.
-fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
+fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
 ) -> Result<StepSelection<'p, L, N>, InputError> {
     let gauss = |stages: usize| -> Shared<'p, L, N> { Arc::new(GaussCollocation { stages }) };
     let mut stages = stages_along(trials.request, trials.wanted);
-    trials.watches_transformation =
-        const { L::HINTS.time_transformation } && trials.request.problem.structure.autonomous;
-    trials.watches_newton = stages > DEFAULT_STAGES;
+    trials.tests_transformation = const { L::HINTS.time_transformation } && trials.request.problem.structure.autonomous;
+    trials.tests_newton_steps = stages > DEFAULT_STAGES;
     // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
     // known.
     let divides = const { L::HINTS.proved || L::HINTS.switching_functions };
-    trials.watches_uneven = divides;
+    trials.tests_uneven_steps = divides;
     let mut found = by_equal_steps(trials, &gauss(stages), stages);
-    trials.watches_newton = false;
+    trials.tests_newton_steps = false;
     if let Err(Ended::SwitchReason(SwitchReason::FewerStages)) = found {
         stages = DEFAULT_STAGES;
         found = by_equal_steps(trials, &gauss(stages), stages);
     }
-    (trials.watches_transformation, trials.watches_uneven) = (false, false);
+    (trials.tests_transformation, trials.tests_uneven_steps) = (false, false);
     if let Err(Ended::SwitchReason(SwitchReason::Divided)) = found {
         match divided_steps(trials) {
-            Ok(choice) => return Ok(choice),
+            Ok(selection) => return Ok(selection),
             Err(interrupted @ InputError::Interrupted) => return Err(interrupted),
             Err(_) => found = by_equal_steps(trials, &gauss(stages), stages),
         }
@@ -148,8 +143,8 @@ fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
     // does not predict.
     let structure = &trials.request.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
-    let (count, error) = fewest(stages, wanted, &found, longer);
-    Ok(chosen(trials, integrator, count, error, &found))
+    let (count, error) = min_step_count(stages, wanted, &found, longer);
+    Ok(selected(trials, integrator, count, error, &found))
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.
@@ -160,30 +155,32 @@ fn in_transformed_time<'p, L: Lagrangian<N>, const N: usize>(
 ) -> Result<StepSelection<'p, L, N>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Times)?;
-    let (count, error) = fewest(stages, wanted, &found, false);
-    Ok(chosen(trials, integrator, count, error, &found))
+    let (count, error) = min_step_count(stages, wanted, &found, false);
+    Ok(selected(trials, integrator, count, error, &found))
 }
 
 /// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict.
-fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
-    let Converged { k, errors: [error, beyond], defect, order, finer_is_cheaper, rough, .. } = *found;
-    // Predictions between and beyond the runs aim at a tenth of the target, since the errors of neighbouring numbers of
-    // steps may differ by this factor.
-    let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
-    let steps = |order: f64| (k as f64 * (max_or_nan(error, 1e-14) / predicted).powf(1.0 / order)).ceil();
+fn min_step_count<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
+    let Converged { k, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
+    let (target, predicted) = (TARGET_ERROR * wanted, PREDICTED_ERROR * wanted);
+    let steps =
+        |order: f64| (k as f64 * (max_or_nan(error, MIN_PREDICTIVE_ERROR) / predicted).powf(1.0 / order)).ceil();
     // Steps that end at a kink by chance agree, while other steps do not.
-    if rough || order < stages as f64 / 3.0 {
+    if irregular || order < stages as f64 / MAX_STAGES_PER_ORDER {
         return if error <= target { (k, error) } else { (2 * k, beyond) };
     }
     if finer_is_cheaper {
         return (2 * k, beyond);
     }
     if error <= target {
-        // The error of longer steps grows faster than their order. They are taken only if the predicted defect shows
-        // that they still resolve the motion.
-        let fewer = steps(2.5 * stages as f64).max((0.6 * k as f64).ceil());
+        // Longer steps are taken only if the predicted defect shows that they still resolve the motion.
+        let fewer = steps(ERROR_ORDER_OF_LONGER_STEPS * stages as f64).max((MIN_STEP_FRACTION * k as f64).ceil());
         let coarser = defect * (k as f64 / fewer).powf(stages as f64);
-        return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
+        return if longer && fewer < k as f64 && coarser <= MAX_DEFECT_OF_LONGER_STEPS {
+            (fewer as usize, predicted)
+        } else {
+            (k, error)
+        };
     }
     // The error of shorter steps decreases like the square of the defect.
     let more = steps(2.0 * order);

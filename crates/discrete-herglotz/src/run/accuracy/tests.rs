@@ -2,8 +2,9 @@
 
 use crate::Problem;
 use crate::gauss::GaussStepper;
-use crate::run::accuracy::select::choose_with;
-use crate::run::accuracy::trial_runs::{BUDGET, TrialRuns};
+use crate::run::accuracy::limits::BUDGET;
+use crate::run::accuracy::select::select_within_budget;
+use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::{Request, Shared};
 use crate::run::{OutputRequest, Until};
 use crate::{AnyIntegrator, Stepper, StepperOptions};
@@ -23,15 +24,15 @@ fn search<L: Lagrangian<N>, const N: usize>(
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
     let request = Request { problem, t_end: span, span, integrator, needs: OutputRequest::default(), scales: None };
     let mut trials = TrialRuns::new(&request, wanted);
-    let choice = choose_with(&mut trials).unwrap();
-    (choice.integrator.info().name, choice.count, BUDGET - trials.left)
+    let selection = select_within_budget(&mut trials).unwrap();
+    (selection.integrator.info().name, selection.count, BUDGET - trials.left)
 }
 
 /// Trial runs cost a small multiple of the run: there are those with k, 2k and k + 1 steps, one with 4k if the first
 /// two do not agree, and before them one that ends because its defect is too large. The run has more than k steps, or
 /// more than 1.2 k.
 #[test]
-fn pilot_runs_cost_little() {
+fn trial_runs_cost_little() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
@@ -40,10 +41,10 @@ fn pilot_runs_cost_little() {
         assert_eq!(count, run.steps);
         // The cost of the defect samples is twice the number of their points, of which there are at least 2000 in
         // addition to those of the steps.
-        let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
+        let (spent, sampled) = (spent as f64, 2.5 * 2.0 * 2000.0);
         // The shortest run after trial runs with k, k + 1 and 2k steps has 0.6 k steps, and a first trial run may have
         // failed.
-        let most = 10.0 * run.evaluations as f64 + looks;
+        let most = 10.0 * run.evaluations as f64 + sampled;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
 }
@@ -52,7 +53,7 @@ fn pilot_runs_cost_little() {
 /// runs, and runs that would need Newton's method, do not.
 #[test]
 fn long_motions_take_more_stages() {
-    let chosen = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
+    let selected = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
         let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
         let run = problem.accuracy(1e-7);
         let run = if let Some(by) = integrator { run.by(by) } else { run };
@@ -60,13 +61,13 @@ fn long_motions_take_more_stages() {
         (plan.integrator().name.to_string(), plan.count())
     };
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
-    let (name, ours) = chosen(&pendulum, None, 1000.0);
-    let (_, of_eight) = chosen(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
+    let (name, ours) = selected(&pendulum, None, 1000.0);
+    let (_, of_eight) = selected(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
     assert_eq!(name, "gauss_16");
     assert!(2 * ours < of_eight, "{ours} steps, {of_eight} with eight stages");
-    assert_eq!(chosen(&pendulum, None, 10.0).0, "gauss_8");
+    assert_eq!(selected(&pendulum, None, 10.0).0, "gauss_8");
     // Where the forced double well is steepest, the iteration of a long step does not contract.
-    assert_eq!(chosen(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
+    assert_eq!(selected(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
 }
 
 /// If steps that are short enough for the error need Newton's method, and steps of half the size rarely do, the latter
@@ -88,7 +89,7 @@ fn steps_that_cost_less_are_taken() {
 /// Trial runs in transformed time cost a small multiple of the run too. If transformed time has no advantage, testing
 /// it costs nothing: the cost equals that for the integrator given by name.
 #[test]
-fn pilot_runs_by_a_clock_cost_little() {
+fn trial_runs_in_transformed_time_cost_little() {
     let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
     for e in [0.0, 0.1, 0.6, 0.9, 0.99] {
         for apocentre in [false, true] {

@@ -20,7 +20,7 @@ pub(crate) struct Track<const N: usize> {
     pub scales: Option<SVector<f64, N>>,
     /// The displacement that the round-off of forces may have caused, for states that have decayed to that size;
     /// otherwise 0.
-    pub noise: Vec<f64>,
+    pub round_off: Vec<f64>,
     /// The largest defect that was sampled between the nodes of the steps.
     pub defect: f64,
     /// The cost without the defect samples, in evaluations of L at one stage.
@@ -44,10 +44,10 @@ pub(crate) fn in_units<const N: usize>(x: &SVector<f64, N>, scales: Option<&SVec
 }
 
 /// The distance between two states, relative to the size of the second one or to `least` if that is larger; 0 if it
-/// does not exceed the noise.
-fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], noise: f64, least: f64) -> f64 {
+/// does not exceed the round-off.
+fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], round_off: f64, least: f64) -> f64 {
     let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), max_or_nan(norm(b), least));
-    if apart <= noise {
+    if apart <= round_off {
         return 0.0;
     }
     // The round-off of a subnormal number is up to half of the smallest positive number.
@@ -62,7 +62,7 @@ impl<const N: usize> Track<N> {
             velocities: vec![v],
             speed: f64::INFINITY,
             scales: None,
-            noise: vec![0.0],
+            round_off: vec![0.0],
             defect: 0.0,
             cost: 0,
             tau: 0.0,
@@ -92,7 +92,7 @@ impl<const N: usize> Track<N> {
         let (a, b, v) = (&self.states[i], &of.states[j], self.velocities[i] - of.velocities[j]);
         let scales = of.scales.as_ref();
         let of_state = match scales {
-            None => relative(a, b, of.noise[j], least),
+            None => relative(a, b, of.round_off[j], least),
             Some(_) => norm(&[in_units(&(a[0] - b[0]), scales)]),
         };
         max_or_nan(of_state, norm(&[in_units(&v, scales)]) / of.speed)

@@ -1,9 +1,9 @@
 //! The velocities of a motion at some times, and its largest speed.
 
 use crate::Problem;
-use crate::run::accuracy::noise::all_together;
+use crate::run::accuracy::equilibrium_round_off::accumulated_roundings;
 use crate::run::accuracy::track::{in_units, norm};
-use crate::run::motion::Near;
+use crate::run::motion::NearbyVelocity;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use crate::{InputError, SelectionFailure, theory::legendre_inverse};
@@ -16,7 +16,7 @@ pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
     scales: Option<SVector<f64, N>>,
     /// The largest speed so far, and the largest position.
     speed: f64,
-    reach: f64,
+    largest_position: f64,
     /// The last time and position.
     before: (f64, SVector<f64, N>),
 }
@@ -25,30 +25,30 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     /// The velocities of a run at its start, with the scales of the coordinates, if they are given.
     pub fn new(problem: &'r Problem<'p, L, N>, scales: Option<SVector<f64, N>>) -> Self {
         let size = |x: &SVector<f64, N>| norm(&[in_units(x, scales.as_ref())]);
-        let (speed, reach) = (size(&problem.start.v), size(&problem.start.q));
-        Velocities { problem, scales, speed, reach, before: (problem.t0, problem.start.q) }
+        let (speed, largest_position) = (size(&problem.start.v), size(&problem.start.q));
+        Velocities { problem, scales, speed, largest_position, before: (problem.t0, problem.start.q) }
     }
 
     /// Updates the largest speed at the end of a step, by the mean velocity of the step.
-    pub fn pass(&mut self, t: f64, q: &SVector<f64, N>) {
+    pub fn record_position(&mut self, t: f64, q: &SVector<f64, N>) {
         let (t_before, q_before) = std::mem::replace(&mut self.before, (t, *q));
-        self.reach = max_or_nan(self.reach, norm(&[in_units(q, self.scales.as_ref())]));
+        self.largest_position = max_or_nan(self.largest_position, norm(&[in_units(q, self.scales.as_ref())]));
         if t != t_before {
-            self.take_in(&((q - q_before) / (t - t_before)));
+            self.record_velocity(&((q - q_before) / (t - t_before)));
         }
     }
 
     /// The velocity at a state; if there are several, the one close to `near`. 0 if none is found: a run that needs the
     /// velocity fails by itself.
-    pub fn at(&mut self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> SVector<f64, N> {
-        self.pass(t, &state.q);
+    pub fn at(&mut self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> SVector<f64, N> {
+        self.record_position(t, &state.q);
         let near = near.unwrap_or(self.problem.start.v);
         let v = legendre_inverse(self.problem.lagrangian, t, state, &near).map_or(SVector::zeros(), |x| x.v);
-        self.take_in(&v);
+        self.record_velocity(&v);
         v
     }
 
-    fn take_in(&mut self, v: &SVector<f64, N>) {
+    fn record_velocity(&mut self, v: &SVector<f64, N>) {
         self.speed = max_or_nan(self.speed, norm(&[in_units(v, self.scales.as_ref())]));
     }
 
@@ -56,7 +56,11 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     /// of its positions, so that its velocity is undetermined.
     pub fn speed(&self, steps: usize) -> f64 {
         let moved = self.speed * (self.before.0 - self.problem.t0).abs();
-        if moved <= all_together(steps) * f64::EPSILON * self.reach { f64::INFINITY } else { self.speed }
+        if moved <= accumulated_roundings(steps) * f64::EPSILON * self.largest_position {
+            f64::INFINITY
+        } else {
+            self.speed
+        }
     }
 }
 

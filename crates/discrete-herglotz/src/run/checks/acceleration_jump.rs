@@ -1,7 +1,8 @@
 //! Suspect intervals: whether the acceleration varies faster than the steps resolve.
 
 use crate::Problem;
-use crate::resolution::monitor::{ROUNDED, rounding, size};
+use crate::resolution::monitor::{rounding, size};
+use crate::resolution::thresholds::{MAX_ACCELERATION_JUMP, POSITION_ROUND_OFF};
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
 use crate::{UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
@@ -12,19 +13,15 @@ use contact_geom::{
     support::herglotz_rates,
 };
 
-/// The number of parts of a suspect interval at whose ends the acceleration is evaluated.
-const PARTS: usize = 32;
-
-/// The change of velocity by a jump of the acceleration over one step, relative to the velocity, above which the step
-/// does not resolve the jump: a tenth. A step has this error if it takes the acceleration of the wrong side of the jump
-/// throughout.
-const JUMP: f64 = 0.1;
+/// The number of parts of a suspect interval at whose ends the acceleration is evaluated: second differences of a
+/// smooth acceleration are then a thousandth of what they are over the interval, and those of a jump are not.
+const ACCELERATION_PARTS: usize = 32;
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// Decides on a suspect interval: an unresolved step if shorter steps differ or the acceleration jumps, `None`
     /// otherwise.
     pub(crate) fn unresolved_within(&self, suspect: &SuspectInterval<N>) -> Option<UnresolvedStep> {
-        let halves = self.against_halves(suspect).unwrap_or(0.0);
+        let halves = self.half_step_defect(suspect).unwrap_or(0.0);
         // The cubic curve does not approximate long steps of many stages, which detect jumps between their nodes by
         // defect samples. On jumps given by switching functions steps end.
         let jump = if self.many_stages() || self.switches { None } else { self.jump(suspect) };
@@ -42,14 +39,14 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         let start = legendre_inverse(lagrangian, *t, from, &first.v).ok()?;
         let end = legendre_inverse(lagrangian, t + span, to, &start.v).ok()?;
         // Substeps back and forth leave the interval by up to half a step, but they do not leave the span of the run.
-        let aside = if self.info.substeps { 0.5 * self.h } else { 0.0 };
+        let excursion = if self.info.substeps { 0.5 * self.h } else { 0.0 };
         // If the conformal factor is exact, linear drag is resolved whatever its strength, and is left out.
         let exact_drag = self.info.exact_rate;
-        let before = if *step > 0 { aside } else { 0.0 };
-        let after = if step + steps < self.count { aside } else { 0.0 };
-        let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); PARTS + 1], 0.0);
+        let before = if *step > 0 { excursion } else { 0.0 };
+        let after = if step + steps < self.count { excursion } else { 0.0 };
+        let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); ACCELERATION_PARTS + 1], 0.0);
         for (i, acceleration) in accelerations.iter_mut().enumerate() {
-            let at = (before + span + after) * (i as f64 / PARTS as f64) - before;
+            let at = (before + span + after) * (i as f64 / ACCELERATION_PARTS as f64) - before;
             let x = hermite(&start, &end, span, at);
             speed = max_or_nan(speed, size(&x.v));
             // Outside the domain of L the acceleration is not finite, and the interval counts as unresolved.
@@ -58,8 +55,8 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         }
         let jump = max_abs_or_nan(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
         // The round-off of forces is relative to the size of the motion at the start and at the current position.
-        let floor = max_or_nan(rounding(&first.q, &first.v, self.h), ROUNDED * size(&to.q));
+        let floor = max_or_nan(rounding(&first.q, &first.v, self.h), POSITION_ROUND_OFF * size(&to.q));
         let rounded = jump * self.h * self.h <= floor;
-        Some(if rounded { 0.0 } else { jump * self.h.abs() / (JUMP * speed) })
+        Some(if rounded { 0.0 } else { jump * self.h.abs() / (MAX_ACCELERATION_JUMP * speed) })
     }
 }

@@ -2,6 +2,7 @@
 //! start.
 
 use crate::resolution::monitor::size;
+use crate::resolution::thresholds::{CLAIM_ROUNDINGS, MAX_CONSTANT_DIFFERENCE, MIN_CLAIM_DISPLACEMENT};
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
 use crate::{Stepper, theory::legendre_inverse};
@@ -12,22 +13,19 @@ use contact_geom::{
     support::gradient_rounding,
 };
 
-/// The displacement since the last check, relative to the extent of the motion in the same coordinate or momentum, from
-/// which on the claims are checked again.
-const MOVED: f64 = 0.125;
+/// The number of parts into which a step is divided for checks within it, if its own displacement exceeds
+/// [`MIN_CLAIM_DISPLACEMENT`]: a step that spans the whole motion has parts of about this displacement.
+const PARTS_OF_A_STEP: usize = 8;
 
-/// The number of parts into which a step is divided for checks within it, if its own displacement exceeds [`MOVED`].
-const WITHIN: usize = 8;
-
-/// The relative difference above which a quantity does not count as constant: round-off reaches it only if ten digits
-/// are lost. In addition the difference must exceed this number of units of the estimated round-off.
-const DIFFERENT: f64 = 1e-6;
-const ROUNDINGS: f64 = 1e4;
+/// The number of steps in each doubling of the number of steps after which checks are due: their cost is then a fixed
+/// number of steps for each doubling, also in long runs.
+const CHECKS_PER_DOUBLING: usize = 8;
 
 /// Compares the quantities that are claimed to be constant (the mass matrix, `L_z` and second derivatives) with their
-/// values at the start of a run. Checks are due after eight steps in each doubling of the number of steps; they are
-/// made if the motion has moved by a given part of its extent since the last one, so that the distance between two
-/// checks is about that part. A step whose own displacement exceeds it is checked at points within the step.
+/// values at the start of a run. Checks are due after [`CHECKS_PER_DOUBLING`] steps in each doubling of the number of
+/// steps; they are made if the motion has moved by a given part of its extent since the last one, so that the distance
+/// between two checks is about that part. A step whose own displacement exceeds it is checked at points within the
+/// step.
 ///
 /// A check costs about as much as a step. [`Structure::defects`] checks more, and is evaluated less often.
 pub(crate) struct ClaimMonitor<const N: usize> {
@@ -87,7 +85,7 @@ impl<const N: usize> ClaimMonitor<N> {
 
     /// The number of steps after which the next check is due.
     pub fn next(&self, taken: usize) -> usize {
-        taken.saturating_add((taken / 8).max(1))
+        taken.saturating_add((taken / CHECKS_PER_DOUBLING).max(1))
     }
 
     /// Checks the claims at the end of a step, and within a long step; returns a violated claim.
@@ -98,7 +96,7 @@ impl<const N: usize> ClaimMonitor<N> {
         before: Option<&(f64, PhasePoint<N>)>,
     ) -> Option<Defect> {
         let (t, state) = (stepper.time(), stepper.state());
-        if self.cover(&state) < MOVED {
+        if self.cover(&state) < MIN_CLAIM_DISPLACEMENT {
             return None;
         }
         self.last = [state.q, state.p];
@@ -106,11 +104,11 @@ impl<const N: usize> ClaimMonitor<N> {
         let guess = stepper.last_velocity().unwrap_or(self.guess);
         let x = legendre_inverse(lagrangian, t, &state, &guess).ok()?;
         self.guess = x.v;
-        let fractions = (1..WITHIN).map(|i| i as f64 / WITHIN as f64);
+        let fractions = (1..PARTS_OF_A_STEP).map(|i| i as f64 / PARTS_OF_A_STEP as f64);
         if let Some(curve) = stepper.dense() {
             let (start, end) = curve.span();
             let from = curve.at_fraction(0.0);
-            if self.part([from.q - state.q, from.p - state.p]) > MOVED {
+            if self.part([from.q - state.q, from.p - state.p]) > MIN_CLAIM_DISPLACEMENT {
                 for fraction in fractions {
                     let (t, state) = (start + fraction * (end - start), curve.at_fraction(fraction));
                     let within = legendre_inverse(lagrangian, t, &state, &self.guess);
@@ -120,7 +118,7 @@ impl<const N: usize> ClaimMonitor<N> {
                 }
             }
         } else if let Some((start, from)) = before
-            && self.part([from.q - state.q, from.p - state.p]) > MOVED
+            && self.part([from.q - state.q, from.p - state.p]) > MIN_CLAIM_DISPLACEMENT
             && let Ok(from) = legendre_inverse(lagrangian, *start, from, &self.guess)
         {
             for fraction in fractions {
@@ -175,7 +173,7 @@ impl<const N: usize> ClaimMonitor<N> {
         let rounding = |part: usize| {
             let (_, r) = gradient_rounding(lagrangian, t, x);
             let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
-            ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
+            CLAIM_ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
         };
         let mut found = None;
         let mut claim = |made: bool, claim: &'static str, part: usize, difference: Option<(f64, f64)>| {
@@ -206,5 +204,5 @@ impl<const N: usize> ClaimMonitor<N> {
 fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     let apart = max_abs_or_nan(a.iter().zip(b).map(|(a, b)| a - b));
     let size = max_abs_or_nan(a.iter().chain(b).copied());
-    (apart > DIFFERENT * size).then(|| (apart, apart / size))
+    (apart > MAX_CONSTANT_DIFFERENCE * size).then(|| (apart, apart / size))
 }

@@ -1,7 +1,8 @@
 //! The energy of an autonomous system, which decays with the conformal factor along the exact motion.
 
-use crate::run::accuracy::noise::Noise;
-use crate::run::checks::energy_drift::{EnergyDrift, EnergyLook, allowed};
+use crate::resolution::thresholds::MIN_SUSPECT_DRIFT;
+use crate::run::accuracy::equilibrium_round_off::EquilibriumRoundOff;
+use crate::run::checks::energy_drift::{EnergyDrift, EnergySample, allowed};
 use crate::run::discretization::Discretization;
 use crate::{Stepper, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
@@ -11,10 +12,11 @@ use contact_geom::{
 
 /// The shortest distance of two energy checks in long runs, in steps: a check costs about three of the least expensive
 /// steps.
-const APART: usize = 256;
+const MIN_STEPS_BETWEEN_CHECKS: usize = 256;
 
-/// The number of energy checks of a run in addition to those at powers of two.
-const LOOKS: usize = 32;
+/// The largest number of energy checks of a run in addition to those at powers of two: a drift that grows is then found
+/// within a few hundredths of the run.
+const MAX_REGULAR_CHECKS: usize = 32;
 
 /// Monitors the [drift](EnergyDrift) of the energy `H = p.v - L` along a run.
 pub(crate) struct EnergyMonitor<const N: usize> {
@@ -47,10 +49,10 @@ impl<const N: usize> EnergyMonitor<N> {
             energies(problem.lagrangian, problem.t0, &problem.start, &problem.state)?;
         let counted = constant_rate || steps.needs.conformal_factor;
         let rate = (!counted).then(|| problem.lagrangian.gradient(problem.t0, &problem.start).z);
-        let start = EnergyLook { total, kinetic, terms, log_factor: 0.0, taken: 0 };
+        let start = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
         Some(EnergyMonitor {
             rate,
-            every: APART.max(steps.count.div_ceil(LOOKS)),
+            every: MIN_STEPS_BETWEEN_CHECKS.max(steps.count.div_ceil(MAX_REGULAR_CHECKS)),
             guess: problem.start.v,
             drift: EnergyDrift::new(steps.info.order, &start),
         })
@@ -81,17 +83,13 @@ impl<const N: usize> EnergyMonitor<N> {
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
         self.guess = x.v;
         let start = (problem.t0, &problem.start, &problem.state);
-        self.drift.defect(&EnergyLook { total, kinetic, terms, log_factor, taken }, |sigma| {
+        self.drift.defect(&EnergySample { total, kinetic, terms, log_factor, taken }, |sigma| {
             rounding_of(problem.lagrangian, t, &x, state)
                 + rounding_of(problem.lagrangian, start.0, start.1, start.2) * sigma
-                + Noise::at(problem.lagrangian, t, &x).energy
+                + EquilibriumRoundOff::at(problem.lagrangian, t, &x).energy
         })
     }
 }
-
-/// The part of the allowed drift above which the two ends of a run indicate a drift. By chance, an oscillating drift
-/// that a run would flag is smaller than this at the end in about one of twenty members.
-const MAY: f64 = 0.05;
 
 /// Whether the energy of a run may have drifted, judged from its two ends, for an autonomous system with constant
 /// `L_z`. The decision is left to an [`EnergyMonitor`].
@@ -109,7 +107,7 @@ pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
         return false;
     };
     let allowed = allowed(f64::from(order.max(1))) * max_or_nan(a.kinetic * sigma, b.kinetic);
-    (b.total - a.total * sigma).abs() > MAY * allowed
+    (b.total - a.total * sigma).abs() > MIN_SUSPECT_DRIFT * allowed
 }
 
 /// The energy at a state, with the kinetic energy `v.Wv/2` as the sum of the magnitudes of its terms.

@@ -1,6 +1,7 @@
 //! Comparison of steps with twice as many steps of half their size: whether given steps resolve the motion.
 
-use crate::resolution::monitor::{LEAST, rounding};
+use crate::resolution::monitor::rounding;
+use crate::resolution::thresholds::{FIRST_ORDER_STEPS, MAX_HALF_STEP_DIFFERENCE, MIN_RELATIVE_DISPLACEMENT};
 use crate::run::discretization::Discretization;
 use crate::{Problem, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
@@ -9,17 +10,9 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// The difference between a step and two half steps, relative to the motion, above which the step does not resolve the
-/// motion. The error of a step of order p is then this number divided by `1 - 2^-p`.
-const APART: f64 = 0.05;
-
-/// The number of steps from rest whose displacement is the smallest length with which the error of a method of order
-/// one is compared.
-const FIRST_STEPS: f64 = 16.0;
-
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// The defect of some steps, above one if they do not resolve the motion. `None` if no comparison is possible.
-    pub(crate) fn against_halves(
+    pub(crate) fn half_step_defect(
         &self,
         SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
     ) -> Option<f64> {
@@ -44,13 +37,16 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
         // After n steps from rest, the error of a method of order one is the displacement divided by n.
         let moved =
-            if self.info.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
+            if self.info.order == 1 { FIRST_ORDER_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
         let width =
             max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
-        let of_v =
-            if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
-        Some(max_or_nan(relative(apart(&to.q, &fine.q), width), of_v) / APART)
+        let of_v = if of_v * self.h.abs() > MIN_RELATIVE_DISPLACEMENT * width {
+            relative(of_v, size([&v, &coarse_v, &fine_v]))
+        } else {
+            0.0
+        };
+        Some(max_or_nan(relative(apart(&to.q, &fine.q), width), of_v) / MAX_HALF_STEP_DIFFERENCE)
     }
 }
 

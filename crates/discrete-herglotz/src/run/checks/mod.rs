@@ -1,6 +1,6 @@
 //! Checks along a run: whether its steps resolve the motion, and whether the claims of structure hold.
 //!
-//! [`crate::resolution`] contains the monitor of the steps.
+//! [`crate::resolution`] lists the measures, with their thresholds, and contains the monitor of the steps.
 
 pub(crate) mod acceleration_jump;
 pub(crate) mod claims;
@@ -20,15 +20,19 @@ use energy::EnergyMonitor;
 
 /// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the
 /// run.
-const PROBES: usize = 1 << 14;
+const MAX_STEPS_BETWEEN_FULL_CHECKS: usize = 1 << 14;
 
 /// The number of steps by which a run may pass the end found by its trial runs, which is known up to the errors of
 /// both.
-const PASSED: usize = 2;
+const MAX_STEPS_PAST_END: usize = 2;
 
-/// The number of steps after which all claims are checked next: every power of two, and the multiples of [`PROBES`].
-pub(crate) fn next_probe(taken: usize) -> usize {
-    (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+/// The number of steps after which all claims are checked next: every power of two, and the multiples of
+/// [`MAX_STEPS_BETWEEN_FULL_CHECKS`].
+pub(crate) fn next_full_check(taken: usize) -> usize {
+    (taken + 1)
+        .checked_next_power_of_two()
+        .unwrap_or(usize::MAX)
+        .min((taken / MAX_STEPS_BETWEEN_FULL_CHECKS + 1) * MAX_STEPS_BETWEEN_FULL_CHECKS)
 }
 
 /// Steps that a run has just taken.
@@ -50,8 +54,8 @@ impl<const N: usize> TakenSteps<'_, N> {
     }
 
     /// Whether all claims are checked after these steps.
-    pub fn probed(&self) -> bool {
-        self.over || self.taken == next_probe(self.taken - 1)
+    pub fn are_fully_checked(&self) -> bool {
+        self.over || self.taken == next_full_check(self.taken - 1)
     }
 }
 
@@ -125,7 +129,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         }
         let claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(taken));
         let energy = self.energy.as_ref().map_or(usize::MAX, |energy| energy.next(taken));
-        next_probe(taken).min(alone(taken, self.next_halves(taken))).min(claims).min(energy)
+        next_full_check(taken).min(single_step_stop(taken, self.next_halves(taken))).min(claims).min(energy)
     }
 
     /// Whether a check needs the state before the next step.
@@ -149,13 +153,13 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         let next_claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(step.first));
         let next_energy = self.energy.as_ref().map_or(usize::MAX, |energy| energy.next(step.first));
         let status = |Defect { claim, size }| Status::FalseClaim { step: step.taken, claim, size };
-        if step.probed() {
+        if step.are_fully_checked() {
             let guess = step.stepper.last_velocity().unwrap_or(self.steps.problem.start.v);
             let (t, state) = (step.stepper.time(), step.stepper.state());
             if let Some(defect) = violated_claim(self.steps.problem.lagrangian, t, &state, &guess) {
                 return Some(status(defect));
             }
-            self.ask_stepper(step.stepper);
+            self.query_stepper(step.stepper);
         }
         if let Some(claims) = &mut self.claims
             && (step.taken >= next_claims || step.over)
@@ -171,7 +175,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
             self.note(drift.map(|defect| UnresolvedStep { step: step.taken - 1, defect }));
         }
         // The trial runs ended at an earlier step.
-        if self.ends_after.is_some_and(|steps| step.taken > steps + PASSED) {
+        if self.ends_after.is_some_and(|steps| step.taken > steps + MAX_STEPS_PAST_END) {
             self.note(Some(UnresolvedStep { step: step.taken - 1, defect: f64::INFINITY }));
         }
         None
@@ -188,14 +192,14 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
     }
 
     /// Checks the suspect interval of the stepper, and takes over its unresolved step.
-    fn ask_stepper(&mut self, stepper: &mut dyn Stepper<N>) {
+    fn query_stepper(&mut self, stepper: &mut dyn Stepper<N>) {
         let suspect = stepper.suspect_interval().filter(|_| self.suspects && self.findings.unresolved.is_none());
         self.note(suspect.and_then(|suspect| self.steps.unresolved_within(&suspect)));
-        self.note(self.found_by(stepper));
+        self.note(self.unresolved_by(stepper));
     }
 
     /// The first step that the stepper found unresolved.
-    pub fn found_by(&self, stepper: &dyn Stepper<N>) -> Option<UnresolvedStep> {
+    pub fn unresolved_by(&self, stepper: &dyn Stepper<N>) -> Option<UnresolvedStep> {
         if self.of_stepper { stepper.unresolved() } else { None }
     }
 
@@ -205,6 +209,6 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
 }
 
 /// The number of steps at which a run stops so that the step which ends at `due` is taken by itself.
-pub(crate) fn alone(taken: usize, due: usize) -> usize {
+pub(crate) fn single_step_stop(taken: usize, due: usize) -> usize {
     if due > taken + 1 { due - 1 } else { due }
 }

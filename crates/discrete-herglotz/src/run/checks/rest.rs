@@ -2,6 +2,7 @@
 
 use crate::Problem;
 use crate::resolution::monitor::size;
+use crate::resolution::thresholds::{MAX_SIZE_AT_REST, REST_ROUNDINGS};
 use crate::run::observers::output_request::OutputRequest;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
@@ -10,13 +11,6 @@ use contact_geom::{
 
 /// The cause in the [`Status`](crate::Status) of a run that ends because the motion has come to rest.
 pub(crate) const REST: &str = "rest";
-
-/// Positions and momenta below this are at rest. Numbers smaller than it by some ten powers of ten lose digits in
-/// products, so that an error relative to the motion is no longer defined.
-const SMALLEST: f64 = 1e-280;
-
-/// The largest rate of the action at rest, in units of its round-off.
-const ROUNDINGS: f64 = 256.0;
 
 /// Whether `q = v = 0` is a stable equilibrium, for the action z, at which a decaying motion stays: L does not depend
 /// on time, its gradient in q and v vanishes there, the mass matrix is positive definite, the potential has a minimum,
@@ -34,27 +28,27 @@ pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Pr
     still && free && slope.z < 0.0 && h.vv.cholesky().is_some() && (-h.qq).cholesky().is_some()
 }
 
-/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`SMALLEST`], and its
-/// action, if it is requested, is constant.
+/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`MAX_SIZE_AT_REST`], and
+/// its action, if it is requested, is constant.
 pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     needs: OutputRequest,
     t: f64,
     state: &PhasePoint<N>,
 ) -> bool {
-    if max_or_nan(size(&state.q), size(&state.p)) >= SMALLEST || starts_at_rest(problem) {
+    if max_or_nan(size(&state.q), size(&state.p)) >= MAX_SIZE_AT_REST || starts_at_rest(problem) {
         return false;
     }
     let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: state.z };
     let steady = || {
         let lagrangian = problem.lagrangian;
         let rate = lagrangian.value(t, &origin.q, &origin.v, origin.z).abs();
-        rate <= ROUNDINGS * gradient_rounding(lagrangian, t, &origin).0
+        rate <= REST_ROUNDINGS * gradient_rounding(lagrangian, t, &origin).0
     };
     rests_at_the_origin(problem, state.z) && (!needs.action || steady())
 }
 
-/// Whether the start itself is below [`SMALLEST`].
+/// Whether the start itself is below [`MAX_SIZE_AT_REST`].
 pub(crate) fn starts_at_rest<L, const N: usize>(problem: &Problem<'_, L, N>) -> bool {
-    max_or_nan(size(&problem.state.q), size(&problem.state.p)) < SMALLEST
+    max_or_nan(size(&problem.state.q), size(&problem.state.p)) < MAX_SIZE_AT_REST
 }

@@ -39,12 +39,12 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
         if last { Ok(self.writer.flush()?) } else { Ok(()) }
     }
 
-    fn written(&mut self, seen: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        if let Err(error) = self.write(at.k, at.last || seen.is_break()) {
+    fn written(&mut self, flow: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Err(error) = self.write(at.k, at.last || flow.is_break()) {
             self.error = Some(error);
             return ControlFlow::Break(Stop::here("a row that could not be written"));
         }
-        seen
+        flow
     }
 }
 
@@ -53,8 +53,8 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
         self.rows.needs()
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.rows.prepare(course)
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.rows.prepare(info)
     }
 
     fn next(&self, taken: usize) -> usize {
@@ -62,13 +62,13 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        let seen = self.rows.start(at);
-        self.written(seen, at)
+        let flow = self.rows.start(at);
+        self.written(flow, at)
     }
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        let seen = self.rows.step(at);
-        self.written(seen, at)
+        let flow = self.rows.step(at);
+        self.written(flow, at)
     }
 }
 

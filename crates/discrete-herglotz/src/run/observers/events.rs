@@ -1,6 +1,6 @@
 //! Events: sign changes of functions of the state along a run.
 
-use crate::run::observers::crossings::{LastSign, Pace, Way};
+use crate::run::observers::crossings::{LastSign, ScaledMotion, TimeScales};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
 use crate::{InputError, StepError};
@@ -47,10 +47,10 @@ pub struct Events<'f, const N: usize> {
     pub crossings: Vec<Crossing<N>>,
     events: Vec<Event<'f, N>>,
     needs: OutputRequest,
-    seen: Vec<LastSign<N>>,
-    pace: Pace,
+    last_signs: Vec<LastSign<N>>,
+    scales: TimeScales,
     /// Interpolated states within the last step.
-    sketch: Vec<PhasePoint<N>>,
+    interpolated: Vec<PhasePoint<N>>,
     /// The time at the end of the last step, and the time derivatives of the state there if they were computed: they
     /// are those at the start of the next step.
     rates: Option<(f64, PhasePoint<N>)>,
@@ -60,14 +60,14 @@ impl<'f, const N: usize> Events<'f, N> {
     /// An observer of these events; crossings refer to them by their index.
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
-        let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
+        let (crossings, last_signs, interpolated) = (Vec::new(), Vec::new(), Vec::new());
         Events {
             crossings,
             events,
             needs: OutputRequest::ACTION,
-            seen,
-            pace: Pace::of(&RunInfo::NONE),
-            sketch,
+            last_signs,
+            scales: TimeScales::of(&RunInfo::NONE),
+            interpolated,
             rates: None,
         }
     }
@@ -78,15 +78,19 @@ impl<'f, const N: usize> Events<'f, N> {
     }
 
     /// The crossings in a step, in the order of the run, and the error that ended the search, if there was one.
-    fn in_step(&mut self, step: &mut LastStep<'_, N>, way: Way<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
+    fn in_step(
+        &mut self,
+        step: &mut LastStep<'_, N>,
+        motion: ScaledMotion<'_, N>,
+    ) -> (Vec<Crossing<N>>, Option<StepError>) {
         let (mut found, mut cause) = (Vec::new(), None);
-        if let Err(cause) = step.sketch(&mut self.sketch) {
+        if let Err(cause) = step.interpolated_states(&mut self.interpolated) {
             return (found, Some(cause));
         }
         let backward = step.span().1 < step.span().0;
         let before = |a: f64, b: f64| if backward { a > b } else { a < b };
-        for (index, (event, seen)) in self.events.iter_mut().zip(&mut self.seen).enumerate() {
-            if let Err(error) = event.in_step(index, (step, way), &self.sketch, seen, &mut found) {
+        for (index, (event, last_sign)) in self.events.iter_mut().zip(&mut self.last_signs).enumerate() {
+            if let Err(error) = event.in_step(index, (step, motion), &self.interpolated, last_sign, &mut found) {
                 cause = match (cause, error) {
                     (Some(StepError::Event { t: first }), StepError::Event { t }) if !before(t, first) => cause,
                     _ => Some(error),
@@ -101,7 +105,7 @@ impl<'f, const N: usize> Events<'f, N> {
         // Simultaneous crossings are ordered by their index.
         let mut rest = found.as_mut_slice();
         while let Some(first) = rest.first() {
-            let (t, rounding) = (first.t, way.pace.rounding(first.t));
+            let (t, rounding) = (first.t, motion.scales.rounding(first.t));
             let (together, later) = rest.split_at_mut(rest.partition_point(|c| (c.t - t).abs() <= rounding));
             together.sort_by_key(|crossing| crossing.event);
             rest = later;
@@ -111,12 +115,12 @@ impl<'f, const N: usize> Events<'f, N> {
 
     /// Whether a crossing is simultaneous with an earlier one: its time is the same up to round-off, or a run that
     /// starts at the earlier crossing would not count it.
-    fn together(&mut self, first: &Crossing<N>, other: &Crossing<N>, way: Way<'_, N>) -> bool {
+    fn together(&mut self, first: &Crossing<N>, other: &Crossing<N>, motion: ScaledMotion<'_, N>) -> bool {
         let event = &mut self.events[other.event];
-        (other.t - first.t).abs() <= way.pace.rounding(first.t)
+        (other.t - first.t).abs() <= motion.scales.rounding(first.t)
             || event
                 .at(first.t, &first.state)
-                .is_ok_and(|value| event.leaves(way, (first.t, &first.state), value).is_some())
+                .is_ok_and(|value| event.departure_from(motion, (first.t, &first.state), value).is_some())
     }
 }
 
@@ -125,24 +129,24 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         self.needs
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.pace = Pace::of(course);
-        self.seen.clear();
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.scales = TimeScales::of(info);
+        self.last_signs.clear();
         self.crossings.clear();
         self.rates = None;
         Ok(())
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
+        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
         for event in &mut self.events {
             match event.at(at.t, &at.state) {
                 Ok(value) => {
-                    let left = event.leaves(way, (at.t, &at.state), value);
-                    let side = left.map_or(value, |left| left.value);
+                    let departure = event.departure_from(motion, (at.t, &at.state), value);
+                    let side = departure.map_or(value, |departure| departure.value);
                     let zero = (side == 0.0).then_some((at.t, at.state));
                     let sign = if side == 0.0 { 0.0 } else { side.signum() };
-                    self.seen.push(LastSign { value, sign, zero, left });
+                    self.last_signs.push(LastSign { value, sign, zero, departure });
                 }
                 Err(cause) => return ControlFlow::Break(Stop::failed(cause)),
             }
@@ -154,13 +158,13 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
         let from = step.span().0;
         let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));
-        let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
-        let (found, cause) = self.in_step(&mut step, way);
+        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
+        let (found, cause) = self.in_step(&mut step, motion);
         self.rates = step.rates_at_end().map(|rates| (at.t, rates));
         let mut end: Option<Crossing<N>> = None;
         for crossing in found {
             // An event has only one crossing at the time at which it ends the run.
-            if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, way)) {
+            if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, motion)) {
                 continue;
             }
             self.crossings.push(crossing);

@@ -1,6 +1,6 @@
 //! An observer that ends a run when an interrupt requests it.
 
-use crate::integration::interrupt::BETWEEN;
+use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::{INTERRUPTION, Interrupt, Observer, OutputRequest, StepView, Stop};
 use std::ops::ControlFlow;
 
@@ -13,7 +13,7 @@ impl<const N: usize> Observer<N> for Interruption<'_> {
     }
 
     fn next(&self, taken: usize) -> usize {
-        (taken / BETWEEN + 1) * BETWEEN
+        (taken / STEPS_BETWEEN_QUERIES + 1) * STEPS_BETWEEN_QUERIES
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
@@ -22,7 +22,7 @@ impl<const N: usize> Observer<N> for Interruption<'_> {
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         // A run that has reached its end is complete.
-        if !at.last && self.0.is_wanted() {
+        if !at.last && self.0.is_requested() {
             return ControlFlow::Break(Stop::here(INTERRUPTION));
         }
         ControlFlow::Continue(())

@@ -5,28 +5,31 @@ use crate::{DenseStep, StepError, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// The number of parts of the sketch of a step whose method has no dense output.
-const PARTS: usize = 4;
+/// The number of parts into which a search along a step divides it, if the method has no dense output: the cubic
+/// interpolant through both ends has at most three sign changes.
+const INTERPOLATED_PARTS: usize = 4;
 
-/// The distance, as a fraction of a step, over which the curvature of the interpolant is computed, and the relative
-/// difference between its slope and that of the motion up to which the curvature is used.
-const ASIDE: f64 = 1e-3;
-const AGREEING: f64 = 1e-4;
+/// The distance, as a fraction of a step, over which the curvature of the interpolant is computed.
+const CURVATURE_DISTANCE: f64 = 1e-3;
+
+/// The largest relative difference between the slope of the interpolant and that of the motion with which the curvature
+/// is used: its error then changes a state at [`TaylorPolynomial::MAX_DISTANCE`] by less than round-off.
+const MAX_SLOPE_DIFFERENCE: f64 = 1e-4;
 
 /// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.
-pub(crate) struct Beside<const N: usize> {
+pub(crate) struct TaylorPolynomial<const N: usize> {
     state: PhasePoint<N>,
     slope: PhasePoint<N>,
     curvature: PhasePoint<N>,
 }
 
-impl<const N: usize> Beside<N> {
+impl<const N: usize> TaylorPolynomial<N> {
     /// The fraction of a step up to which the third-order term is below round-off, if the step resolves the motion.
-    pub(crate) const REACH: f64 = 1e-6;
+    pub(crate) const MAX_DISTANCE: f64 = 1e-6;
 
     /// The state at a distance `ahead`, in fractions of the step.
     pub(crate) fn at(&self, ahead: f64) -> PhasePoint<N> {
-        let Beside { state, slope, curvature } = self;
+        let TaylorPolynomial { state, slope, curvature } = self;
         let half = 0.5 * ahead;
         PhasePoint {
             q: state.q + (slope.q + curvature.q * half) * ahead,
@@ -103,14 +106,14 @@ impl<'r, const N: usize> LastStep<'r, N> {
     }
 
     /// Interpolated states at the ends of the parts in which a search along the step evaluates it; no step is taken.
-    pub(crate) fn sketch(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
+    pub(crate) fn interpolated_states(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
         to.clear();
         if let Some(curve) = self.curve() {
-            curve.sketch(to);
+            curve.states_between_parts(to);
             return Ok(());
         }
-        for k in 1..PARTS {
-            to.push(self.interpolate(k as f64 / PARTS as f64)?);
+        for k in 1..INTERPOLATED_PARTS {
+            to.push(self.interpolate(k as f64 / INTERPOLATED_PARTS as f64)?);
         }
         Ok(())
     }
@@ -118,22 +121,29 @@ impl<'r, const N: usize> LastStep<'r, N> {
     /// The Taylor polynomial about a state of the motion at a fraction of the step: the slope from the equations of
     /// motion, the curvature from the interpolant. `None` if the slope of the interpolant differs, so that its
     /// curvature is unreliable, or if the time derivatives cannot be computed.
-    pub(crate) fn beside(&mut self, fraction: f64, state: &PhasePoint<N>) -> Result<Option<Beside<N>>, StepError> {
+    pub(crate) fn taylor_polynomial(
+        &mut self,
+        fraction: f64,
+        state: &PhasePoint<N>,
+    ) -> Result<Option<TaylorPolynomial<N>>, StepError> {
         let (t0, t1) = self.span();
         let near = self.stepper.last_velocity();
         let Ok(rates) = self.motion.rates(self.time(fraction), state, near) else { return Ok(None) };
-        let aside = ASIDE.min(fraction).min(1.0 - fraction);
-        let (below, here, above) =
-            (self.interpolate(fraction - aside)?, self.interpolate(fraction)?, self.interpolate(fraction + aside)?);
+        let distance = CURVATURE_DISTANCE.min(fraction).min(1.0 - fraction);
+        let (below, here, above) = (
+            self.interpolate(fraction - distance)?,
+            self.interpolate(fraction)?,
+            self.interpolate(fraction + distance)?,
+        );
         let part = |of: fn(&PhasePoint<N>) -> SVector<f64, N>| {
             let slope = of(&rates) * (t1 - t0);
             let [below, here, above] = [&below, &here, &above].map(of);
-            let agrees = ((above - below) / (2.0 * aside) - slope).amax() <= AGREEING * slope.amax();
-            (agrees, slope, (above - here * 2.0 + below) / (aside * aside))
+            let agrees = ((above - below) / (2.0 * distance) - slope).amax() <= MAX_SLOPE_DIFFERENCE * slope.amax();
+            (agrees, slope, (above - here * 2.0 + below) / (distance * distance))
         };
         let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| x.q), part(|x| x.p));
-        let z_curvature = (above.z - 2.0 * here.z + below.z) / (aside * aside);
-        Ok((q_agrees && p_agrees).then_some(Beside {
+        let z_curvature = (above.z - 2.0 * here.z + below.z) / (distance * distance);
+        Ok((q_agrees && p_agrees).then_some(TaylorPolynomial {
             state: *state,
             slope: PhasePoint { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
             curvature: PhasePoint { q: q_curvature, p: p_curvature, z: z_curvature },
@@ -155,9 +165,9 @@ impl<'r, const N: usize> LastStep<'r, N> {
         let ra = ra.map_or_else(|| self.motion.rates(t0, &a, near), Ok)?;
         let rb = rb.map_or_else(|| self.motion.rates(t1, &b, near), Ok)?;
         self.rates = [Some(ra), Some(rb)];
-        let (u, left, h) = (fraction, 1.0 - fraction, t1 - t0);
+        let (u, rest, h) = (fraction, 1.0 - fraction, t1 - t0);
         let weights =
-            [left * left * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * left), h * u * left * left, -h * u * u * left];
+            [rest * rest * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * rest), h * u * rest * rest, -h * u * u * rest];
         let of = |a: &SVector<f64, N>, b: &SVector<f64, N>, ra: &SVector<f64, N>, rb: &SVector<f64, N>| {
             a * weights[0] + b * weights[1] + ra * weights[2] + rb * weights[3]
         };

@@ -18,7 +18,7 @@ pub trait Observer<const N: usize> {
     ///
     /// # Errors
     /// An [`InputError`] if it cannot observe the run.
-    fn prepare(&mut self, _course: &RunInfo) -> Result<(), InputError> {
+    fn prepare(&mut self, _info: &RunInfo) -> Result<(), InputError> {
         Ok(())
     }
 
@@ -66,8 +66,8 @@ macro_rules! one_after_the_other {
             fn needs(&self) -> OutputRequest {
                 OutputRequest::default()$(.and(self.$field.needs()))+
             }
-            fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-                $(self.$field.prepare(course)?;)+
+            fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+                $(self.$field.prepare(info)?;)+
                 Ok(())
             }
             fn next(&self, taken: usize) -> usize {
@@ -95,8 +95,8 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
     fn needs(&self) -> OutputRequest {
         self.iter().fold(OutputRequest::default(), |needs, observer| needs.and(observer.needs()))
     }
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.iter_mut().try_for_each(|observer| observer.prepare(course))
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.iter_mut().try_for_each(|observer| observer.prepare(info))
     }
     fn next(&self, taken: usize) -> usize {
         self.iter().map(|observer| observer.next(taken)).min().unwrap_or(usize::MAX)
@@ -119,8 +119,8 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
     fn needs(&self) -> OutputRequest {
         self.0.needs()
     }
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.0.prepare(course)
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.0.prepare(info)
     }
     fn next(&self, taken: usize) -> usize {
         self.0.next(taken)
@@ -140,8 +140,8 @@ impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
     fn needs(&self) -> OutputRequest {
         (**self).needs()
     }
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        (**self).prepare(course)
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        (**self).prepare(info)
     }
     fn next(&self, taken: usize) -> usize {
         (**self).next(taken)

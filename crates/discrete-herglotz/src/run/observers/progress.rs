@@ -4,8 +4,9 @@ use crate::InputError;
 use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
 use std::ops::ControlFlow;
 
-/// The number of steps between two reports, if the total number of steps is not known.
-const STRIDE: usize = 1 << 10;
+/// The number of steps between two reports, if the total number of steps is not known: below a millisecond of short
+/// steps, so that a bar moves smoothly.
+const DEFAULT_STRIDE: usize = 1 << 10;
 
 /// Reports the completed fraction of the span of a run, from 0 to 1, at each hundredth: for a progress bar.
 ///
@@ -19,18 +20,18 @@ const STRIDE: usize = 1 << 10;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 pub struct Progress<F> {
-    tell: F,
-    course: RunInfo,
+    report: F,
+    run: RunInfo,
 }
 
 impl<F: FnMut(f64)> Progress<F> {
     /// Reports to this function.
-    pub fn new(tell: F) -> Self {
-        Progress { tell, course: RunInfo::NONE }
+    pub fn new(report: F) -> Self {
+        Progress { report, run: RunInfo::NONE }
     }
 
     fn stride(&self) -> usize {
-        self.course.count.map_or(STRIDE, |count| count.div_ceil(100))
+        self.run.count.map_or(DEFAULT_STRIDE, |count| count.div_ceil(100))
     }
 }
 
@@ -39,8 +40,8 @@ impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
         OutputRequest::default()
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.course = *course;
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.run = *info;
         Ok(())
     }
 
@@ -54,8 +55,8 @@ impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if at.last || at.k.is_multiple_of(self.stride()) {
-            let RunInfo { t0, t_end, .. } = self.course;
-            (self.tell)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });
+            let RunInfo { t0, t_end, .. } = self.run;
+            (self.report)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });
         }
         ControlFlow::Continue(())
     }

@@ -59,7 +59,7 @@ pub struct Rows<'f, const N: usize> {
     needs: OutputRequest,
     velocity: bool,
     energy: bool,
-    course: RunInfo,
+    run: RunInfo,
 }
 
 /// The largest number of rows: a few gigabytes.
@@ -103,7 +103,7 @@ impl<'f, const N: usize> Rows<'f, N> {
             needs: OutputRequest::ACTION,
             velocity: false,
             energy: false,
-            course: RunInfo::NONE,
+            run: RunInfo::NONE,
         }
     }
 
@@ -164,7 +164,7 @@ impl<'f, const N: usize> Rows<'f, N> {
             RowTimes::Every(_) => return Ok(()),
             RowTimes::At { times, recorded } => (times, *recorded),
         };
-        let backward = self.course.t_end < self.course.t0;
+        let backward = self.run.t_end < self.run.t0;
         let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
         // The last step ends at the end of the span up to round-off.
         let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
@@ -190,13 +190,13 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         OutputRequest { action: self.needs.action || self.energy, ..self.needs }
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.course = *course;
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.run = *info;
         self.rows.clear();
         if let RowTimes::At { recorded, .. } = &mut self.when {
             *recorded = 0;
         }
-        let RunInfo { t0, t_end, count, .. } = *course;
+        let RunInfo { t0, t_end, count, .. } = *info;
         let rows = match &self.when {
             // In transformed time the number of steps is not known in advance.
             RowTimes::Every(stride) => count.map_or(2, |count| count / stride + 2),
@@ -219,15 +219,14 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
             RowTimes::At { times, recorded } => {
                 let Some(t) = times.get(*recorded) else { return usize::MAX };
                 // The step that contains the time or, by round-off, the one before it, which then records nothing.
-                let step =
-                    self.course.h.map_or(0.0, |h| ((t - self.course.t0) / h * (1.0 - 4.0 * f64::EPSILON)).ceil());
+                let step = self.run.h.map_or(0.0, |h| ((t - self.run.t0) / h * (1.0 - 4.0 * f64::EPSILON)).ceil());
                 (step as usize).max(taken + 1)
             }
         }
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        let backward = self.course.t_end < self.course.t0;
+        let backward = self.run.t_end < self.run.t0;
         if let RowTimes::At { times, recorded } = &mut self.when
             && at.k > 0
         {

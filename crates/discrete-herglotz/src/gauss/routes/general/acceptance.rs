@@ -3,13 +3,14 @@
 
 use crate::gauss::dense::Solved;
 use crate::gauss::limits::MAX_UNCHECKED_FACTOR_CHANGE;
-use crate::gauss::resolution::tail::{FORETOLD, ROUNDINGS, of_sigma};
+use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::parametrization::Parametrization;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::monitor::value_rounding;
+use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
 use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, numbers::max_or_nan, support::gradient_rounding};
@@ -22,11 +23,11 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
     #[inline(always)]
     pub(crate) fn assess_resolution<S: Simd>(&mut self, first: f64) {
         self.defect = 0.0;
-        if first > FORETOLD {
+        if first > MIN_CHECKED_CHANGE {
             let rates = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
             self.defect = self.tail.defect::<S, N>(&self.v, rates, &self.x, self.table.h);
         }
-        if first > FORETOLD || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {
+        if first > MIN_CHECKED_CHANGE || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {
             let one = Lanes::<S>::splat(1.0);
             let mut integral = Lanes::<S>::splat(0.0);
             for r in 0..blocks::<S>(self.table.s) {
@@ -52,7 +53,11 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             (0..s).all(|i| {
                 let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
                 let off = start + sum.0[i] - sums(i);
-                off.abs() <= max_or_nan(8.0 * f64::EPSILON * max_or_nan(terms, sums(i).abs()), ROUNDINGS * rounding)
+                off.abs()
+                    <= max_or_nan(
+                        8.0 * f64::EPSILON * max_or_nan(terms, sums(i).abs()),
+                        COLLOCATION_ROUNDINGS * rounding,
+                    )
             })
         };
         let rho = self.one_minus_rho_stages.map(|one_minus_rho_stages| 1.0 - one_minus_rho_stages);

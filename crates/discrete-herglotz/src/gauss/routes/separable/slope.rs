@@ -111,7 +111,8 @@ mod tests {
     fn motion<const N: usize>(stages: usize, h: f64) -> (f64, f64, u64) {
         let start = PhasePoint::new(std::array::from_fn(|i| 1.2 * (i == 0) as u8 as f64), [0.0; N], 0.0);
         let problem = Problem::new(&Anharmonic, 0.0, start).unwrap();
-        let mut run = GaussStepper::new(&problem, stages, h, StepperOptions { action: true, watched: false }).unwrap();
+        let mut run =
+            GaussStepper::new(&problem, stages, h, StepperOptions { action: true, check_resolution: false }).unwrap();
         assert_eq!(run.route(), GaussRoute::Condensed);
         let steps = (100.0 / h).round() as usize;
         run.advance(steps).unwrap();

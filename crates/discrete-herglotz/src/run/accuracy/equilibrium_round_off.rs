@@ -10,7 +10,7 @@ use contact_geom::{
 /// The displacement of a motion at an equilibrium by the round-off of its forces alone. Forces that cancel there have
 /// the round-off of the terms that cancel, as in `1 - exp(-x)` near `x = 0`: a decaying motion does not become smaller
 /// than this.
-pub(crate) struct Noise {
+pub(crate) struct EquilibriumRoundOff {
     /// The displacement of (q, p), in the 2-norm: for each coordinate the round-off of its force divided by its
     /// stiffness, and for each momentum the same divided by the frequency.
     pub displacement: f64,
@@ -21,8 +21,8 @@ pub(crate) struct Noise {
     pub energy: f64,
 }
 
-impl Noise {
-    /// The noise at a point.
+impl EquilibriumRoundOff {
+    /// The round-off at a point.
     pub fn at<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Self {
         let (_, of_gradient) = gradient_rounding(lagrangian, t, x);
         let h = lagrangian.hessian(t, x);
@@ -36,26 +36,27 @@ impl Noise {
                 energy += squared;
             }
         }
-        Noise { displacement: squares.sqrt(), force: max_abs_or_nan(of_gradient.x.iter().copied()), energy }
+        EquilibriumRoundOff {
+            displacement: squares.sqrt(),
+            force: max_abs_or_nan(of_gradient.x.iter().copied()),
+            energy,
+        }
     }
 }
 
-/// The size of a motion, relative to its largest size so far, below which it may consist of the round-off of its
-/// forces.
-pub(crate) const DECAYED: f64 = 1e-3;
-
-/// The noise of all steps in units of the noise of one force: the contributions add up at random, and are damped.
-pub(crate) fn all_together(steps: usize) -> f64 {
+/// The round-off of all steps in units of the round-off of one force: the contributions add up at random, and are
+/// damped.
+pub(crate) fn accumulated_roundings(steps: usize) -> f64 {
     (64.0 + steps as f64).sqrt() * 8.0
 }
 
 impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
-    /// The noise at a state of the motion.
+    /// The round-off at a state of the motion.
     #[cold]
     #[inline(never)]
-    pub(crate) fn noise(&self, t: f64, state: &PhasePoint<N>) -> Noise {
+    pub(crate) fn equilibrium_round_off(&self, t: f64, state: &PhasePoint<N>) -> EquilibriumRoundOff {
         let lagrangian = self.problem.lagrangian;
         let still = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        Noise::at(lagrangian, t, &legendre_inverse(lagrangian, t, state, &still.v).unwrap_or(still))
+        EquilibriumRoundOff::at(lagrangian, t, &legendre_inverse(lagrangian, t, state, &still.v).unwrap_or(still))
     }
 }

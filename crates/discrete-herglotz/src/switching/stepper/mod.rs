@@ -1,0 +1,167 @@
+//! The steps of any integrator, divided at the zeros of switching functions.
+
+pub(crate) mod as_stepper;
+pub(crate) mod evaluation_range;
+pub(crate) mod of_integrator;
+mod parts;
+mod run;
+
+use crate::error::{first, step_error};
+use crate::gauss::StepStart;
+use crate::switching::stepper::as_stepper::AsStepper;
+use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
+use crate::{InputError, Problem, StepError, UnresolvedStep, theory::legendre_inverse};
+use contact_geom::{Lagrangian, VelocityPoint};
+
+/// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of
+/// parts that end on the zeros.
+///
+/// `make` constructs a stepper for a problem and a step length; its last argument is whether the steps are such parts.
+pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
+    problem: Problem<'a, L, N>,
+    make: M,
+    range: EvaluationRange,
+    h: f64,
+    /// The number of steps taken.
+    k: usize,
+    /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it
+    /// (`before`).
+    base: S,
+    origin: TimedState<N>,
+    before: usize,
+    here: TimedState<N>,
+    surfaces: Surfaces,
+    /// The bound for the defect of a step; a step with a larger one is divided.
+    max_defect: f64,
+    sigma: f64,
+    /// The number of evaluations of the steppers before `base`.
+    spent: u64,
+    unresolved: Option<UnresolvedStep>,
+    /// The steppers of the parts of the last step that had parts, if they are kept.
+    parts: Option<Vec<S>>,
+    switched: bool,
+}
+
+impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
+{
+    pub fn new(problem: &Problem<'a, L, N>, h: f64, range: EvaluationRange, make: M) -> Result<Self, InputError> {
+        let base = make(problem, h, false)?;
+        let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v, rests: StepStart::ZERO };
+        Ok(SwitchingStepper {
+            problem: *problem,
+            make,
+            range,
+            h,
+            k: 0,
+            base,
+            origin: here,
+            before: 0,
+            here,
+            surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start),
+            max_defect: f64::INFINITY,
+            sigma: 1.0,
+            spent: 0,
+            unresolved: None,
+            parts: None,
+            switched: false,
+        })
+    }
+
+    /// The same, keeping the steppers of the parts of a step.
+    pub fn keeping_parts(self) -> Self {
+        SwitchingStepper { parts: Some(Vec::new()), ..self }
+    }
+
+    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it.
+    pub fn dividing(self, max_defect: f64) -> Self {
+        SwitchingStepper { max_defect, ..self }
+    }
+
+    /// Whether a step is to be divided.
+    fn is_too_long(&self, step: &S) -> bool {
+        if self.max_defect == f64::INFINITY {
+            return false;
+        }
+        let defect = step.defect();
+        defect.is_nan() || defect > self.max_defect
+    }
+
+    /// The steppers of the last step: those of its parts if it had some, otherwise the common stepper of all steps.
+    pub fn last_step(&self) -> &[S] {
+        match &self.parts {
+            Some(parts) if self.switched => parts,
+            _ => std::slice::from_ref(&self.base),
+        }
+    }
+
+    /// Whether the last step had parts.
+    pub fn has_switched(&self) -> bool {
+        self.switched
+    }
+
+    /// The integrator's stepper at a state.
+    fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<S, StepError> {
+        let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
+        let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
+        let mut stepper = (self.make)(&problem, h, is_part).map_err(step_error)?;
+        stepper.set_compensation(&at.rests);
+        Ok(stepper)
+    }
+
+    /// The state of a stepper, with its velocity.
+    fn reached(&self, stepper: &S, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
+        let (state, rests) = (stepper.stepper().state(), stepper.compensation());
+        let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
+        Ok(TimedState { t, state, v, rests })
+    }
+
+    /// The next step.
+    fn step(&mut self) -> Result<(), StepError> {
+        let from = self.here;
+        let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
+        self.switched = false;
+        if self.base.stepper_mut().advance(1).is_ok()
+            && let Ok(to) = self.reached(&self.base, t, &from)
+        {
+            let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
+            let (lagrangian, surfaces) = (self.problem.lagrangian, &mut self.surfaces);
+            let quiet = match self.range {
+                EvaluationRange::Within => true,
+                EvaluationRange::Extended(part) => !surfaces.are_near(lagrangian, &curve, part),
+            };
+            if quiet && surfaces.first_change(lagrangian, &curve).is_none() && !self.is_too_long(&self.base) {
+                (self.here, self.sigma) = (to, self.base.stepper().sigma());
+                return Ok(());
+            }
+        }
+        // Unresolved steps before this one are kept; a flag of this step is dropped, since it may be due to the
+        // surface.
+        let earlier = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
+        self.unresolved = first(self.unresolved, earlier.filter(|s| s.step < self.k));
+        self.spent += self.base.stepper().evaluations();
+        if let Some(parts) = &mut self.parts {
+            parts.clear();
+        }
+        let sides = self.surfaces.clone();
+        match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h, false)?))) {
+            Ok((to, sigma, base)) => {
+                (self.here, self.sigma, self.base) = (to, sigma, base);
+                (self.origin, self.before, self.switched) = (to, self.k + 1, true);
+                Ok(())
+            }
+            Err(cause) => {
+                self.surfaces = sides;
+                // The state is that before the step.
+                if let Ok(base) = self.stepper_at(&from, self.h, false) {
+                    (self.base, self.origin, self.before) = (base, from, self.k);
+                }
+                Err(cause)
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The stepper as seen by a run: its steps, its state, and its words for a resumed run.
+
+use crate::error::first;
+use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::as_stepper::AsStepper;
+use crate::switching::surfaces::TimedState;
+use crate::{
+    DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint};
+
+impl<'a, L, S, M, const N: usize> Stepper<N> for SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
+{
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| StepFailure { taken, cause })?;
+            self.k += 1;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.here.state
+    }
+
+    fn time(&self) -> f64 {
+        self.problem.t0 + self.k as f64 * self.h
+    }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        (self.k > 0).then_some(self.here.v)
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.spent + self.base.stepper().evaluations()
+    }
+
+    fn dense(&self) -> Option<DenseStep<N>> {
+        if self.switched { None } else { self.base.stepper().dense() }
+    }
+
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        let mut items = self.base.stepper().work_summary();
+        items.push(PlanEntry::computed(
+            "switching functions",
+            "L has kinks or jumps: steps end on those that the motion meets",
+        ));
+        items
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        [self.k, self.before].save(&mut words);
+        [self.origin, self.here].save(&mut words);
+        self.surfaces.sides.save(&mut words);
+        (self.sigma, self.spent).save(&mut words);
+        save_option(self.unresolved.as_ref(), &mut words);
+        words.extend(self.base.stepper().save()?);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && self.base.stepper_mut().restore(words)
+    }
+
+    fn unresolved(&self) -> Option<UnresolvedStep> {
+        let of_base = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
+        first(self.unresolved, of_base)
+    }
+
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+        let suspect = self.base.stepper_mut().suspect_interval()?;
+        Some(SuspectInterval { step: suspect.step + self.before, ..suspect })
+    }
+}
+
+saved!([const N: usize] TimedState<N> { t, state, v, rests });
+
+impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
+{
+    /// Loads everything except the words of `base`, which is constructed again at its origin.
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        let mut counts = [self.k, self.before];
+        counts.load(from)?;
+        let mut states = [self.origin, self.here];
+        states.load(from)?;
+        self.surfaces.sides.load(from)?;
+        let mut numbers = (self.sigma, self.spent);
+        numbers.load(from)?;
+        self.unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
+        self.base = self.stepper_at(&states[0], self.h, false).ok()?;
+        ([self.k, self.before], [self.origin, self.here], (self.sigma, self.spent)) = (counts, states, numbers);
+        Some(())
+    }
+}
