@@ -268,6 +268,9 @@ fn input_errors() {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
         }, ["needs a composition", "another method"];
+        InputError::NoTimeTransformation => {
+            AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
+        }, ["states a time transformation", "another method"];
         InputError::FirstStep(_) => {
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
             Flow::new(&Rectangle::new(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()

@@ -116,9 +116,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
         check_stages(self.stages)?;
         if const { !L::HINTS.time_transformation } {
-            return Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`)",
-            });
+            return Err(InputError::NoTimeTransformation);
         }
         if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
     }

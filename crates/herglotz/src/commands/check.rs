@@ -1,6 +1,6 @@
 //! `herglotz check`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use super::plan::momentum;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};

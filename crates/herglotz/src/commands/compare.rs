@@ -1,6 +1,6 @@
 //! `herglotz compare`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use super::run::progress_bar;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, short};

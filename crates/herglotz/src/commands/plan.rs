@@ -1,6 +1,6 @@
 //! `herglotz plan`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;

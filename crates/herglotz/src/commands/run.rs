@@ -1,6 +1,6 @@
 //! `herglotz run`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use super::checkpoint::{Checkpoint, Saves, Written};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};

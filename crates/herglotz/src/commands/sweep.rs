@@ -1,6 +1,6 @@
 //! `herglotz sweep`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use super::run::{EVENTS, header_of_events, numbers_of_event, progress_bar, stop_flag};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, print, print_json};

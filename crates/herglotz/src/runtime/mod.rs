@@ -34,6 +34,7 @@ mod parameters;
 mod path;
 mod peer;
 mod request;
+mod symmetry;
 mod system;
 
 pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
@@ -50,7 +51,8 @@ pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
-pub use system::{SeenSymmetry, System};
+pub use symmetry::SeenSymmetry;
+pub use system::System;
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{

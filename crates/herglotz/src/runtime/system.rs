@@ -1,21 +1,15 @@
 //! Systems given by a formula.
 
-use crate::runtime::kernel::{Kernel, kernel_of};
+use crate::runtime::kernel::{self, Kernel, kernel_of};
 use crate::runtime::outcome::KeptRows;
-use crate::runtime::{Check, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start};
+use crate::runtime::{
+    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FoundPath, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError,
+    SeenSymmetry, Start,
+};
 use contact_geom::Structure;
-use discrete_herglotz::{AnyIntegrator, InputError, ResumeState};
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
 use formula_lagrangian::Formula;
 use std::sync::Arc;
-
-/// A symmetry that is recognised in a formula; its momentum decays with the conformal factor.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SeenSymmetry {
-    /// L is invariant under translation of these coordinates by a common length.
-    Translation(Vec<usize>),
-    /// L is invariant under rotation of these pairs of coordinates by a common angle.
-    Rotation(Vec<(usize, usize)>),
-}
 
 /// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is inexpensive.
 ///
@@ -154,5 +148,23 @@ impl System {
     /// Those of [`plan`](Self::plan).
     pub fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
         self.kernel.check(motion, places)
+    }
+
+    /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others
+    /// continue. The result of a member does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Errors that concern all members.
+    pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        self.kernel.ensemble(ensemble, watch)
+    }
+
+    /// Searches for a path between two positions, of a system of one to eight coordinates. The status of the result
+    /// says whether a path was found.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] for an invalid problem.
+    pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
+        kernel::path::search(self.formula(), problem)
     }
 }

@@ -3,7 +3,9 @@
 use super::file::{RowsTable, RunTable, place_of_table};
 use super::location::{Location, Named, Span};
 use super::output::{RowTimes, of_formula};
-use super::{SceneError, check_version, finite, way};
+use super::SceneError;
+use super::checked::{check_version, finite};
+use super::step_control::step_control;
 use crate::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError,
     Start, StepControl, Steps, velocity_name,
@@ -269,7 +271,7 @@ fn steps(text: &str, run: &Location<RunTable>) -> Result<(AnyIntegrator, Steps),
             "the run of a lattice needs an `integrator` and a `step`, as integrator = \"strang\" and step = 0.1";
         return Err(SceneError::at(text, run.span(), message));
     }
-    match way(text, run)? {
+    match step_control(text, run)? {
         StepControl::Steps { by, steps } => Ok((by, steps)),
         StepControl::Accuracy { .. } => {
             Err(SceneError::at(text, run.span(), "the run of a lattice needs an `integrator` and a `step`"))

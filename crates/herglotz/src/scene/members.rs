@@ -1,7 +1,6 @@
 //! The members of a sweep: all combinations of the values of the swept quantities.
 
-use super::Knob;
-use super::sweep::{Slot, put};
+use super::sweep::{Knob, Slot, put};
 use crate::runtime::Start;
 
 /// The members of a sweep by their index; the last swept quantity varies fastest.

@@ -1,6 +1,7 @@
 //! The requested output of a motion.
 
 use super::SceneError;
+use super::checked::{finite, positive};
 use super::file::{DirectionName, EventTable, RowsTable};
 use super::location::{Location, Span};
 use crate::runtime::{
@@ -53,7 +54,7 @@ impl RowTimes {
         let Some(rows) = rows else { return Ok(RowTimes::Parts(DEFAULT_ROWS)) };
         match (&rows.every, &rows.at, &rows.every_step) {
             (Some(every), None, None) => {
-                let value = super::positive(text, every, "every")?;
+                let value = positive(text, every, "every")?;
                 if (end - t0).abs() / value > MOST_ROWS {
                     let message = format!("these are more than {MOST_ROWS:e} rows; take a longer time between them");
                     return Err(SceneError::at(text, every.span(), message));
@@ -87,7 +88,7 @@ impl RowTimes {
 
 /// Checks that a time is between the start and the end of a motion.
 fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
-    let t = super::finite(text, time, name)?;
+    let t = finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
         let message = format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
         return Err(SceneError::at(text, time.span(), message));

@@ -1,6 +1,7 @@
 //! The initial state of a motion.
 
 use super::SceneError;
+use super::checked::finite;
 use super::location::{Location, Named, Numbers, Span};
 use crate::runtime::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
 use std::ops::Range;
@@ -158,7 +159,7 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
             Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
         };
         for (i, x) in key.entries.clone().zip(&values) {
-            given.set(key.part, i, super::finite(text, x, name)?);
+            given.set(key.part, i, finite(text, x, name)?);
         }
     }
     Ok(given)

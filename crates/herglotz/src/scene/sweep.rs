@@ -1,6 +1,7 @@
 //! The swept quantities of a scene.
 
 use super::SceneError;
+use super::checked::finite;
 use super::file::{RangeTable, Spacing, Swept, Values};
 use super::location::Location;
 use super::start::{Part, entry_of, single_names};
@@ -97,10 +98,10 @@ fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneErr
     let refuse = |message: &str| Err(SceneError::at(text, values.span(), message));
     let RangeTable { from, to, count, spacing } = match &**values {
         Values::List(list) if list.is_empty() => return refuse("no values; give at least one"),
-        Values::List(list) => return list.iter().map(|x| super::finite(text, x, "a value")).collect(),
+        Values::List(list) => return list.iter().map(|x| finite(text, x, "a value")).collect(),
         Values::Range(range) => range,
     };
-    let (a, b) = (super::finite(text, from, "from")?, super::finite(text, to, "to")?);
+    let (a, b) = (finite(text, from, "from")?, finite(text, to, "to")?);
     let count_at = count.span();
     let count = match **count {
         0 => return Err(SceneError::at(text, count.span(), "no values; give a `count` of at least 1")),

@@ -1,7 +1,8 @@
 //! Runs of systems of many coordinates.
 
 use super::stepper::{Place, Stepper};
-use super::{Assembled, argument};
+use super::system::Assembled;
+use crate::runtime::outcome::KeptRows;
 use crate::runtime::{InitialVelocity, Outcome, OutputTimes, RunMonitor, RuntimeError, Start};
 use discrete_herglotz::{AnyIntegrator, InputError, Status, StepError, StepFailure, Steps};
 use std::ops::ControlFlow;
@@ -43,14 +44,14 @@ impl AssembledMotion {
                 "ends at {}, where the motion starts at {}; give a later or earlier end",
                 self.end, self.start.t
             );
-            return Err(argument("t", why));
+            return Err(RuntimeError::argument("t", why));
         }
         let count = match self.steps {
             Steps::Count(0) => return Err(InputError::NoSteps.into()),
             Steps::Count(count) => return Ok((span / count as f64, count)),
             Steps::Size(h) => {
                 if !(h > 0.0 && h.is_finite()) {
-                    return Err(argument(
+                    return Err(RuntimeError::argument(
                         "step",
                         format!("is {h}, where a positive number is needed; the end says the direction"),
                     ));
@@ -63,7 +64,7 @@ impl AssembledMotion {
         // Integers up to here are exact in floating point.
         const LARGEST: f64 = (1u64 << 53) as f64;
         if count > LARGEST {
-            return Err(argument(
+            return Err(RuntimeError::argument(
                 "step",
                 format!("gives {count:.1e} steps, more than can be counted; take a longer one"),
             ));
@@ -110,7 +111,30 @@ impl From<RuntimeError> for Ended {
     }
 }
 
-pub(super) fn run(
+impl Assembled {
+    /// Runs a motion. Each row has `t`, the positions, the velocities, the momenta, `z` and the energy, followed by the
+    /// logarithm of the conformal factor where it is requested. A failure during the run is reported in the status of
+    /// the outcome, whose state is then that of the last row.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument;
+    /// [`RuntimeError::Assembly`].
+    pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
+        run(self, motion, watch)
+    }
+
+    /// Runs a motion and keeps its rows.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn record(&self, motion: &AssembledMotion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
+        let mut kept = KeptRows::default();
+        let outcome = self.run(motion, &mut kept)?;
+        Ok((outcome, kept.0))
+    }
+}
+
+fn run(
     of: &Assembled,
     motion: &AssembledMotion,
     watch: &mut dyn RunMonitor,
@@ -134,7 +158,7 @@ pub(super) fn run(
 /// Checks the times of the rows.
 fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
-        OutputTimes::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
+        OutputTimes::Every(0) => return Err(RuntimeError::argument("every", "is 0, where at least 1 is needed")),
         OutputTimes::Every(_) => return Ok(()),
         OutputTimes::At(times) => times,
     };

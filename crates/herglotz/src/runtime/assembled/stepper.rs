@@ -1,6 +1,6 @@
 //! The integrators of systems of many coordinates, behind one type.
 
-use super::{Assembled, argument};
+use super::system::Assembled;
 use crate::runtime::RuntimeError;
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, State};
 use discrete_herglotz::{AnyIntegrator, StepError, StepFailure, UnresolvedStep, rules::Method};
@@ -51,7 +51,7 @@ impl<'a> Stepper<'a> {
                      \"gauss_1\" or \"gauss_2\"",
                     other.to_string()
                 );
-                return Err(argument("integrator", why));
+                return Err(RuntimeError::argument("integrator", why));
             }
         })
     }

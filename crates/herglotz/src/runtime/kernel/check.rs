@@ -1,7 +1,7 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::theorems::{Points, theorems};
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Check, Interrupt, MomentumSample, Motion, Place, RuntimeError, StatementResidual, StepControl};
 use contact_geom::{
     ChartVector, OneParameterGroup, PhasePoint,

@@ -2,7 +2,7 @@
 
 use super::observed::{Observed, Seen};
 use super::recorder::{Crossings, check_events, number};
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, StepControl, Varied};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
@@ -227,6 +227,7 @@ fn is_common(cause: &InputError) -> bool {
             | E::Count { .. }
             | E::Unclaimed { .. }
             | E::Hypothesis { .. }
+            | E::NoTimeTransformation
     )
 }
 

@@ -1,6 +1,6 @@
 //! The observer of a motion: rows, events, nodes, and polling for interruption.
 
-use super::coordinates;
+use super::sized::coordinates;
 use crate::runtime::{
     Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };

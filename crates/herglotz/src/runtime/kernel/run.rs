@@ -1,7 +1,7 @@
 //! Runs of one motion.
 
 use super::recorder::Recorder;
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl};
 use discrete_herglotz::{Problem, ResumeState, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
