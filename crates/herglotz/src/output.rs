@@ -117,7 +117,7 @@ impl Table {
     }
 
     /// Continues a file after a number of bytes; anything after them is dropped.
-    pub fn go_on(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
+    pub fn resume(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
         let open = || -> std::io::Result<File> {
             let file = OpenOptions::new().append(true).open(&path)?;
             if file.metadata()?.len() < bytes {

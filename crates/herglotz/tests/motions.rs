@@ -7,8 +7,8 @@ use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};
 use formula_lagrangian::Formula;
 use herglotz::runtime::{
-    CATALOGUE, CatalogueEntry, Check, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes,
-    Place, RunMonitor, RuntimeError, SeenSymmetry, Start, StepControl, System, Varied,
+    CATALOGUE, CatalogueEntry, Check, Column, Crossing, Direction, Ensemble, Event, FormulaSymmetry, MemberEnd, Motion,
+    OutputTimes, RunMonitor, RuntimeError, Sample, Start, StepControl, System, Varied,
 };
 use std::ops::ControlFlow;
 
@@ -77,9 +77,9 @@ fn every_entry_runs_and_its_steps_are_contact() {
         let check = system.check(&motion, 3).unwrap_or_else(|error| panic!("{}: {error}", entry.name));
         assert!(check.is_contact(), "{}: {:e}", entry.name, check.contact_defect());
         assert!(check.momentum_defect() <= 1e-11, "{}: {:e}", entry.name, check.momentum_defect());
-        for place in &check.places {
+        for sample in &check.samples {
             // The whole motion has an error of 1e-9, so the error of a single step is below this bound.
-            assert!(place.herglotz_defect <= 1e-8, "{}: {:e}", entry.name, place.herglotz_defect);
+            assert!(sample.herglotz_defect <= 1e-8, "{}: {:e}", entry.name, sample.herglotz_defect);
         }
         assert!(check.statements.len() >= 12, "{}", entry.name);
         for stated in &check.statements {
@@ -118,7 +118,7 @@ fn sixteen_coupled_coordinates() {
     let text = format!("({mass})/2 + sum(i, 0, n-1, cos(q[i])) + 0.1*cos(sum(i, 0, n-1, q[i])) - 0.05*z^2");
     let system = System::parse(&text, &["x[16]"], &[]).unwrap();
     let start = Start::new(0.0, vec![0.3; 16], (0..16).map(|i| 0.05 * f64::from(i)).collect::<Vec<_>>(), 0.5);
-    let of = |way: StepControl| system.run(&Motion::new(start.clone(), 2.0, way), &mut ()).unwrap();
+    let of = |step_control: StepControl| system.run(&Motion::new(start.clone(), 2.0, step_control), &mut ()).unwrap();
     let exact = of(accurate(1e-10));
     let six = of(StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) });
     assert_eq!((exact.status, six.status), (Status::Completed, Status::Completed));
@@ -132,7 +132,7 @@ fn sixteen_coupled_coordinates() {
         t0: 0.0,
         varied: None,
         end: 2.0,
-        way: StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
+        step_control: StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
         rows: None,
         columns: &[],
         events: &[],
@@ -190,7 +190,7 @@ fn what_fills_a_kernel_is_not_seen() {
         t0: 0.0,
         varied: None,
         end: 6.0,
-        way: by_steps(24),
+        step_control: by_steps(24),
         rows: None,
         columns: &[],
         events: &[],
@@ -209,10 +209,10 @@ fn what_fills_a_kernel_is_not_seen() {
     assert_eq!(geometry.eta[20], 1.0);
 
     let check = system.check(&motion, 2).unwrap();
-    assert!(check.places.iter().all(|place| place.contact_defect < 1e-9), "{:?}", check.places);
+    assert!(check.samples.iter().all(|sample| sample.contact_defect < 1e-9), "{:?}", check.samples);
     assert!(check.statements.iter().all(|stated| stated.residual < 1e-9), "{:?}", check.statements);
     let free = System::parse("sum(i, 0, n-1, v[i]^2)/2 - q[1]^2", &["x[9]"], &[]).unwrap();
-    assert_eq!(free.symmetries().iter().filter(|s| matches!(s, SeenSymmetry::Translation(_))).count(), 8);
+    assert_eq!(free.symmetries().iter().filter(|s| matches!(s, FormulaSymmetry::Translation(_))).count(), 8);
     assert!(system.to_rust("Halves").unwrap().contains("impl Lagrangian<10> for Halves"));
 }
 
@@ -328,7 +328,7 @@ fn quantities_in_columns_and_events() {
         t0: 1.0,
         varied: Some(Varied { names: &["gamma"], values: &|i| vec![-0.1 * i as f64] }),
         end: 6.0,
-        way: StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
+        step_control: StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
         rows: None,
         columns: &["sigma", "energy"].map(column),
         events: &[event("sigma - 0.75")],
@@ -435,7 +435,7 @@ fn members_are_single_runs_whatever_the_threads() {
         t0: 0.0,
         varied: Some(Varied { names: &["gamma"], values: &values }),
         end: 10.0,
-        way: by_steps(40),
+        step_control: by_steps(40),
         rows: None,
         columns: &columns,
         events: &[],
@@ -471,7 +471,7 @@ fn members_are_single_runs_whatever_the_threads() {
     let end_of_all = all[4].ending.clone().unwrap();
     assert_eq!((ending.v, ending.columns), (end_of_all.v, end_of_all.columns));
     // With a requested accuracy.
-    let accurate = Ensemble { way: accurate(1e-8), ..of(2) };
+    let accurate = Ensemble { step_control: accurate(1e-8), ..of(2) };
     for (a, b) in members(&system, &accurate).iter().zip(&one) {
         if let (Ok(a), Ok(b)) = (&a.ending, &b.ending) {
             assert!((a.q[0] - b.q[0]).abs() < 1e-8, "{a:?} {b:?}");
@@ -501,7 +501,7 @@ fn events_of_members_are_those_of_single_runs() {
             t0: 0.0,
             varied: Some(Varied { names: &["gamma"], values: &values }),
             end: 8.0,
-            way: by_steps(32),
+            step_control: by_steps(32),
             rows: rows.clone(),
             columns: &columns,
             events: &events,
@@ -552,8 +552,9 @@ fn a_comparison_ranks_integrators() {
 #[test]
 fn bad_input_says_what_is_wrong() {
     let system = pendulum();
-    let run =
-        |start: Start, way: StepControl| system.run(&Motion::new(start, 1.0, way), &mut ()).unwrap_err().to_string();
+    let run = |start: Start, step_control: StepControl| {
+        system.run(&Motion::new(start, 1.0, step_control), &mut ()).unwrap_err().to_string()
+    };
     let good = || Start::new(0.0, [1.0], [0.0], 0.0);
     assert!(run(Start::new(0.0, [1.0, 2.0], [0.0], 0.0), by_steps(1)).contains("`q` has 2 numbers"));
     assert!(run(Start::new(0.0, [1.0], [f64::NAN], 0.0), by_steps(1)).contains("`v[0]` is NaN"));
@@ -577,9 +578,9 @@ fn bad_input_says_what_is_wrong() {
 #[test]
 fn symmetries_and_source() {
     let kepler = System::new(&CatalogueEntry::find("kepler").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(kepler.symmetries(), [SeenSymmetry::Rotation(vec![(0, 1)])]);
+    assert_eq!(kepler.symmetries(), [FormulaSymmetry::Rotation(vec![(0, 1)])]);
     let free = System::new(&CatalogueEntry::find("free_particle").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(free.symmetries(), [SeenSymmetry::Translation(vec![0])]);
+    assert_eq!(free.symmetries(), [FormulaSymmetry::Translation(vec![0])]);
     assert!(free.structure().separable && free.is_smooth());
     assert!(free.to_rust("Free").unwrap().contains("impl Lagrangian<1> for Free"));
     assert!(free.to_rust("not a type").is_err());
@@ -590,8 +591,8 @@ fn symmetries_and_source() {
 fn a_factor_that_is_none_is_not_contact() {
     let check = |sigma: f64| {
         let (contact_defect, herglotz_defect, momenta) = (0.0, 0.0, Vec::new());
-        let place = Place { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
-        Check { integrator: String::new(), step_size: 1.0, places: vec![place], statements: Vec::new() }
+        let sample = Sample { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
+        Check { integrator: String::new(), step_size: 1.0, samples: vec![sample], statements: Vec::new() }
     };
     assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
     for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {

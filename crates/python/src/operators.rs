@@ -14,12 +14,12 @@ impl Symbol {
         self.with(|graph| graph.unary(function, self.id))
     }
 
-    fn binary<'py>(&self, op: Operation, other: &Bound<'py, PyAny>, turned: bool) -> PyResult<Bound<'py, PyAny>> {
+    fn binary<'py>(&self, op: Operation, other: &Bound<'py, PyAny>, reversed: bool) -> PyResult<Bound<'py, PyAny>> {
         let py = other.py();
         match self.operand(other)? {
             Operand::Other => Ok(py.NotImplemented().into_bound(py)),
             Operand::Node(other) => {
-                let (a, b) = if turned { (other, self.id) } else { (self.id, other) };
+                let (a, b) = if reversed { (other, self.id) } else { (self.id, other) };
                 Ok(Bound::new(py, self.with(|graph| graph.binary(op, a, b))?)?.into_any())
             }
         }
@@ -214,8 +214,8 @@ impl Symbol {
     }
 
     /// A function of two numbers by its NumPy name.
-    #[pyo3(signature = (name, other, turned = false))]
-    fn apply_two<'py>(&self, name: &str, other: &Bound<'py, PyAny>, turned: bool) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (name, other, reversed = false))]
+    fn apply_two<'py>(&self, name: &str, other: &Bound<'py, PyAny>, reversed: bool) -> PyResult<Bound<'py, PyAny>> {
         let operation = match name {
             "minimum" => Operation::Min,
             "maximum" => Operation::Max,
@@ -223,7 +223,7 @@ impl Symbol {
             "hypot" => Operation::Hypot,
             _ => return Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value: write it out"))),
         };
-        self.binary(operation, other, turned)
+        self.binary(operation, other, reversed)
     }
 }
 

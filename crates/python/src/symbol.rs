@@ -8,7 +8,7 @@ use pyo3::types::{PyFloat, PyInt};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The maximal number of nodes of a traced function, above the limit of a formula.
-const MOST: usize = 100_000;
+const MAX_NODES: usize = 100_000;
 
 /// The graph of one trace.
 #[derive(Clone, Default)]
@@ -73,9 +73,9 @@ impl Symbol {
     pub fn with(&self, node: impl FnOnce(&mut Graph) -> Id) -> PyResult<Symbol> {
         let mut graph = self.shared.graph();
         let id = node(&mut graph);
-        if graph.len() > MOST {
+        if graph.len() > MAX_NODES {
             return Err(PyValueError::new_err(format!(
-                "the traced function has more than {MOST} operations: write it in Rust, or take a smaller one"
+                "the traced function has more than {MAX_NODES} operations: write it in Rust, or take a smaller one"
             )));
         }
         Ok(Symbol { shared: self.shared.clone(), id })

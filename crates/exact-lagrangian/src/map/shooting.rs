@@ -104,7 +104,11 @@ impl<L> ContactExponential<L> {
     }
 
     /// The retraction completed by the time by which its motion has met a conjugate point.
-    pub(super) fn with_conjugate_time<const N: usize>(&self, t: f64, found: Retraction<N>) -> Result<Retraction<N>, ExactError<N>>
+    pub(super) fn with_conjugate_time<const N: usize>(
+        &self,
+        t: f64,
+        found: Retraction<N>,
+    ) -> Result<Retraction<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
@@ -252,7 +256,12 @@ impl<L> ContactExponential<L> {
 
     /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s increasing to 1, where each
     /// is the guess for the next.
-    pub(super) fn by_continuation<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, work: &mut Work) -> Option<Found<N>>
+    pub(super) fn by_continuation<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        work: &mut Work,
+    ) -> Option<Found<N>>
     where
         L: Lagrangian<N>,
     {

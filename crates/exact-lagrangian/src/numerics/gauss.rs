@@ -180,7 +180,8 @@ mod tests {
                 assert!((sum - 1.0 / (k + 1) as f64).abs() < eps, "s = {}, degree {k}: {sum}", g.s);
             }
             for (i, k) in (0..g.s).flat_map(|i| (0..g.s).map(move |k| (i, k))) {
-                let row = |m: &[[f64; MAX_NODES]; MAX_NODES]| (0..g.s).map(|j| m[i][j] * g.c[j].powi(k as i32)).sum::<f64>();
+                let row =
+                    |m: &[[f64; MAX_NODES]; MAX_NODES]| (0..g.s).map(|j| m[i][j] * g.c[j].powi(k as i32)).sum::<f64>();
                 let (once, n) = (g.c[i].powi(k as i32 + 1), (k + 1) as f64);
                 assert!((row(&g.a) - once / n).abs() < eps, "s = {}, row {i}, degree {k}", g.s);
                 if k + 1 < g.s {

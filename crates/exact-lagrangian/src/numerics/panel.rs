@@ -470,7 +470,12 @@ fn iterate<const N: usize, T: Scalar>(
 /// that is applied. This holds where the coefficients decrease geometrically, so that the tail is the square of the
 /// relative size of the coefficients halfway to it. For a function with a kink they decrease algebraically; the second
 /// factor is then the square of their decrease from halfway to the end.
-fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N, T>], changes: &IterationChange, g: &Gauss) -> f64 {
+fn estimate<const N: usize, T: Scalar>(
+    problem: &Problem<N, T>,
+    nodes: &[Rate<N, T>],
+    changes: &IterationChange,
+    g: &Gauss,
+) -> f64 {
     let h = problem.h;
     let floor = problem.floor.over(h, 32.0);
     let [tails, middle] = [&g.tail, &g.middle].map(|rows| {

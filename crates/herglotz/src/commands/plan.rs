@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
 use herglotz::Scene;
-use herglotz::runtime::SeenSymmetry;
+use herglotz::runtime::FormulaSymmetry;
 
 #[derive(Args)]
 pub(crate) struct Plan {
@@ -17,12 +17,12 @@ pub(crate) struct Plan {
 }
 
 /// The momentum of a symmetry, as a formula.
-pub(crate) fn momentum(scene: &Scene, symmetry: &SeenSymmetry) -> String {
+pub(crate) fn momentum(scene: &Scene, symmetry: &FormulaSymmetry) -> String {
     let names = scene.system.formula().coordinates();
     let name = |i: usize| names.get(i).map(String::as_str).unwrap_or_default();
     let all: Vec<_> = match symmetry {
-        SeenSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
-        SeenSymmetry::Rotation(pairs) => {
+        FormulaSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
+        FormulaSymmetry::Rotation(pairs) => {
             pairs.iter().map(|(i, j)| format!("{x}*p_{y} - {y}*p_{x}", x = name(*i), y = name(*j))).collect()
         }
     };
@@ -71,7 +71,7 @@ impl Plan {
         let holding = proved.iter().filter(|(_, holds, _)| *holds);
         lines.extend(holding.map(|(name, _, meaning)| format!("  {name}: {meaning}")));
         lines.extend(momenta.iter().map(|momentum| format!("  {momentum} decays as the conformal factor")));
-        if !scene.knobs.is_empty() {
+        if !scene.swept.is_empty() {
             lines.push(format!("a sweep has {} members", scene.members().count()));
         }
         print(&lines.join("\n"))

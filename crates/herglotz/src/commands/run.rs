@@ -1,7 +1,7 @@
 //! `herglotz run`.
 
+use super::checkpoint::{Checkpoint, CheckpointWriter, Written};
 use super::scene_arguments::SceneArguments;
-use super::checkpoint::{Checkpoint, Saves, Written};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
@@ -63,7 +63,7 @@ struct Writer {
     stop: Arc<AtomicBool>,
     interrupt_at: Option<f64>,
     interrupted: Option<ResumeState>,
-    saves: Saves,
+    checkpoints: CheckpointWriter,
     failure: Option<Failure>,
 }
 
@@ -120,11 +120,11 @@ impl RunMonitor for Writer {
     }
 
     fn wants_checkpoint(&mut self) -> bool {
-        self.saves.is_due()
+        self.checkpoints.is_due()
     }
 
     fn checkpoint(&mut self, taken: usize, at: ResumeState) -> ControlFlow<()> {
-        let saved = self.written().and_then(|written| self.saves.save(taken, written, &at));
+        let saved = self.written().and_then(|written| self.checkpoints.save(taken, written, &at));
         self.keep(saved)
     }
 }
@@ -136,7 +136,7 @@ pub(crate) fn numbers_of_event(scene: &Scene, crossing: &Crossing) -> impl Itera
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
-pub(crate) fn stop_flag() -> Arc<AtomicBool> {
+pub(crate) fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = flag.clone();
     let handler = move || {
@@ -184,19 +184,19 @@ impl Run {
         let plan = match &saved {
             // The steps are known, and are not determined again.
             Some(saved) if !saved.in_transformed_time => {
-                motion.way = steps(&saved.integrator, saved.count).unwrap_or(motion.way);
+                motion.step_control = steps(&saved.integrator, saved.count).unwrap_or(motion.step_control);
                 scene.system.plan(&motion).map_err(explain)?
             }
             _ => scene.system.plan(&motion).map_err(explain)?,
         };
         // The run takes the steps of the plan, which are determined once.
         if !plan.integrator.in_transformed_time {
-            motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
+            motion.step_control = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.step_control);
         }
         let from = saved.as_ref().map(|saved| saved.state(&directory)).transpose()?;
         let every = Duration::from_secs(self.checkpoint_every.into());
-        let saves = Saves::new(&directory, &scene, &plan, every);
-        let mut writer = self.writer(&directory, &scene, saves, saved.as_ref())?;
+        let checkpoints = CheckpointWriter::new(&directory, &scene, &plan, every);
+        let mut writer = self.writer(&directory, &scene, checkpoints, saved.as_ref())?;
         if saved.is_none() {
             Checkpoint::remove(&directory)?;
         }
@@ -207,7 +207,7 @@ impl Run {
         writer.bar.finish_and_clear();
         let outcome = outcome.map_err(explain)?;
         let written = writer.written()?;
-        let Writer { not_finite, interrupted, mut saves, failure, .. } = writer;
+        let Writer { not_finite, interrupted, mut checkpoints, failure, .. } = writer;
         if let Some(failure) = failure {
             return Err(failure);
         }
@@ -215,7 +215,7 @@ impl Run {
             eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
         match &interrupted {
-            Some(state) => saves.save(outcome.steps, written, state)?,
+            Some(state) => checkpoints.save(outcome.steps, written, state)?,
             None => Checkpoint::remove(&directory)?,
         }
         if self.plot {
@@ -228,7 +228,7 @@ impl Run {
                 directory.write("section.svg", &figure)?;
             }
         }
-        self.tell(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
+        self.report(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
     }
 
     /// The output files: new ones, or those of the run that is resumed.
@@ -236,7 +236,7 @@ impl Run {
         &self,
         directory: &Directory,
         scene: &Scene,
-        saves: Saves,
+        checkpoints: CheckpointWriter,
         saved: Option<&Checkpoint>,
     ) -> Result<Writer, Failure> {
         directory.create()?;
@@ -245,8 +245,8 @@ impl Run {
         let before = saved.map(|saved| saved.written);
         let (rows, events) = match before {
             Some(before) => {
-                let events = has_events.then(|| Table::go_on(events_at, before.events_bytes)).transpose()?;
-                (Table::go_on(rows_at, before.rows_bytes)?, events)
+                let events = has_events.then(|| Table::resume(events_at, before.events_bytes)).transpose()?;
+                (Table::resume(rows_at, before.rows_bytes)?, events)
             }
             None => {
                 let header = header_of_events(scene);
@@ -268,16 +268,16 @@ impl Run {
             not_finite: vec![0; scene.columns.len()],
             skip,
             bar: progress_bar(!self.json),
-            stop: stop_flag(),
+            stop: interrupt_flag(),
             interrupt_at: self.interrupt_at,
             interrupted: None,
-            saves,
+            checkpoints,
             failure: None,
         })
     }
 
     /// Prints the final state.
-    fn tell(
+    fn report(
         &self,
         scene: &Scene,
         plan: &Plan,

@@ -26,7 +26,7 @@ pub struct Ensemble<'a> {
     /// The final time.
     pub end: f64,
     /// How the motions are advanced.
-    pub way: StepControl,
+    pub step_control: StepControl,
     /// The times at which rows are recorded.
     pub rows: Option<OutputTimes>,
     /// The columns of a row, which are also evaluated at the end.

@@ -39,7 +39,7 @@ mod system;
 
 pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
-pub use check::{CONTACT, Check, MomentumSample, Place, StatementResidual};
+pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
 pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
@@ -51,7 +51,7 @@ pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
-pub use symmetry::SeenSymmetry;
+pub use symmetry::FormulaSymmetry;
 pub use system::System;
 
 pub use contact_geom::{Statement, Structure};

@@ -3,8 +3,8 @@
 use crate::runtime::kernel::{self, Kernel, kernel_of};
 use crate::runtime::outcome::KeptRows;
 use crate::runtime::{
-    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FoundPath, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError,
-    SeenSymmetry, Start,
+    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, FoundPath, Geometry, Motion, Outcome, Plan,
+    RunMonitor, RuntimeError, Start,
 };
 use contact_geom::Structure;
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
@@ -72,7 +72,7 @@ impl System {
     }
 
     /// The symmetries that are recognised.
-    pub fn symmetries(&self) -> Vec<SeenSymmetry> {
+    pub fn symmetries(&self) -> Vec<FormulaSymmetry> {
         self.kernel.symmetries()
     }
 
@@ -105,8 +105,8 @@ impl System {
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
-    pub fn run(&self, motion: &Motion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, watch, None)
+    pub fn run(&self, motion: &Motion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
+        self.kernel.run(motion, monitor, None)
     }
 
     /// Continues an interrupted motion; the result is bitwise that of an uninterrupted run. Events and rows from there
@@ -119,9 +119,9 @@ impl System {
         &self,
         motion: &Motion,
         from: ResumeState,
-        watch: &mut dyn RunMonitor,
+        monitor: &mut dyn RunMonitor,
     ) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, watch, Some(from))
+        self.kernel.run(motion, monitor, Some(from))
     }
 
     /// Runs a motion and keeps its rows.
@@ -142,12 +142,12 @@ impl System {
         self.kernel.geometry(at)
     }
 
-    /// Checks at this number of places along a motion whether its steps are contact transformations.
+    /// Checks at this number of samples of a motion whether its steps are contact transformations.
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
-    pub fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
-        self.kernel.check(motion, places)
+    pub fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        self.kernel.check(motion, samples)
     }
 
     /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others
@@ -155,8 +155,8 @@ impl System {
     ///
     /// # Errors
     /// Errors that concern all members.
-    pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        self.kernel.ensemble(ensemble, watch)
+    pub fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        self.kernel.ensemble(ensemble, monitor)
     }
 
     /// Searches for a path between two positions, of a system of one to eight coordinates. The status of the result

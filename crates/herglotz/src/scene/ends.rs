@@ -1,10 +1,10 @@
 //! Scenes of boundary value problems: paths between given ends.
 
-use super::file::{SystemTable, place_of_table};
-use super::location::{Location, Named, Numbers, Span};
-use super::start::Ends;
 use super::SceneError;
 use super::checked::check_version;
+use super::file::{SystemTable, span_of_table};
+use super::location::{Location, Named, Numbers, Span};
+use super::start::Ends;
 use super::step_control::integrator;
 use super::system::{check_used, entry, formula};
 use crate::runtime::{
@@ -64,7 +64,7 @@ pub struct EndsScene {
 impl EndsScene {
     /// Whether a text is a scene with `[ends]`.
     pub fn is_one(text: &str) -> bool {
-        place_of_table(text, "ends").is_some()
+        span_of_table(text, "ends").is_some()
     }
 
     /// Reads a scene file with `[ends]`.

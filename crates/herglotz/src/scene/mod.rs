@@ -20,7 +20,7 @@ pub use error::SceneError;
 pub use lattice::LatticeScene;
 pub use members::Members;
 pub use motion::Scene;
-pub use sweep::Knob;
+pub use sweep::SweptQuantity;
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {

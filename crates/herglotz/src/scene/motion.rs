@@ -6,12 +6,10 @@ use super::location::{Location, Span};
 use super::members::Members;
 use super::output::{self, EventColumns, Events, RowTimes};
 use super::step_control::step_control;
-use super::sweep::{self, Knob};
+use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
 use super::{SceneError, overrides, start};
-use crate::runtime::{
-    Column, Crossing, Event, InputError, Motion, RuntimeError, Start, StepControl, System, in_words,
-};
+use crate::runtime::{Column, Crossing, Event, InputError, Motion, RuntimeError, Start, StepControl, System, in_words};
 
 /// A scene that has been read and validated.
 #[derive(Clone)]
@@ -27,23 +25,23 @@ pub struct Scene {
     /// The texts of all columns and events.
     expressions: Vec<String>,
     /// The swept quantities with their values.
-    pub knobs: Vec<Knob>,
+    pub swept: Vec<SweptQuantity>,
     /// The text of the formula.
     lagrangian: String,
     start: Start,
     end: f64,
-    way: StepControl,
+    step_control: StepControl,
     rows: RowTimes,
     conformal_factor: bool,
     estimate: bool,
     scales: Option<Vec<f64>>,
     text: String,
-    places: Places,
+    spans: Spans,
 }
 
 /// Positions in the file, for errors that are found after it has been read.
 #[derive(Clone, Copy, Debug)]
-struct Places {
+struct Spans {
     lagrangian: Span,
     start: Span,
     run: Span,
@@ -89,11 +87,11 @@ impl Scene {
     /// [`SceneError`] with the position in the text, or in the override.
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
-        if let Some(lattice) = file::place_of_table(text, "lattice") {
+        if let Some(lattice) = file::span_of_table(text, "lattice") {
             let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
-        if let Some(ends) = file::place_of_table(text, "ends") {
+        if let Some(ends) = file::span_of_table(text, "ends") {
             let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
             return Err(SceneError::at(text, ends, message));
         }
@@ -112,8 +110,8 @@ impl Scene {
         let header = file.start.as_ref().map_or(system.span(), Location::span);
         let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
         let end = finite(text, &run.time, "time")?;
-        let way = step_control(text, run)?;
-        let by = match way {
+        let step_control = step_control(text, run)?;
+        let by = match step_control {
             StepControl::Accuracy { by, .. } => by,
             StepControl::Steps { by, .. } => Some(by),
         };
@@ -134,7 +132,7 @@ impl Scene {
             columns,
             events: events.events,
             event_columns: events.columns,
-            knobs: sweep::read(text, &formula, &start, &file.sweep)?,
+            swept: sweep::read(text, &formula, &start, &file.sweep)?,
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
             expressions: expressions(&file).cloned().collect(),
@@ -144,12 +142,12 @@ impl Scene {
             },
             start,
             end,
-            way,
+            step_control,
             conformal_factor: file.want.conformal_factor,
             estimate: file.want.estimate,
             scales: run.scales.as_deref().cloned(),
             text: text.to_owned(),
-            places: Places {
+            spans: Spans {
                 lagrangian,
                 start: header,
                 run: run.span(),
@@ -182,7 +180,7 @@ impl Scene {
 
     /// The motion with no output but its end.
     pub fn bare_motion(&self) -> Motion {
-        Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.way) }
+        Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.step_control) }
     }
 
     /// The columns of events.csv after the name of the event: the state there, and the columns of the events.
@@ -225,47 +223,47 @@ impl Scene {
 
     /// The members of its sweep.
     pub fn members(&self) -> Members<'_> {
-        Members::new(&self.knobs, &self.start)
+        Members::new(&self.swept, &self.start)
     }
 
     /// A text of everything that determines the output, used to distinguish scenes.
     pub fn fingerprint(&self) -> String {
         let events = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal, e.from)).collect::<Vec<_>>();
-        let Scene { start, end, way, rows, conformal_factor, expressions, event_columns, .. } = self;
+        let Scene { start, end, step_control, rows, conformal_factor, expressions, event_columns, .. } = self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
         let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
         format!(
-            "{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?}"
+            "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?}"
         )
     }
 
     /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
         use InputError as E;
-        let places = &self.places;
+        let spans = &self.spans;
         let span = match error {
-            RuntimeError::NotRegular { .. } | RuntimeError::Formula(_) => places.lagrangian,
+            RuntimeError::NotRegular { .. } | RuntimeError::Formula(_) => spans.lagrangian,
             RuntimeError::Input(error) => match error {
-                E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => places.step,
-                E::Span { .. } => places.time,
-                E::Tolerance { .. } | E::Accuracy { .. } => places.accuracy,
-                E::Scale { .. } => places.scales,
+                E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => spans.step,
+                E::Span { .. } => spans.time,
+                E::Tolerance { .. } | E::Accuracy { .. } => spans.accuracy,
+                E::Scale { .. } => spans.scales,
                 E::NoIntegrator
                 | E::Unclaimed { .. }
                 | E::Hypothesis { .. }
                 | E::NoTimeTransformation
-                | E::Stages { .. } => places.integrator,
-                E::FalseClaim { .. } => places.lagrangian,
-                E::Times { .. } => places.rows,
+                | E::Stages { .. } => spans.integrator,
+                E::FalseClaim { .. } => spans.lagrangian,
+                E::Times { .. } => spans.rows,
                 E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::TimeTransformation { .. } | E::EqualPoints => {
-                    places.start
+                    spans.start
                 }
-                _ => places.run,
+                _ => spans.run,
             },
-            RuntimeError::Length { what: "scales", .. } => places.scales,
-            RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => places.start,
-            _ => places.run,
+            RuntimeError::Length { what: "scales", .. } => spans.scales,
+            RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => spans.start,
+            _ => spans.run,
         };
         SceneError::at(&self.text, span, error.to_string())
     }

@@ -8,11 +8,11 @@ use crate::runtime::{
     Column, Direction, Event, Expression, Formula, FormulaError, OutputTimes, RuntimeError, nearest_name, velocity_name,
 };
 
-/// The number of intervals between rows of a scene without `rows`.
+/// The number of intervals between rows of a scene without `rows`: as many as a figure resolves.
 const DEFAULT_ROWS: usize = 1000;
 
-/// The maximal number of rows at given times.
-const MOST_ROWS: f64 = 1e7;
+/// The maximal number of rows at given times, which are stored.
+const MAX_ROWS: f64 = 1e7;
 
 /// The times of the rows.
 #[derive(Clone, Debug)]
@@ -55,8 +55,8 @@ impl RowTimes {
         match (&rows.every, &rows.at, &rows.every_step) {
             (Some(every), None, None) => {
                 let value = positive(text, every, "every")?;
-                if (end - t0).abs() / value > MOST_ROWS {
-                    let message = format!("these are more than {MOST_ROWS:e} rows; take a longer time between them");
+                if (end - t0).abs() / value > MAX_ROWS {
+                    let message = format!("these are more than {MAX_ROWS:e} rows; take a longer time between them");
                     return Err(SceneError::at(text, every.span(), message));
                 }
                 Ok(RowTimes::Every(value))

@@ -209,10 +209,10 @@ fn complete(
         let message = "the start has velocities and momenta; give one kind for all coordinates";
         return Err(SceneError::at(text, at, message));
     }
-    let rate = if by_momentum {
+    let velocity = if by_momentum {
         InitialVelocity::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
     } else {
         InitialVelocity::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
     };
-    Ok(Start { t: given.t.unwrap_or(0.0), q, rate, z: given.z.unwrap_or(0.0) })
+    Ok(Start { t: given.t.unwrap_or(0.0), q, velocity, z: given.z.unwrap_or(0.0) })
 }

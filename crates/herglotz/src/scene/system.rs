@@ -70,7 +70,12 @@ pub(super) fn formula(
 }
 
 /// Rejects parameters that occur neither in the formula nor in the texts of columns and events.
-pub(super) fn check_used(text: &str, formula: &Formula, system: &Location<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
+pub(super) fn check_used(
+    text: &str,
+    formula: &Formula,
+    system: &Location<SystemTable>,
+    texts: &[&str],
+) -> Result<(), SceneError> {
     check_parameters(formula, texts).map_err(|error| {
         let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
         let span = match &error {

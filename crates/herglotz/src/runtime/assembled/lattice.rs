@@ -1,7 +1,7 @@
 //! Lattices given by the formulas of a site and of a bond.
 
-use super::term::AtRest;
 use super::system::Assembled;
+use super::term::AtRest;
 use crate::runtime::RuntimeError;
 use assembled_herglotz::{AssembledSystem, FIXED};
 use contact_geom::nalgebra::SVector;
@@ -28,7 +28,10 @@ impl FromStr for Boundary {
             "periodic" => Ok(Boundary::Periodic),
             "fixed" => Ok(Boundary::Fixed),
             "free" => Ok(Boundary::Free),
-            _ => Err(RuntimeError::argument("boundary", format!("is {name:?}, where \"periodic\", \"fixed\" or \"free\" is needed"))),
+            _ => Err(RuntimeError::argument(
+                "boundary",
+                format!("is {name:?}, where \"periodic\", \"fixed\" or \"free\" is needed"),
+            )),
         }
     }
 }
@@ -80,7 +83,10 @@ impl Lattice {
             1 => self.of::<1, 2>(),
             2 => self.of::<2, 4>(),
             3 => self.of::<3, 6>(),
-            found => Err(RuntimeError::argument("coordinates", format!("has {found} names, where a site has 1 to 3 components"))),
+            found => Err(RuntimeError::argument(
+                "coordinates",
+                format!("has {found} names, where a site has 1 to 3 components"),
+            )),
         }
     }
 
@@ -88,7 +94,10 @@ impl Lattice {
     fn sites(&self) -> Result<usize, RuntimeError> {
         let least = if self.boundary == Boundary::Periodic && self.bond.is_some() { 2 } else { 1 };
         if let Some(size) = self.sizes.iter().find(|size| **size < least) {
-            return Err(RuntimeError::argument("sites", format!("has {size} along a direction, where at least {least} are needed")));
+            return Err(RuntimeError::argument(
+                "sites",
+                format!("has {size} along a direction, where at least {least} are needed"),
+            ));
         }
         match self.sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size)) {
             Some(sites) if !self.sizes.is_empty() => Ok(sites),
@@ -140,7 +149,7 @@ impl Lattice {
                 system = system.with_potential(AtRest(bond.clone()), ends)?;
             }
         }
-        Ok(Assembled { system, places: sites, components: D, masses: each, full: false })
+        Ok(Assembled { system, sites, components: D, masses: each, full: false })
     }
 
     fn parse(&self, part: &'static str, text: &str, names: &[&str]) -> Result<Formula, RuntimeError> {
@@ -196,9 +205,10 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
     };
     let masses = std::array::from_fn(|i| m[(i, i)]);
     match masses.iter().find(|m| !(**m > 0.0 && m.is_finite())) {
-        Some(m) => {
-            Err(RuntimeError::argument("site", format!("has the mass {m}, where each component needs a positive one: m*x'^2/2")))
-        }
+        Some(m) => Err(RuntimeError::argument(
+            "site",
+            format!("has the mass {m}, where each component needs a positive one: m*x'^2/2"),
+        )),
         None => Ok(masses),
     }
 }
@@ -214,7 +224,10 @@ fn check_bond<const N: usize>(bond: &FormulaLagrangian<N>) -> Result<(), Runtime
     }
     let masses = bond.closed_mass_matrix(0.0, &origin()).filter(|_| proved.separable);
     if masses.is_none_or(|m| m.iter().any(|m| *m != 0.0)) {
-        return Err(RuntimeError::argument("bond", "depends on velocities; a bond is minus a potential energy of its two ends"));
+        return Err(RuntimeError::argument(
+            "bond",
+            "depends on velocities; a bond is minus a potential energy of its two ends",
+        ));
     }
     Ok(())
 }

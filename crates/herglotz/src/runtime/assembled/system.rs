@@ -24,7 +24,7 @@ use assembled_herglotz::AssembledSystem;
 pub struct Assembled {
     pub(super) system: AssembledSystem,
     /// The number of sites or bodies, and of components at each.
-    pub(super) places: usize,
+    pub(super) sites: usize,
     pub(super) components: usize,
     /// The mass of each coordinate, in the order of the assembled system.
     pub(super) masses: Vec<f64>,
@@ -35,19 +35,19 @@ pub struct Assembled {
 impl Assembled {
     /// The number of coordinates. In a start and in rows, the components of one site or body follow each other.
     pub fn dimension(&self) -> usize {
-        self.places * self.components
+        self.sites * self.components
     }
 
     /// Reorders from the order of users (the components of each place together) to that of the assembled system (each
     /// component of all places), in which neighbours are contiguous in memory.
     pub(super) fn inward(&self, x: &[f64]) -> Vec<f64> {
-        let (n, d) = (self.places, self.components);
+        let (n, d) = (self.sites, self.components);
         (0..n * d).map(|k| x.get(k % n * d + k / n).copied().unwrap_or(f64::NAN)).collect()
     }
 
     /// The inverse reordering, appended to a row.
     pub(super) fn outward(&self, x: &[f64], row: &mut Vec<f64>) {
-        let (n, d) = (self.places, self.components);
+        let (n, d) = (self.sites, self.components);
         row.extend((0..n * d).map(|k| x.get(k % d * n + k / d).copied().unwrap_or(f64::NAN)));
     }
 }

@@ -12,7 +12,7 @@ mod theorems;
 mod work_thread;
 
 use crate::runtime::{
-    Check, Ensemble, EnsembleMonitor, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, SeenSymmetry, Start,
+    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start,
 };
 use contact_geom::{Structure, Symmetry};
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
@@ -26,7 +26,7 @@ pub(crate) trait Kernel: Send + Sync {
     fn formula(&self) -> &Formula;
     fn structure(&self) -> Structure;
     fn is_smooth(&self) -> bool;
-    fn symmetries(&self) -> Vec<SeenSymmetry>;
+    fn symmetries(&self) -> Vec<FormulaSymmetry>;
     fn to_rust(&self, name: &str) -> Result<String, FormulaError>;
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError>;
@@ -34,13 +34,13 @@ pub(crate) trait Kernel: Send + Sync {
     fn run(
         &self,
         motion: &Motion,
-        watch: &mut dyn RunMonitor,
+        monitor: &mut dyn RunMonitor,
         from: Option<ResumeState>,
     ) -> Result<Outcome, RuntimeError>;
-    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError>;
+    fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError>;
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]);
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
-    fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError>;
+    fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError>;
 }
 
 /// The kernel of a formula.
@@ -70,13 +70,13 @@ impl<const N: usize> Kernel for Sized<N> {
         self.0.is_smooth()
     }
 
-    fn symmetries(&self) -> Vec<SeenSymmetry> {
+    fn symmetries(&self) -> Vec<FormulaSymmetry> {
         let seen = |symmetry: &Symmetry<N>| match symmetry {
-            Symmetry::Translation(a) => Some(SeenSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
-            Symmetry::Rotation(i, j) => Some(SeenSymmetry::Rotation(vec![(*i, *j)])),
-            Symmetry::Rotations(planes) => {
-                Some(SeenSymmetry::Rotation(planes.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect()))
-            }
+            Symmetry::Translation(a) => Some(FormulaSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
+            Symmetry::Rotation(i, j) => Some(FormulaSymmetry::Rotation(vec![(*i, *j)])),
+            Symmetry::Rotations(planes) => Some(FormulaSymmetry::Rotation(
+                planes.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect(),
+            )),
             _ => None,
         };
         self.0.symmetries().iter().filter_map(seen).collect()
@@ -103,14 +103,14 @@ impl<const N: usize> Kernel for Sized<N> {
     fn run(
         &self,
         motion: &Motion,
-        watch: &mut dyn RunMonitor,
+        monitor: &mut dyn RunMonitor,
         from: Option<ResumeState>,
     ) -> Result<Outcome, RuntimeError> {
-        run::run(self, motion, watch, from)
+        run::run(self, motion, monitor, from)
     }
 
-    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        ensemble::run(self, ensemble, watch)
+    fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        ensemble::run(self, ensemble, monitor)
     }
 
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
@@ -121,7 +121,7 @@ impl<const N: usize> Kernel for Sized<N> {
         geometry::at(self, at)
     }
 
-    fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
-        on_large_stack(|| check::check(self, motion, places))
+    fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        on_large_stack(|| check::check(self, motion, samples))
     }
 }

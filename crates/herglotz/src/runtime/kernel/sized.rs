@@ -36,7 +36,7 @@ impl<const N: usize> Sized<N> {
             }
         }
         let q = self.vector("q", &start.q)?;
-        Ok(match &start.rate {
+        Ok(match &start.velocity {
             InitialVelocity::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
             InitialVelocity::MomentumNear { p, v } => discrete_herglotz::Start::Momentum(
                 PhasePoint { q, p: self.vector("p", p)?, z: start.z },

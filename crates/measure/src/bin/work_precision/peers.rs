@@ -9,7 +9,7 @@ use ode_solvers::{Dop853, OutputType, SVector};
 use std::time::Instant;
 
 /// The largest number of steps of a run, of either peer.
-const MOST_STEPS: u32 = 100_000_000;
+const MAX_STEPS: u32 = 100_000_000;
 
 /// The peers as candidates for a problem, with or without the action.
 pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
@@ -118,7 +118,7 @@ impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEqua
         let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(self.0.absolute(tolerance));
         let ivp = IVP::ode(rhs, 0.0, problem.duration, self.0.start())
             .t_eval([problem.duration])
-            .method(method.max_steps(MOST_STEPS as usize));
+            .method(method.max_steps(MAX_STEPS as usize));
         let clock = Instant::now();
         let solution = ivp.solve().map_err(|error| RunError::Peer(format!("{error:?}")))?;
         let seconds = clock.elapsed().as_secs_f64();
@@ -167,7 +167,7 @@ impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolver
             6.0,
             end,
             0.0,
-            MOST_STEPS,
+            MAX_STEPS,
             u32::MAX,
             OutputType::Sparse,
         );
