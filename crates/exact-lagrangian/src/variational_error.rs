@@ -40,6 +40,7 @@ impl std::fmt::Display for Order {
 
 /// An order measured as the slope of an error against the time step, both on a logarithmic scale.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MeasuredOrder {
     /// The order.
     pub order: Order,
@@ -59,6 +60,7 @@ pub struct MeasuredOrder {
 /// cancel to leading order. This is proved in Patrick and Cuell, "Error analysis of variational integrators of
 /// unconstrained Lagrangian systems", Numer. Math. 113 (2009).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorOrders {
     /// The order of `|L_d - L_h^e|`.
     pub value: MeasuredOrder,

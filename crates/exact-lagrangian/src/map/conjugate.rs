@@ -8,6 +8,7 @@ use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, numbers::max_abs
 /// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there
 /// again, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ConjugatePoint {
     /// The time since the start of the motion.
     pub after: f64,

@@ -4,6 +4,7 @@ use contact_geom::VelocityPoint;
 
 /// How the motion between two points was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RetractionRoute {
     /// By collocation with both positions given, the least expensive way, which is taken where its iteration contracts.
     Collocation,
@@ -16,6 +17,7 @@ pub enum RetractionRoute {
 /// The motion from `q0` to `q1` in time h: `R_h^(e-)` is its start, `R_h^(e+) = phi_h o R_h^(e-)` its end; paper,
 /// section 4.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Retraction<const N: usize> {
     /// `R_h^(e-)(q0, q1, z0) = (q0, v0, z0)`.
     pub start: VelocityPoint<N>,

@@ -64,6 +64,7 @@ pub(crate) fn flow_between_jumps<const N: usize>(
 
 /// A motion: its end, and the integrals along it. On dual numbers, with the derivatives of all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Motion<const N: usize, T = f64> {
     /// The end `phi_t(q0, v0, z0)`.
     pub end: VelocityPoint<N, T>,

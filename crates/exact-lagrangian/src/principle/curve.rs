@@ -71,6 +71,7 @@ impl<const N: usize, C: Curve<N>, V: Curve<N>> Curve<N> for VariedCurve<'_, C, V
 
 /// The action along a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CurveAction {
     /// The end value `Z = z(t1)` of the action.
     pub z: f64,

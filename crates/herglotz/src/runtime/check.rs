@@ -32,6 +32,7 @@ pub struct Sample {
 
 /// A statement of the paper on the discrete theory, evaluated at two points of the motion.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StatementResidual {
     /// The statement.
     pub statement: Statement,

@@ -52,6 +52,7 @@ pub struct MemberEnd {
 
 /// The final state of a member's motion.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Ending {
     /// How it ended.
     pub status: Status,

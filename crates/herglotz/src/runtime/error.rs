@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// Invalid input to a system that is defined at run time.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RuntimeError {
     /// A formula, a column or the function of an event.
     #[error(transparent)]

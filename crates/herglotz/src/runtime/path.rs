@@ -39,6 +39,7 @@ impl BoundaryProblem {
 
 /// The last path of a search, with measures of its quality. Vectors are stored point by point.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FoundPath {
     /// The times of the points.
     pub t: Vec<f64>,

@@ -64,7 +64,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(name) = arguments.case.iter().find(unknown) {
         return Err(Failure::Unknown { what: "case", name: name.clone(), known: names.join(", ") });
     }
-    let mut report = Report::new(Directory::create(&arguments.out)?, arguments.quick);
+    let mut report = Report::new(Directory::create(&arguments.out)?);
+    report.quick = arguments.quick;
     for (name, size, case) in CASES {
         if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
             report.begin(name, size);

@@ -91,7 +91,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A panic that a case provokes is part of its result; one line on stderr suffices.
     let above = bar.clone();
     std::panic::set_hook(Box::new(move |panic| above.suspend(|| eprintln!("note: {panic}"))));
-    let mut report = Report::new(out, arguments.quick, bar);
+    let mut report = Report::new(out, bar);
+    report.quick = arguments.quick;
     for (name, title, case) in CASES {
         if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
             let clock = Instant::now();

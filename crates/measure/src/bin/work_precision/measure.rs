@@ -2,7 +2,7 @@
 
 use crate::candidate::{Candidate, Control, Run, RunError};
 use crate::problems::Problem;
-use crate::row::{Origin, Row};
+use crate::row::{Action, Origin, Row};
 
 /// The minimum number of runs from which a median is taken.
 const MIN_RUNS: usize = 7;
@@ -86,7 +86,7 @@ fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
 }
 
 /// Measures a candidate from coarse to fine, until a run is slow or the error no longer decreases.
-pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: bool, effort: Effort) -> Sweep {
+pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: Action, effort: Effort) -> Sweep {
     let mut sweep = Sweep::default();
     let (mut last, mut strikes) = (f64::INFINITY, 0);
     let control = candidate.control();
