@@ -169,14 +169,14 @@ const MAX_PLATEAU_SLOPE: f64 = 0.5;
 /// or grows by at most `1/h`, as it does where momenta are differences of positions divided by h.
 fn raise_floors(rows: &mut [Row]) {
     let smallest = &rows[rows.len().saturating_sub(PLATEAU_STEPS)..];
-    let seen: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
-    if seen.len() < PLATEAU_STEPS || !smallest.iter().any(|r| r.error > MIN_ERROR_OVER_ROUND_OFF * r.floor) {
+    let positive: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
+    if positive.len() < PLATEAU_STEPS || !smallest.iter().any(|r| r.error > MIN_ERROR_OVER_ROUND_OFF * r.floor) {
         return;
     }
-    let slope = least_squares_slope(&seen);
+    let slope = least_squares_slope(&positive);
     if slope < MAX_PLATEAU_SLOPE {
         let slope = slope.clamp(-1.0, 0.0);
-        let level = seen.iter().map(|(h, e)| e.ln() - slope * h.ln()).sum::<f64>() / seen.len() as f64;
+        let level = positive.iter().map(|(h, e)| e.ln() - slope * h.ln()).sum::<f64>() / positive.len() as f64;
         rows.iter_mut().for_each(|r| r.floor = max_or_nan(r.floor, (level + slope * r.h.ln()).exp()));
     }
 }

@@ -58,8 +58,8 @@ pub(crate) struct Directory(PathBuf);
 
 impl Directory {
     /// The requested directory, or one in the current directory with the name of the scene.
-    pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Self {
-        Directory(wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
+    pub fn new(requested: Option<PathBuf>, scene: &Path) -> Self {
+        Directory(requested.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
     }
 
     /// Creates the directory; called when there is output to write.

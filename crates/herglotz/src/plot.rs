@@ -67,22 +67,22 @@ fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[V
         let points = rows.iter().step_by(stride).chain(rows.last());
         points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
     };
-    let place = |wanted: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| wanted(column));
+    let position = |is_requested: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| is_requested(column));
     let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, of(i, j));
     let mut figures = Vec::new();
-    if let Some(t) = place(&|column| matches!(column, Column::Time)) {
+    if let Some(t) = position(&|column| matches!(column, Column::Time)) {
         let panels: Vec<Panel> = (0..columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
         figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
     }
     let portraits = (0..dimension).filter_map(|k| {
-        let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
-        let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
+        let q = position(&|column| matches!(column, Column::Position(i) if *i == k))?;
+        let v = position(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
         of_pair(q, v)
     });
     let panels: Vec<Panel> = portraits.collect();
     figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
     let positions: Vec<usize> =
-        (0..dimension).filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
+        (0..dimension).filter_map(|k| position(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
     if let [x, y, ..] = positions.as_slice() {
         figures.extend(of_pair(*x, *y).map(|panel| ("path.svg".to_owned(), draw(&panel))));
     }

@@ -24,8 +24,8 @@ fn by_steps(count: usize) -> StepControl {
     StepControl::Steps { by: GAUSS, steps: Steps::Count(count) }
 }
 
-fn accurate(wanted: f64) -> StepControl {
-    StepControl::Accuracy { wanted, by: None }
+fn accurate(error: f64) -> StepControl {
+    StepControl::Accuracy { error, by: None }
 }
 
 fn pendulum() -> System {

@@ -63,7 +63,7 @@ type States =
 #[pyfunction]
 pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     let signals = motion.signals.clone();
-    let mut keeps = NodeStore { nodes: Nodes::default(), until, done: false, signals };
+    let mut store = NodeStore { nodes: Nodes::default(), until, done: false, signals };
     let by = py.detach(|| {
         let plan = motion.system.plan(&motion.motion)?;
         let by = match motion.motion.step_control {
@@ -81,7 +81,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             nodes: true,
             ..motion.motion.clone()
         };
-        motion.system.run(&again, &mut keeps)?;
+        motion.system.run(&again, &mut store)?;
         Ok(Some(by))
     });
     if let Some(raised) = motion.signals.take() {
@@ -89,7 +89,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     }
     let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
     let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes, until })
+    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, until })
 }
 
 impl Dense {

@@ -46,8 +46,8 @@ pub fn step_control([accuracy, integrator, step, steps]: &GivenStepControl<'_>) 
         }
         (Some(_), None, None) => Err(value_error("a step is given without `integrator`: name one, as \"gauss_8\"")),
         (Some(steps), Some(by), None) => Ok(StepControl::Steps { by, steps }),
-        (None, by, None) => Ok(StepControl::Accuracy { wanted: ACCURACY, by }),
-        (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { wanted: number("accuracy", accuracy)?, by }),
+        (None, by, None) => Ok(StepControl::Accuracy { error: ACCURACY, by }),
+        (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { error: number("accuracy", accuracy)?, by }),
     }
 }
 

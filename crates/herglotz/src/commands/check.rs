@@ -24,7 +24,8 @@ impl Check {
         let scene = self.scene.read()?;
         let checked = scene.system.check(&scene.bare_motion(), self.samples.into());
         let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
+        let momenta: Vec<String> =
+            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
             print_json(&of_json(&check, &momenta))?;
         } else {

@@ -49,7 +49,8 @@ impl Plan {
         let scene = self.scene.read()?;
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let proved = proved(&scene);
-        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
+        let momenta: Vec<String> =
+            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
             let of = |item: &herglotz::runtime::PlanEntry| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
             let proved: serde_json::Map<_, _> =

@@ -75,7 +75,7 @@ impl Writer {
         Ok(Written { rows: self.row_count, rows_bytes, events: self.event_count, events_bytes })
     }
 
-    fn keep(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
+    fn continue_unless_failed(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
         match written {
             Ok(()) => ControlFlow::Continue(()),
             Err(failure) => {
@@ -96,7 +96,7 @@ impl RunMonitor for Writer {
             *count += usize::from(!x.is_finite());
         }
         let written = self.rows.numbers(numbers);
-        self.keep(written)
+        self.continue_unless_failed(written)
     }
 
     fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
@@ -105,14 +105,14 @@ impl RunMonitor for Writer {
         };
         self.event_count += 1;
         let written = table.record([name.clone()].into_iter().chain(numbers_of_event(&self.scene, crossing)));
-        self.keep(written)
+        self.continue_unless_failed(written)
     }
 
     fn poll(&mut self, part: f64) -> ControlFlow<()> {
         self.bar.set_position((part * 1000.0) as u64);
         // At the end of the motion an interruption has no effect.
-        let wanted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
-        if wanted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let is_interrupted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
+        if is_interrupted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn interrupted(&mut self, at: ResumeState) {
@@ -125,7 +125,7 @@ impl RunMonitor for Writer {
 
     fn checkpoint(&mut self, taken: usize, at: ResumeState) -> ControlFlow<()> {
         let saved = self.written().and_then(|written| self.checkpoints.save(taken, written, &at));
-        self.keep(saved)
+        self.continue_unless_failed(saved)
     }
 }
 

@@ -123,15 +123,15 @@ impl System {
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
-        let bare = |step_control: StepControl| Motion {
+        let without_output = |step_control: StepControl| Motion {
             action: false,
             interrupt: motion.interrupt.clone(),
             ..Motion::new(motion.start.clone(), motion.end, step_control)
         };
         let by = AnyIntegrator::Gauss { stages: 16 };
         let mut count = Err(RuntimeError::from(InputError::NoSteps));
-        for wanted in REFERENCES {
-            let plan = self.plan(&bare(StepControl::Accuracy { wanted, by: Some(by) }));
+        for error in REFERENCES {
+            let plan = self.plan(&without_output(StepControl::Accuracy { error, by: Some(by) }));
             let refused = matches!(plan, Err(RuntimeError::Input(InputError::Accuracy { .. })));
             count = plan.map(|plan| plan.steps);
             if !refused {
@@ -141,7 +141,7 @@ impl System {
         let (count, span) = (count?, motion.end - motion.start.t);
         let run = |by: AnyIntegrator, count: usize| {
             self.run(
-                &bare(StepControl::Steps { by, steps: Steps::Count(count) }),
+                &without_output(StepControl::Steps { by, steps: Steps::Count(count) }),
                 &mut UntilInterrupted(motion.interrupt.as_ref()),
             )
         };

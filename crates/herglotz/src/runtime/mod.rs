@@ -12,7 +12,7 @@
 //! let motion = Motion {
 //!     rows: Some(OutputTimes::At((0..=10).map(f64::from).collect())),
 //!     columns: vec![Column::Time, Column::parse("theta", pendulum.formula())?, Column::Energy],
-//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-10, by: None })
+//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { error: 1e-10, by: None })
 //! };
 //! let (outcome, rows) = pendulum.record(&motion)?;
 //! println!("{}: {rows:?}", outcome.status);

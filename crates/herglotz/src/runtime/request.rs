@@ -47,7 +47,7 @@ pub enum StepControl {
     /// To a relative error of (q, p) and of v, with this integrator or with one that is chosen automatically.
     Accuracy {
         /// The error.
-        wanted: f64,
+        error: f64,
         /// The integrator.
         by: Option<AnyIntegrator>,
     },
@@ -123,7 +123,7 @@ impl Event {
 /// let motion = Motion {
 ///     rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])),
 ///     columns: vec![Column::Time, Column::Position(0), Column::Energy],
-///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-9, by: None })
+///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { error: 1e-9, by: None })
 /// };
 /// let (outcome, rows) = system.record(&motion)?;
 /// assert_eq!((outcome.t, rows.len()), (10.0, 3));

@@ -221,14 +221,14 @@ impl EventColumns {
             if name == "event" || of_state.iter().any(|known| known == name) {
                 return refuse(format!("every event has `{name}` already; leave it out, or name it otherwise"));
             }
-            let place = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
-            if own.contains(&place) {
+            let index = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
+            if own.contains(&index) {
                 return refuse(format!("the event has two columns `{name}`; name one of them otherwise"));
             }
-            if place == self.names.len() {
+            if index == self.names.len() {
                 self.names.push(name.to_owned());
             }
-            own.push(place);
+            own.push(index);
         }
         self.of_event.push(own);
         Ok(())

@@ -26,7 +26,7 @@ pub(super) fn step_control(text: &str, run: &Location<RunTable>) -> Result<StepC
     };
     let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
     match (&run.accuracy, by, steps) {
-        (Some(accuracy), by, None) => Ok(StepControl::Accuracy { wanted: positive(text, accuracy, "accuracy")?, by }),
+        (Some(accuracy), by, None) => Ok(StepControl::Accuracy { error: positive(text, accuracy, "accuracy")?, by }),
         (None, Some(by), Some(steps)) => Ok(StepControl::Steps { by, steps }),
         (Some(accuracy), _, Some(_)) => {
             refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the step is chosen for the accuracy")

@@ -42,8 +42,8 @@ pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
         (Part::Time, _) => return start.t = value,
         (Part::Velocity | Part::Momentum, _) => return,
     };
-    if let Some(place) = vector.get_mut(entry) {
-        *place = value;
+    if let Some(component) = vector.get_mut(entry) {
+        *component = value;
     }
 }
 

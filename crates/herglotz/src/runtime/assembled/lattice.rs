@@ -137,14 +137,14 @@ impl Lattice {
             system.with_timed_drag(move |t| rate(&timed, t))
         };
         // Component by component, so that the components of neighbours are contiguous in memory.
-        let places = (0..sites).map(|i| -> [usize; D] { std::array::from_fn(|c| c * sites + i) });
-        let mut system = system.with_potential(AtRest(site), places)?;
+        let indices = (0..sites).map(|i| -> [usize; D] { std::array::from_fn(|c| c * sites + i) });
+        let mut system = system.with_potential(AtRest(site), indices)?;
         if let Some(bond) = bond {
             check_bond(&bond)?;
             for along in 0..self.sizes.len() {
                 let ends = self.bonds(along, sites).into_iter().map(|ends| -> [usize; K] {
-                    let place = |c: usize, i: usize| if i == FIXED { FIXED } else { c * sites + i };
-                    std::array::from_fn(|k| place(k % D, ends[usize::from(k >= D)]))
+                    let index_of = |c: usize, i: usize| if i == FIXED { FIXED } else { c * sites + i };
+                    std::array::from_fn(|k| index_of(k % D, ends[usize::from(k >= D)]))
                 });
                 system = system.with_potential(AtRest(bond.clone()), ends)?;
             }
@@ -161,10 +161,10 @@ impl Lattice {
     fn bonds(&self, along: usize, sites: usize) -> Vec<[usize; 2]> {
         let size = self.sizes.get(along).copied().unwrap_or(1);
         let stride: usize = self.sizes.iter().skip(along + 1).product();
-        let place = |i: usize| i / stride % size;
-        let walls = (0..sites).filter(|i| self.boundary == Boundary::Fixed && place(*i) == 0).map(|i| [FIXED, i]);
+        let index_of = |i: usize| i / stride % size;
+        let walls = (0..sites).filter(|i| self.boundary == Boundary::Fixed && index_of(*i) == 0).map(|i| [FIXED, i]);
         let inner = (0..sites).filter_map(|i| match self.boundary {
-            _ if place(i) + 1 < size => Some([i, i + stride]),
+            _ if index_of(i) + 1 < size => Some([i, i + stride]),
             Boundary::Periodic => Some([i, i + stride - size * stride]),
             Boundary::Fixed => Some([i, FIXED]),
             Boundary::Free => None,

@@ -288,7 +288,7 @@ impl AssembledRun<'_, '_> {
             self.last.t = time;
         } else {
             let mut part = Stepper::new(self.of, self.motion.by, time - self.last.t, &self.last)?;
-            part.advance(1).map_err(|halt| halt.cause)?;
+            part.advance(1).map_err(|failure| failure.cause)?;
             if self.motion.conformal_factor {
                 log_factor += part.sigma().ln();
             }

@@ -39,7 +39,7 @@ fn step<const N: usize>(
     let problem = Problem::new(lagrangian, t, Start::from(*from))?;
     let plan = problem.by(by).steps(Steps::Count(count)).plan(Until::After(h))?;
     let mut stepper = plan.stepper()?;
-    stepper.advance(count).map_err(|halt| halt.cause)?;
+    stepper.advance(count).map_err(|failure| failure.cause)?;
     Ok((stepper.state(), stepper.sigma()))
 }
 
@@ -106,7 +106,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
     let mut states: Vec<(f64, PhasePoint<N>, f64)> = vec![(motion.start.t, *problem.state(), 0.0)];
-    let mut seen = |at: &discrete_herglotz::StepView<'_, N>| {
+    let mut record = |at: &discrete_herglotz::StepView<'_, N>| {
         if at.k.is_multiple_of(stride) && !at.last {
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
         }
@@ -116,7 +116,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             ControlFlow::Continue(())
         }
     };
-    problem.by(by).steps(steps).with_conformal_factor().observe(&mut seen).run(Until::Time(motion.end))?;
+    problem.by(by).steps(steps).with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
     let map = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {

@@ -149,8 +149,8 @@ impl<const N: usize> Block<'_, N> {
             }),
         };
         let many = match step_control {
-            StepControl::Accuracy { wanted, by: None } => many.accuracy(wanted),
-            StepControl::Accuracy { wanted, by: Some(by) } => many.by(by).accuracy(wanted),
+            StepControl::Accuracy { error, by: None } => many.accuracy(error),
+            StepControl::Accuracy { error, by: Some(by) } => many.by(by).accuracy(error),
             StepControl::Steps { by, steps } => many.by(by).steps(steps),
         };
         let many = match ensemble.threads {
@@ -158,7 +158,7 @@ impl<const N: usize> Block<'_, N> {
             None => many,
         };
         let many = match self.interrupt {
-            Some(interrupt) => many.with_interrupt(interrupt.asked()),
+            Some(interrupt) => many.with_interrupt(interrupt.for_integrators()),
             None => many,
         };
         let own_columns = |i: usize| match &ensemble.varied {

@@ -71,7 +71,7 @@ impl<const N: usize> Kernel for Sized<N> {
     }
 
     fn symmetries(&self) -> Vec<FormulaSymmetry> {
-        let seen = |symmetry: &Symmetry<N>| match symmetry {
+        let recognised = |symmetry: &Symmetry<N>| match symmetry {
             Symmetry::Translation(a) => Some(FormulaSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
             Symmetry::Rotation(i, j) => Some(FormulaSymmetry::Rotation(vec![(*i, *j)])),
             Symmetry::Rotations(planes) => Some(FormulaSymmetry::Rotation(
@@ -79,7 +79,7 @@ impl<const N: usize> Kernel for Sized<N> {
             )),
             _ => None,
         };
-        self.0.symmetries().iter().filter_map(seen).collect()
+        self.0.symmetries().iter().filter_map(recognised).collect()
     }
 
     fn to_rust(&self, name: &str) -> Result<String, FormulaError> {

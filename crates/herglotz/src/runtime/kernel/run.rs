@@ -16,8 +16,8 @@ fn of<'p, 'o, const N: usize>(
     motion: &Motion,
 ) -> Result<Run<'p, 'o, FormulaLagrangian<N>, N>, RuntimeError> {
     let run = match motion.step_control {
-        StepControl::Accuracy { wanted, by: None } => problem.accuracy(wanted),
-        StepControl::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
+        StepControl::Accuracy { error, by: None } => problem.accuracy(error),
+        StepControl::Accuracy { error, by: Some(by) } => problem.by(by).accuracy(error),
         StepControl::Steps { by, steps } => problem.by(by).steps(steps),
     };
     let run = if motion.action { run } else { run.without_action() };

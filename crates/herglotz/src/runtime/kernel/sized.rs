@@ -56,7 +56,7 @@ impl<const N: usize> Sized<N> {
     pub fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, FormulaLagrangian<N>, N>, RuntimeError> {
         let problem = self.problem(&motion.start)?;
         Ok(match &motion.interrupt {
-            Some(interrupt) => problem.with_interrupt(interrupt.asked()),
+            Some(interrupt) => problem.with_interrupt(interrupt.for_integrators()),
             None => problem,
         })
     }

@@ -67,7 +67,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut report = Report::new(Directory::create(&arguments.out)?);
     report.quick = arguments.quick;
     for (name, size, case) in CASES {
-        if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
+        if arguments.case.iter().any(|requested| requested == "all" || requested == name) {
             report.begin(name, size);
             case(&mut report)?;
         }

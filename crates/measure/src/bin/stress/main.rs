@@ -94,11 +94,11 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut report = Report::new(out, bar);
     report.quick = arguments.quick;
     for (name, title, case) in CASES {
-        if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
-            let clock = Instant::now();
+        if arguments.case.iter().any(|requested| requested == "all" || requested == name) {
+            let start = Instant::now();
             report.begin(name, title)?;
             case(&mut report)?;
-            report.say(&format!("  {:.1} s\n", clock.elapsed().as_secs_f64()))?;
+            report.say(&format!("  {:.1} s\n", start.elapsed().as_secs_f64()))?;
         }
     }
     report.bar.finish_and_clear();

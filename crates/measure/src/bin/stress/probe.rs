@@ -168,7 +168,7 @@ fn standing_clock() -> String {
         let mut run = gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
         Ok(match run.advance_to(1.0) {
             Ok(()) => format!("completed q = {:e}", Stepper::state(&run).q[0]),
-            Err(halt) => format!("halted: {}", halt.cause),
+            Err(failure) => format!("halted: {}", failure.cause),
         })
     };
     described(ended())

@@ -82,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_names("problem", &arguments.problem, &PROBLEMS.map(|problem| problem.name))?;
     check_names("method", &arguments.method, &methods)?;
     let named = |names: &[String], name: &str| names.iter().any(|n| n == "all" || n == name);
-    let wanted = |problem: &Problem, z: Action| {
+    let is_requested = |problem: &Problem, z: Action| {
         let with = arguments.z.is_none_or(|requested| requested == z);
         with && named(&arguments.problem, problem.name)
     };
@@ -91,21 +91,21 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(path) => recorded::read(path, if arguments.all_peers { Peers::All } else { Peers::Heyoka })?,
         None => Vec::new(),
     };
-    rows.retain(|row| PROBLEMS.iter().any(|problem| problem.name == row.problem && wanted(problem, row.z)));
+    rows.retain(|row| PROBLEMS.iter().any(|problem| problem.name == row.problem && is_requested(problem, row.z)));
     let out = Directory::create(&arguments.out)?;
     let chosen: Vec<Entry> = all
         .into_iter()
         .filter(|entry| {
             let shown = matches!(entry.origin, Origin::Peer) || library::DIAGRAMS.contains(&entry.candidate.name());
             let chosen = shown && arguments.method.iter().any(|name| name == "chosen");
-            wanted(entry.problem, entry.z) && (chosen || named(&arguments.method, entry.candidate.name()))
+            is_requested(entry.problem, entry.z) && (chosen || named(&arguments.method, entry.candidate.name()))
         })
         .collect();
     rows.extend(measure(&chosen, Effort { quick: arguments.quick }));
     row::sort(&mut rows);
 
     out.table("work_precision.csv", &row::COLUMNS, rows.iter().map(Row::fields))?;
-    for (problem, z) in variants().filter(|(problem, z)| wanted(problem, *z)) {
+    for (problem, z) in variants().filter(|(problem, z)| is_requested(problem, *z)) {
         diagrams::write(&out, problem, z, &rows)?;
         print(&summary::of(problem, z, &rows))?;
     }

@@ -107,8 +107,8 @@ fn configuration(record: &csv::StringRecord, peers: Peers) -> Result<Option<Conf
     };
     let (peer, error) = (field("peer")?, number("err_qv")?);
     let problem = field("problem")?;
-    let wanted = field("status")? == "ok" && error.is_finite() && (peers == Peers::All || peer == PEER);
-    let Some(problem) = PROBLEMS.iter().find(|p| wanted && p.name == problem) else {
+    let is_used = field("status")? == "ok" && error.is_finite() && (peers == Peers::All || peer == PEER);
+    let Some(problem) = PROBLEMS.iter().find(|p| is_used && p.name == problem) else {
         return Ok(None);
     };
     let seconds = number("wall_med_s")?;
