@@ -5,9 +5,15 @@
 // In a test a missing value is a failure.
 #![allow(clippy::unwrap_used)]
 
+// Other binaries use the rest of it.
+#[allow(dead_code)]
+#[path = "common/counting_allocator.rs"]
+mod counting_allocator;
+
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
+use counting_allocator::allocations;
 use discrete_herglotz::{
     DiscreteLagrangian, Ensemble, GaussCollocation, SplittingScheme, Stepper, Steps, Until,
     boundary::{BoundaryPath, End},
@@ -15,35 +21,6 @@ use discrete_herglotz::{
     rules::{Flow, LeftMidpoint, Method},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
-use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
-use std::cell::Cell;
-
-thread_local! {
-    /// The allocations of this thread, without those of the test runner's threads.
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-#[allow(unsafe_code)] // An allocator cannot be written without.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
-        unsafe { SystemAllocator.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { SystemAllocator.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(action: impl FnOnce()) -> usize {
-    let before = COUNT.with(Cell::get);
-    action();
-    COUNT.with(Cell::get) - before
-}
 
 /// The counter counts.
 #[test]

@@ -10,7 +10,7 @@ fuzz_target!(|text: &str| match Scene::read(text) {
     Ok(scene) => {
         let members = scene.members();
         assert_eq!(scene.motion().start.q.len(), scene.system.dimension());
-        assert!(members.count() == 0 || members.values(0).len() == scene.knobs.len());
+        assert!(members.count() == 0 || members.values(0).len() == scene.swept.len());
     }
     Err(error) => assert!(error.to_string().contains("line "), "{error}"),
 });

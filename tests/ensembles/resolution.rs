@@ -1,7 +1,13 @@
 //! Steps that do not resolve the motion of a member, and steps for an accuracy.
 
-use super::*;
+use super::{By, gauss, members, pendulum_start, splitting};
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::Pendulum;
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::UnresolvedStep;
+use discrete_herglotz::ensemble::{EnsembleError, Member};
+use discrete_herglotz::rules::QuadratureMethod;
+use discrete_herglotz::{Ensemble, InputError, Integrator, Problem, SplittingScheme, Status, Steps, Until};
 
 /// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator whose stiffness is its parameter.
 struct Spring {

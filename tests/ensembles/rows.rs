@@ -1,6 +1,12 @@
 //! Rows of members, and observers of members.
 
-use super::*;
+use super::{Bowl, By, integrators, members, pendulum_start};
+use contact_geom::VelocityPoint;
+use contact_geom::systems::{HarmonicOscillator, Pendulum};
+use discrete_herglotz::ensemble::{EnsembleError, Member};
+use discrete_herglotz::{
+    Ensemble, Event, Events, InputError, Problem, Row, Rows, SplittingScheme, Status, Steps, Until,
+};
 
 #[test]
 fn rows_are_those_of_single_runs() {

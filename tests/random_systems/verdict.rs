@@ -80,7 +80,7 @@ pub fn refused(error: &InputError) -> Verdict {
         InputError::EqualPoints => "equal points",
         InputError::Unclaimed { .. } => "unclaimed",
         InputError::FalseClaim { .. } => "false claim",
-        InputError::Hypothesis { .. } => "hypothesis",
+        InputError::Hypothesis { .. } | InputError::NoTimeTransformation => "hypothesis",
         InputError::FirstStep(_) => "first step",
         _ => "another",
     })

@@ -4,50 +4,13 @@
 // A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../../tests/common/counting_allocator.rs"]
+mod counting_allocator;
+
 use assembled_herglotz::systems::{FputBond, OuterSolarSystem, SineGordon, fput_chain, lattice};
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssemblyError, State};
+use counting_allocator::{allocations, held, peak};
 use discrete_herglotz::SplittingScheme;
-use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
-use std::cell::Cell;
-
-thread_local! {
-    /// Counters of this thread, so that those of the test runner do not count: the number of allocations, the bytes
-    /// held, and their maximum.
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-    static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-fn count(bytes: isize) {
-    let _ = HELD.try_with(|held| {
-        held.set(held.get() + bytes);
-        let _ = MOST.try_with(|most| most.set(most.get().max(held.get())));
-    });
-}
-
-#[allow(unsafe_code)] // An allocator requires unsafe code.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
-        count(layout.size() as isize);
-        unsafe { SystemAllocator.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        unsafe { SystemAllocator.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(action: impl FnOnce()) -> usize {
-    let before = COUNT.with(Cell::get);
-    action();
-    COUNT.with(Cell::get) - before
-}
 
 #[test]
 fn steps() {
@@ -89,17 +52,16 @@ fn steps() {
 #[test]
 fn memory_of_a_chain() {
     let n = 100_000;
-    let before = HELD.with(Cell::get);
-    MOST.with(|most| most.set(before));
-    let (q, v) = (vec![0.5; n], vec![0.1; n]);
-    let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
-    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
-    let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
-    motion.advance(2).unwrap();
-    motion.state();
-    let most = MOST.with(Cell::get) - before;
+    let bytes = peak(|| {
+        let (q, v) = (vec![0.5; n], vec![0.1; n]);
+        let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
+        let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
+        let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
+        motion.advance(2).unwrap();
+        motion.state();
+    });
     // The lists of blocks may take 64 kB more.
-    assert!(most <= 6 * 8 * n as isize + 65_536, "{most} bytes, {} vectors", most as f64 / (8 * n) as f64);
+    assert!(bytes <= 6 * 8 * n as isize + 65_536, "{bytes} bytes, {} vectors", bytes as f64 / (8 * n) as f64);
 }
 
 /// Steps of Gauss collocation with kept factors do not allocate, and the memory held is within the estimate that is
@@ -117,10 +79,10 @@ fn memory_of_gauss() {
         panic!("a byte is not enough");
     };
     assert!(AssembledGauss::new(&system, 2, 0.05, start, Some(needed - 1)).is_err());
-    let before = HELD.with(Cell::get);
+    let before = held();
     let mut motion = AssembledGauss::new(&system, 2, 0.05, start, Some(needed)).unwrap();
     motion.advance(5).unwrap();
-    let held = HELD.with(Cell::get) - before;
+    let held = held() - before;
     // The estimate does not include the vectors, and the pattern and the lists of indices: some 30 and 60 numbers for
     // each unknown.
     assert!(held <= needed as isize + 100 * 8 * n as isize, "{held} bytes are held, {needed} were estimated");

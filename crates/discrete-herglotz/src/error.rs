@@ -166,6 +166,11 @@ pub enum InputError {
         /// The hypothesis.
         hypothesis: &'static str,
     },
+    /// The method needs a time transformation, which the Lagrangian does not state.
+    #[error(
+        "the method needs a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`); take another method or another Lagrangian"
+    )]
+    NoTimeTransformation,
     /// The first step fails.
     #[error("no first step from this start: {0}")]
     FirstStep(StepError),

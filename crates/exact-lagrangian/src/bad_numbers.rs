@@ -10,7 +10,7 @@ use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
 use std::fmt::Debug;
 
 /// The debug output of a result, in which a NaN can be found.
-fn told<A: Debug, E: Debug>(answer: Result<A, E>) -> Option<String> {
+fn described<A: Debug, E: Debug>(answer: Result<A, E>) -> Option<String> {
     answer.ok().map(|a| format!("{a:?}"))
 }
 
@@ -40,66 +40,66 @@ fn exact(h: f64) -> Result<ExactLagrangian<Pendulum, 1>, ExactError<1>> {
 
 /// Each function as a function of `(t, h, q, v, z)`, with the coordinates of the point that it takes.
 const CALLS: &[Call] = &[
-    ("herglotz_flow", |a| told(herglotz_flow(&SYSTEM, a[0], &start(a), a[1]))),
-    ("herglotz_flow back", |a| told(herglotz_flow(&SYSTEM, a[0], &start(a), -a[1]))),
-    ("exp at", |a| told(exponential(a[1]).and_then(|e| e.at(a[0], &start(a))))),
-    ("exp differential", |a| told(exponential(a[1]).and_then(|e| e.differential(a[0], &start(a))))),
-    ("retract", |a| told(exponential(a[1]).and_then(|e| e.retract(a[0], &points(a))))),
-    ("retract_near", |a| told(exponential(a[1]).and_then(|e| e.retract_near(a[0], &points(a), &[a[3]].into())))),
-    ("branches", |a| told(exponential(a[1]).and_then(|e| e.branches(a[0], &points(a), &[[a[3]].into()])))),
-    ("conjugate_points", |a| told(exponential(a[1]).and_then(|e| e.conjugate_points(a[0], &start(a))))),
-    ("exact retract", |a| told(exact(a[1]).and_then(|e| e.near([a[3]].into()).retract(a[0], &points(a))))),
-    ("exact value", |a| exact(a[1]).ok().and_then(|e| told(e.value(a[0], &points(a))))),
-    ("exact jet", |a| exact(a[1]).ok().and_then(|e| told(e.jet(a[0], &points(a))))),
-    ("exact second jet", |a| exact(a[1]).ok().and_then(|e| told(e.second_jet(a[0], &points(a))))),
+    ("herglotz_flow", |a| described(herglotz_flow(&SYSTEM, a[0], &start(a), a[1]))),
+    ("herglotz_flow back", |a| described(herglotz_flow(&SYSTEM, a[0], &start(a), -a[1]))),
+    ("exp at", |a| described(exponential(a[1]).and_then(|e| e.at(a[0], &start(a))))),
+    ("exp differential", |a| described(exponential(a[1]).and_then(|e| e.differential(a[0], &start(a))))),
+    ("retract", |a| described(exponential(a[1]).and_then(|e| e.retract(a[0], &points(a))))),
+    ("retract_near", |a| described(exponential(a[1]).and_then(|e| e.retract_near(a[0], &points(a), &[a[3]].into())))),
+    ("branches", |a| described(exponential(a[1]).and_then(|e| e.branches(a[0], &points(a), &[[a[3]].into()])))),
+    ("conjugate_points", |a| described(exponential(a[1]).and_then(|e| e.conjugate_points(a[0], &start(a))))),
+    ("exact retract", |a| described(exact(a[1]).and_then(|e| e.near([a[3]].into()).retract(a[0], &points(a))))),
+    ("exact value", |a| exact(a[1]).ok().and_then(|e| described(e.value(a[0], &points(a))))),
+    ("exact jet", |a| exact(a[1]).ok().and_then(|e| described(e.jet(a[0], &points(a))))),
+    ("exact second jet", |a| exact(a[1]).ok().and_then(|e| described(e.second_jet(a[0], &points(a))))),
     ("exact forward", |a| {
-        exact(a[1]).ok().and_then(|e| told(e.forward(a[0], &phase(a), &[a[3]].into(), &mut Solver::default())))
+        exact(a[1]).ok().and_then(|e| described(e.forward(a[0], &phase(a), &[a[3]].into(), &mut Solver::default())))
     }),
     ("exact backward", |a| {
-        exact(a[1]).ok().and_then(|e| told(e.backward(a[0], &phase(a), &[a[3]].into(), &mut Solver::default())))
+        exact(a[1]).ok().and_then(|e| described(e.backward(a[0], &phase(a), &[a[3]].into(), &mut Solver::default())))
     }),
     ("quadratic value", |a| {
         QuadraticExact::new(&HarmonicOscillator { gamma: -0.1 }, a[1])
             .ok()
-            .and_then(|l| told(l.value(a[0], &points(a))))
+            .and_then(|l| described(l.value(a[0], &points(a))))
     }),
-    ("quadratic drag", |a| told(QuadraticExact::new(&HarmonicOscillator { gamma: a[3] }, a[1]))),
+    ("quadratic drag", |a| described(QuadraticExact::new(&HarmonicOscillator { gamma: a[3] }, a[1]))),
     ("chetaev", |a| {
         let system = NonHolonomic::new(SYSTEM);
-        told(system.chetaev(a[0], &system.lift(a[0], &start(a))))
+        described(system.chetaev(a[0], &system.lift(a[0], &start(a))))
     }),
     ("chetaev flow", |a| {
         let system = NonHolonomic::new(SYSTEM);
-        told(system.flow(a[0], &system.lift(a[0], &start(a)), a[1]))
+        described(system.flow(a[0], &system.lift(a[0], &start(a)), a[1]))
     }),
-    ("chetaev differential", |a| told(NonHolonomic::new(SYSTEM).exponential_differential(a[0], &start(a), a[1]))),
-    ("projection", |a| told(NonHolonomic::new(SYSTEM).projection_regularity(a[0], &start(a), a[1]))),
+    ("chetaev differential", |a| described(NonHolonomic::new(SYSTEM).exponential_differential(a[0], &start(a), a[1]))),
+    ("projection", |a| described(NonHolonomic::new(SYSTEM).projection_regularity(a[0], &start(a), a[1]))),
     ("action", |a| {
         let curve = move |s: f64| (SVector::from([a[2] + a[3] * s]), SVector::from([a[3]]));
-        told(action(&SYSTEM, &curve, (a[0], a[1]), a[4]))
+        described(action(&SYSTEM, &curve, (a[0], a[1]), a[4]))
     }),
     ("action_derivative", |a| {
         let curve = move |s: f64| (SVector::from([a[2] + a[3] * s]), SVector::from([a[3]]));
-        told(action_derivative(&SYSTEM, &curve, &curve, (a[0], a[1]), (a[4], a[3])))
+        described(action_derivative(&SYSTEM, &curve, &curve, (a[0], a[1]), (a[4], a[3])))
     }),
-    ("motion curve", |a| told(MotionCurve { lagrangian: &SYSTEM, t0: a[0], start: start(a) }.at(a[1]))),
+    ("motion curve", |a| described(MotionCurve { lagrangian: &SYSTEM, t0: a[0], start: start(a) }.at(a[1]))),
     ("spline", |a| {
         let nodes = [[0.1], [a[2]], [a[3]]].map(SVector::from);
         SplineCurve::new(&[a[0], a[0] + a[1], a[4] + 9.0], &nodes, None)
             .ok()
-            .and_then(|s| told(s.at(a[0] + 0.5 * a[1])))
+            .and_then(|s| described(s.at(a[0] + 0.5 * a[1])))
     }),
     ("compose", |a| {
         let one = exact(a[1]).ok()?;
-        told(compose(&one, &one, a[0], (&[[a[2]].into(), [a[3]].into()], a[4]), &[0.5 * (a[2] + a[3])].into()))
+        described(compose(&one, &one, a[0], (&[[a[2]].into(), [a[3]].into()], a[4]), &[0.5 * (a[2] + a[3])].into()))
     }),
     ("through", |a| {
         let one = exact(a[1]).ok()?;
-        told(through(&one, &one, a[0], (&[[a[2]].into(), [a[3]].into()], a[4]), &[0.5 * (a[2] + a[3])].into()))
+        described(through(&one, &one, a[0], (&[[a[2]].into(), [a[3]].into()], a[4]), &[0.5 * (a[2] + a[3])].into()))
     }),
-    ("error_orders", |a| told(error_orders(&SYSTEM, |h| Midpoint::new(SYSTEM, h), a[0], &start(a), a[1]))),
-    ("condition", |a| told(statements::condition(&SYSTEM, a[0], &start(a), a[1]))),
-    ("follows_motion", |a| told(statements::follows_motion(&SYSTEM, a[0], &start(a), a[1], 2))),
+    ("error_orders", |a| described(error_orders(&SYSTEM, |h| Midpoint::new(SYSTEM, h), a[0], &start(a), a[1]))),
+    ("condition", |a| described(statements::condition(&SYSTEM, a[0], &start(a), a[1]))),
+    ("follows_motion", |a| described(statements::follows_motion(&SYSTEM, a[0], &start(a), a[1], 2))),
 ];
 
 /// Replaces one argument at a time by a bad number.
@@ -110,9 +110,9 @@ fn one_at_a_time() {
     let mut found = Vec::new();
     for (name, call) in CALLS {
         assert!(call(good).is_some(), "{name} refuses good numbers");
-        for (place, number) in (0..good.len()).flat_map(|p| bad.map(|b| (p, b))) {
+        for (position, number) in (0..good.len()).flat_map(|p| bad.map(|b| (p, b))) {
             let mut arguments = good;
-            arguments[place] = number;
+            arguments[position] = number;
             let since = std::time::Instant::now();
             let answer = call(arguments);
             // The work of one motion, and of a whole search, is bounded by about a second; 10 s allow for a busy

@@ -1,7 +1,7 @@
 //! Errors of exact motions, and of their input.
 
 use contact_geom::{GeometryError, VelocityPoint};
-use discrete_herglotz::{InputError, StepError};
+use discrete_herglotz::{InputError, StepError, solve::ITERATION_LIMIT};
 use thiserror::Error;
 
 /// The reason why a motion, or the motion between two points, could not be computed. Errors along a motion carry the
@@ -80,7 +80,7 @@ impl<const N: usize> From<ExactError<N>> for StepError {
             ExactError::Input(_) => StepError::NonFinite,
             ExactError::OutsideDomain { t, .. } | ExactError::Unfinished { t, .. } => StepError::OutsideDomain { t },
             ExactError::NotConverged { residual, .. } => {
-                StepError::NotConverged { residual, iterations: crate::map::ITERATIONS }
+                StepError::NotConverged { residual, iterations: ITERATION_LIMIT }
             }
             ExactError::ConjugatePoint { smallest, .. } => StepError::ConjugatePoint { smallest },
         }

@@ -70,7 +70,7 @@ struct Affine<const N: usize> {
 
 /// The tolerance for derivatives that are zero according to a claim, relative to the size of their terms: some thousand
 /// units of round-off, for Lagrangians whose constants are themselves rounded.
-const FALSE_CLAIM: f64 = 1e-12;
+const CLAIM_TOLERANCE: f64 = 1e-12;
 
 impl<const N: usize> QuadraticExact<N> {
     /// The exact discrete Lagrangian of a Lagrangian that is declared autonomous and quadratic in its
@@ -323,7 +323,7 @@ fn check_claims<const N: usize>(lagrangian: &impl Lagrangian<N>) -> Result<(), I
     };
     let mut defects =
         structure.defects(lagrangian, 0.7, &x).ok_or(GeometryError::Undefined { what: "the Lagrangian" })?;
-    match defects.find(|d| d.size > FALSE_CLAIM) {
+    match defects.find(|d| d.size > CLAIM_TOLERANCE) {
         Some(defect) => Err(InputError::FalseClaim { claim: defect.claim, size: defect.size }),
         None => Ok(()),
     }

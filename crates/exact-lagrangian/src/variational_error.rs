@@ -40,6 +40,7 @@ impl std::fmt::Display for Order {
 
 /// An order measured as the slope of an error against the time step, both on a logarithmic scale.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MeasuredOrder {
     /// The order.
     pub order: Order,
@@ -59,6 +60,7 @@ pub struct MeasuredOrder {
 /// cancel to leading order. This is proved in Patrick and Cuell, "Error analysis of variational integrators of
 /// unconstrained Lagrangian systems", Numer. Math. 113 (2009).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorOrders {
     /// The order of `|L_d - L_h^e|`.
     pub value: MeasuredOrder,
@@ -70,15 +72,15 @@ pub struct ErrorOrders {
     pub flow: MeasuredOrder,
 }
 
-/// The number of time steps, from the largest by factors of the square root of two.
+/// The number of time steps, from the largest by factors of the square root of two: down to 3e-7 times the largest.
 const STEPS: usize = 44;
 
-/// The number of steps that are fitted, if so many are above the plateau.
-const FIT: usize = 8;
+/// The number of steps that are fitted, if so many are above the plateau: a factor of ten in h.
+const FITTED_STEPS: usize = 8;
 
 /// The factor by which an error must exceed its round-off to be used. The slope of a fit over a factor of ten in h then
 /// has an error of less than 0.01.
-const CLEAR: f64 = 200.0;
+const MIN_ERROR_OVER_ROUND_OFF: f64 = 200.0;
 
 /// Measures the orders of a discrete Lagrangian, given as a function of the time step, along the motion from a start at
 /// time t. `largest` is the largest step tried; the others are smaller by factors of the square root of two. For a
@@ -157,24 +159,24 @@ struct Row {
     floor: f64,
 }
 
-/// The number of smallest steps that show the round-off plateau if their errors do not decrease.
-const PLATEAU: usize = 8;
+/// The number of smallest steps that show the round-off plateau if their errors do not decrease: as many as are fitted.
+const PLATEAU_STEPS: usize = 8;
 
 /// The largest slope of a plateau: half of the lowest possible order.
-const FLAT: f64 = 0.5;
+const MAX_PLATEAU_SLOPE: f64 = 0.5;
 
 /// Raises the round-off of the errors, if it is too low, to the plateau of the smallest steps. The plateau is constant
 /// or grows by at most `1/h`, as it does where momenta are differences of positions divided by h.
 fn raise_floors(rows: &mut [Row]) {
-    let smallest = &rows[rows.len().saturating_sub(PLATEAU)..];
-    let seen: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
-    if seen.len() < PLATEAU || !smallest.iter().any(|r| r.error > CLEAR * r.floor) {
+    let smallest = &rows[rows.len().saturating_sub(PLATEAU_STEPS)..];
+    let positive: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
+    if positive.len() < PLATEAU_STEPS || !smallest.iter().any(|r| r.error > MIN_ERROR_OVER_ROUND_OFF * r.floor) {
         return;
     }
-    let slope = least_squares_slope(&seen);
-    if slope < FLAT {
+    let slope = least_squares_slope(&positive);
+    if slope < MAX_PLATEAU_SLOPE {
         let slope = slope.clamp(-1.0, 0.0);
-        let level = seen.iter().map(|(h, e)| e.ln() - slope * h.ln()).sum::<f64>() / seen.len() as f64;
+        let level = positive.iter().map(|(h, e)| e.ln() - slope * h.ln()).sum::<f64>() / positive.len() as f64;
         rows.iter_mut().for_each(|r| r.floor = max_or_nan(r.floor, (level + slope * r.h.ln()).exp()));
     }
 }
@@ -183,8 +185,8 @@ fn fit(mut rows: Vec<Row>) -> MeasuredOrder {
     raise_floors(&mut rows);
     let errors = rows.iter().map(|r| (r.h, r.error)).collect();
     let clear: Vec<(f64, f64)> =
-        rows.iter().take_while(|r| r.error > CLEAR * r.floor).map(|r| (r.h, r.error)).collect();
-    let fitted = clear[clear.len().saturating_sub(FIT)..].to_vec();
+        rows.iter().take_while(|r| r.error > MIN_ERROR_OVER_ROUND_OFF * r.floor).map(|r| (r.h, r.error)).collect();
+    let fitted = clear[clear.len().saturating_sub(FITTED_STEPS)..].to_vec();
     let order = match fitted.len() {
         0 if rows.is_empty() => Order::Unclear,
         0 => Order::Exact,

@@ -3,38 +3,15 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+// Other binaries use the rest of it.
+#[allow(dead_code)]
+#[path = "../../../tests/common/counting_allocator.rs"]
+mod counting_allocator;
+
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
+use counting_allocator::allocations;
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
-use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
-use std::cell::Cell;
-
-thread_local! {
-    /// The allocations of this thread, so that those of the test runner do not count.
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-#[allow(unsafe_code)] // An allocator requires unsafe code.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
-        unsafe { SystemAllocator.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { SystemAllocator.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(action: impl FnOnce()) -> usize {
-    let before = COUNT.with(Cell::get);
-    action();
-    COUNT.with(Cell::get) - before
-}
 
 #[test]
 fn nothing_is_allocated() {

@@ -37,7 +37,7 @@ impl Failure {
     }
 
     /// Prints the error, and returns the exit code: 1 for a run, 2 for input.
-    pub fn tell(&self) -> ExitCode {
+    pub fn report(&self) -> ExitCode {
         // A reader that closes the output early is not an error.
         if matches!(self, Failure::Output(cause) if cause.kind() == std::io::ErrorKind::BrokenPipe) {
             return ExitCode::SUCCESS;

@@ -10,4 +10,4 @@ pub mod runtime;
 mod scene;
 
 #[cfg(feature = "scenes")]
-pub use scene::{EndsScene, Knob, LatticeScene, Members, Scene, SceneError, schema};
+pub use scene::{EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, schema};

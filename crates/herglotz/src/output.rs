@@ -58,8 +58,8 @@ pub(crate) struct Directory(PathBuf);
 
 impl Directory {
     /// The requested directory, or one in the current directory with the name of the scene.
-    pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Self {
-        Directory(wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
+    pub fn new(requested: Option<PathBuf>, scene: &Path) -> Self {
+        Directory(requested.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
     }
 
     /// Creates the directory; called when there is output to write.
@@ -117,7 +117,7 @@ impl Table {
     }
 
     /// Continues a file after a number of bytes; anything after them is dropped.
-    pub fn go_on(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
+    pub fn resume(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
         let open = || -> std::io::Result<File> {
             let file = OpenOptions::new().append(true).open(&path)?;
             if file.metadata()?.len() < bytes {

@@ -7,7 +7,7 @@ use differential_equations::traits::State;
 use herglotz::runtime::{FirstOrder, Peer, PeerEnd};
 
 /// The maximal number of steps of a run; runs that need more are left out of the comparison.
-const MOST_STEPS: usize = 100_000;
+const MAX_STEPS: usize = 100_000;
 
 /// `dop853` of the crate differential-equations.
 pub(crate) struct Dop853;
@@ -64,7 +64,7 @@ where
     for<'m> Rates<'m>: ODE<f64, Y>,
 {
     let rates = Rates(motion);
-    let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(tolerance * motion.size).max_steps(MOST_STEPS);
+    let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(tolerance * motion.size).max_steps(MAX_STEPS);
     let solved = IVP::ode(&rates, motion.t0, motion.end, start).t_eval([motion.end]).method(method).solve().ok()?;
     Some(PeerEnd {
         state: numbers(solved.y.last()?),

@@ -6,13 +6,13 @@ use herglotz::{EndsScene, LatticeScene, Scene};
 use std::collections::BTreeSet;
 
 /// The maximal number of points of a curve; more points are not visible.
-const POINTS: usize = 2000;
+const MAX_POINTS: usize = 2000;
 
-/// From this number on, single points are drawn as dots.
-const MANY: usize = 500;
+/// From this number on, the points of a section are drawn as dots, so that they do not cover each other.
+const MIN_SECTION_POINTS: usize = 500;
 
-/// The number of panels in a row.
-const IN_A_ROW: usize = 3;
+/// The number of panels in a row: three fit the width of a page.
+const PANELS_IN_A_ROW: usize = 3;
 
 /// The families of integrators, with the number of integrators of each that are drawn in a comparison.
 const FAMILIES: [(&str, usize); 5] =
@@ -22,11 +22,12 @@ const FAMILIES: [(&str, usize); 5] =
 const RULES: [&str; 4] = ["rectangle", "left_midpoint", "midpoint", "trapezoidal"];
 
 /// A run was delayed by other load on the machine if it takes this many times as long as a run with more steps, or as a
-/// run with fewer, but at least half as many, steps.
-const HELD_UP: (f64, f64) = (2.0, 8.0);
+/// run with fewer, but at least half as many, steps. Run time is proportional to the number of steps, up to small
+/// variations, so that both factors are far outside the usual.
+const OUTLIER: (f64, f64) = (2.0, 8.0);
 
-/// The maximal length of an axis label, in characters.
-const LABEL: usize = 30;
+/// The maximal length of an axis label, in characters: as many as fit along an axis.
+const MAX_LABEL_LENGTH: usize = 30;
 
 /// A quantity on an axis: its name, and whether it is an angle.
 #[derive(Clone, Copy)]
@@ -61,27 +62,27 @@ pub(crate) fn of_path(scene: &EndsScene, rows: &[Vec<f64>]) -> Vec<(String, Stri
 }
 
 fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[Vec<f64>]) -> Vec<(String, String)> {
-    let stride = rows.len().div_ceil(POINTS).max(1);
+    let stride = rows.len().div_ceil(MAX_POINTS).max(1);
     let of = |i: usize, j: usize| -> Vec<(f64, f64)> {
         let points = rows.iter().step_by(stride).chain(rows.last());
         points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
     };
-    let place = |wanted: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| wanted(column));
+    let position = |is_requested: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| is_requested(column));
     let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, of(i, j));
     let mut figures = Vec::new();
-    if let Some(t) = place(&|column| matches!(column, Column::Time)) {
+    if let Some(t) = position(&|column| matches!(column, Column::Time)) {
         let panels: Vec<Panel> = (0..columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
         figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
     }
     let portraits = (0..dimension).filter_map(|k| {
-        let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
-        let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
+        let q = position(&|column| matches!(column, Column::Position(i) if *i == k))?;
+        let v = position(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
         of_pair(q, v)
     });
     let panels: Vec<Panel> = portraits.collect();
     figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
     let positions: Vec<usize> =
-        (0..dimension).filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
+        (0..dimension).filter_map(|k| position(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
     if let [x, y, ..] = positions.as_slice() {
         figures.extend(of_pair(*x, *y).map(|panel| ("path.svg".to_owned(), draw(&panel))));
     }
@@ -108,27 +109,27 @@ pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Opti
 }
 
 /// The figure of one column against the swept value, over the members of a sweep.
-pub(crate) fn of_sweep(scene: &Scene, knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
-    let quantities = [Quantity::plain(knob), Quantity::of(scene, column)];
+pub(crate) fn of_sweep(scene: &Scene, quantity: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
+    let quantities = [Quantity::plain(quantity), Quantity::of(scene, column)];
     panel(quantities, single(points.len()), points).map(|panel| draw(&panel))
 }
 
 /// The style in which a number of single points is drawn.
 fn single(count: usize) -> Line {
-    if count < MANY { Line::Discs } else { Line::Dots }
+    if count < MIN_SECTION_POINTS { Line::Discs } else { Line::Dots }
 }
 
 /// Panels in a grid; a single panel has no letter.
 fn grid(panels: &[Panel]) -> String {
     match panels {
         [one] => draw(one),
-        several => draw_grid(several, if several.len() == 4 { 2 } else { several.len().min(IN_A_ROW) }),
+        several => draw_grid(several, if several.len() == 4 { 2 } else { several.len().min(PANELS_IN_A_ROW) }),
     }
 }
 
 /// One curve with axes that fit it; angles are reduced to -pi to pi.
 fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
-    let label = |name: &str| match name.char_indices().nth(LABEL) {
+    let label = |name: &str| match name.char_indices().nth(MAX_LABEL_LENGTH) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_owned(),
     };
@@ -208,8 +209,8 @@ fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     let rows: Vec<&Work> = comparison.rows.iter().chain(&comparison.peers).filter(shown).collect();
     let held_up = |row: &Work| {
         rows.iter().filter(|other| other.integrator == row.integrator).any(|other| {
-            other.steps > row.steps && row.seconds > HELD_UP.0 * other.seconds
-                || other.steps < row.steps && 2 * other.steps >= row.steps && row.seconds > HELD_UP.1 * other.seconds
+            other.steps > row.steps && row.seconds > OUTLIER.0 * other.seconds
+                || other.steps < row.steps && 2 * other.steps >= row.steps && row.seconds > OUTLIER.1 * other.seconds
         })
     };
     rows.iter().copied().filter(|row| !held_up(row)).collect()
@@ -251,9 +252,11 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     }))
 }
 
-/// The maximal number of curves of a space-time figure, and of points of each.
-const PROFILES: usize = 40;
-const PLACES: usize = 150;
+/// The maximal number of curves of a space-time figure; more are too close to be distinguished.
+const MAX_PROFILES: usize = 40;
+
+/// The maximal number of points of each of these curves.
+const MAX_PROFILE_SITES: usize = 150;
 
 /// The figures of a lattice with their file names: the first component at all sites, as curves at successive times
 /// above each other, and the same component at three sites against time. For lattices with several directions, the
@@ -271,7 +274,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
     let name = scene.coordinates.first().map_or("x", String::as_str);
     let value = |row: &[f64], i: usize| Some((*row.first()?, *row.get(1 + d * (first + i))?));
     let mut figures = Vec::new();
-    let stride = rows.len().div_ceil(PROFILES).max(1);
+    let stride = rows.len().div_ceil(MAX_PROFILES).max(1);
     let chosen: Vec<&Vec<f64>> = rows.iter().step_by(stride).collect();
     let sizes = chosen.iter().flat_map(|row| (0..length).filter_map(|i| value(row, i))).map(|(_, x)| x.abs());
     let largest = sizes.fold(0.0, f64::max);
@@ -279,7 +282,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
     if let ([start, .., end], true) = (times.as_slice(), largest > 0.0 && largest.is_finite()) {
         // The largest value is drawn 2.5 times as high as the distance of two curves.
         let height = 2.5 * (end - start) / (times.len() - 1) as f64 / largest;
-        let every = length.div_ceil(PLACES).max(1);
+        let every = length.div_ceil(MAX_PROFILE_SITES).max(1);
         let curves: Vec<Curve> = chosen
             .iter()
             .map(|row| {
@@ -303,7 +306,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
             figures.push(("space-time.svg".to_owned(), draw(&panel)));
         }
     }
-    let stride = rows.len().div_ceil(POINTS).max(1);
+    let stride = rows.len().div_ceil(MAX_POINTS).max(1);
     let panels: Vec<Panel> = [0, length / 4, length / 2]
         .into_iter()
         .collect::<BTreeSet<usize>>()

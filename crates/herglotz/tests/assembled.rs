@@ -37,12 +37,12 @@ fn small_rows(text: &str, coordinates: &str, parameters: &[(&str, f64)], motion:
     columns.extend((0..n).map(Column::Momentum));
     columns.extend([Column::Action, Column::Energy]);
     columns.extend(motion.conformal_factor.then_some(Column::LogFactor));
-    let way = StepControl::Steps { by: motion.by, steps: motion.steps };
+    let step_control = StepControl::Steps { by: motion.by, steps: motion.steps };
     let asked = Motion {
         rows: Some(motion.rows.clone()),
         columns,
         conformal_factor: motion.conformal_factor,
-        ..Motion::new(motion.start.clone(), motion.end, way)
+        ..Motion::new(motion.start.clone(), motion.end, step_control)
     };
     system.record(&asked).unwrap().1
 }
@@ -146,7 +146,7 @@ fn few_bodies_are_the_small_system_of_their_formula() {
             }
         }
         for name in ["strang", "blanes_moan_6", "midpoint"] {
-            let start = Start { t: 0.0, q: q.clone(), rate: InitialVelocity::Velocity(v.clone()), z: 0.0 };
+            let start = Start { t: 0.0, q: q.clone(), velocity: InitialVelocity::Velocity(v.clone()), z: 0.0 };
             let motion = AssembledMotion::new(start, 1.0, by(name), Steps::Count(20));
             let (_, found) = bodies.record(&motion).unwrap();
             let off = distance(&found, &small_rows(&text, &format!("q[{n}]"), &[], &motion));

@@ -2,13 +2,19 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
-use contact_geom::systems as typed;
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
+#[path = "motions/catalogue.rs"]
+mod catalogue;
+#[path = "motions/dimensions.rs"]
+mod dimensions;
+#[path = "motions/ensembles.rs"]
+mod ensembles;
+
+use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};
 use formula_lagrangian::Formula;
 use herglotz::runtime::{
-    CATALOGUE, CatalogueEntry, Check, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes,
-    Place, RunMonitor, RuntimeError, SeenSymmetry, Start, StepControl, System, Varied,
+    CatalogueEntry, Check, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes, RunMonitor,
+    RuntimeError, Sample, Start, StepControl, System, Varied,
 };
 use std::ops::ControlFlow;
 
@@ -18,8 +24,8 @@ fn by_steps(count: usize) -> StepControl {
     StepControl::Steps { by: GAUSS, steps: Steps::Count(count) }
 }
 
-fn accurate(wanted: f64) -> StepControl {
-    StepControl::Accuracy { wanted, by: None }
+fn accurate(error: f64) -> StepControl {
+    StepControl::Accuracy { error, by: None }
 }
 
 fn pendulum() -> System {
@@ -28,192 +34,6 @@ fn pendulum() -> System {
 
 fn start_of(entry: &CatalogueEntry) -> Start {
     Start::new(entry.t, entry.q, entry.v, 0.2)
-}
-
-/// Checks that the Herglotz field of a catalogue entry is that of the type.
-fn same<const N: usize>(name: &str, lagrangian: &impl Lagrangian<N>) {
-    let entry = CatalogueEntry::find(name).unwrap();
-    let system = System::new(&entry.formula().unwrap()).unwrap();
-    let x = VelocityPoint::<N>::from_slices(entry.q, entry.v, 0.2).unwrap();
-    let field = herglotz_field(lagrangian, entry.t, &x).unwrap().to_vector();
-    let geometry = system.geometry(&start_of(entry)).unwrap();
-    let size = field.amax();
-    for (found, expected) in geometry.herglotz_field.iter().zip(&field) {
-        assert!((found - expected).abs() <= 16.0 * f64::EPSILON * size, "{name}: {found} and {expected}");
-    }
-    let rate = lagrangian.gradient(entry.t, &x).z;
-    assert!((geometry.rate - rate).abs() <= 16.0 * f64::EPSILON, "{name}: {}", geometry.rate);
-}
-
-#[test]
-fn the_catalogue_has_the_formulas_of_the_types() {
-    same("free_particle", &typed::FreeParticle { gamma: -0.1 });
-    same("uniform_field", &typed::UniformField::<2> { field: [0.0, -1.0], gamma: -0.1 });
-    same("harmonic_oscillator", &typed::HarmonicOscillator { gamma: -0.1 });
-    same("pendulum", &typed::Pendulum { gamma: -0.1 });
-    same("duffing", &typed::Duffing { alpha: -1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.3 });
-    same("quadratic_in_z", &typed::QuadraticInZ { c: 0.1 });
-    same("coupled_in_z", &typed::CoupledInZ { a: 0.5, b: 0.1, gamma: -0.1 });
-    same("relativistic", &typed::Relativistic { gamma: -0.1 });
-    same("lane_emden", &typed::LaneEmden { n: 5 });
-    same("kepler", &typed::Kepler::<2> { mu: 1.0, gamma: -0.01 });
-    same("kepler_in_space", &typed::Kepler::<3> { mu: 1.0, gamma: -0.01 });
-    same("perturbed_kepler", &typed::PerturbedKepler { mu: 1.0, alpha: 0.01, theta: std::f64::consts::PI });
-    same("charged_particle", &typed::ChargedParticle { b: 1.0, k: 0.5, gamma: -0.1 });
-    same("double_pendulum", &typed::DoublePendulum { masses: [1.0; 2], lengths: [1.0; 2], gamma: -0.1 });
-    same("spherical_pendulum", &typed::SphericalPendulum { gamma: -0.1 });
-    same("coupled_plane", &typed::CoupledPlane { a: 0.3, b: 0.4, c: 0.3 });
-    same("chain", &typed::Chain::<6> { ends: typed::Ends::Fixed, beta: 0.5, gamma: -0.1 });
-    assert_eq!(CATALOGUE.len(), 17, "each is compared above");
-}
-
-#[test]
-fn every_entry_runs_and_its_steps_are_contact() {
-    for entry in CATALOGUE {
-        let system = System::new(&entry.formula().unwrap()).unwrap();
-        let motion = Motion::new(start_of(entry), entry.t + 3.0, accurate(1e-9));
-        let outcome = system.run(&motion, &mut ()).unwrap();
-        assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "{}", entry.name);
-        let check = system.check(&motion, 3).unwrap_or_else(|error| panic!("{}: {error}", entry.name));
-        assert!(check.is_contact(), "{}: {:e}", entry.name, check.contact_defect());
-        assert!(check.momentum_defect() <= 1e-11, "{}: {:e}", entry.name, check.momentum_defect());
-        for place in &check.places {
-            // The whole motion has an error of 1e-9, so the error of a single step is below this bound.
-            assert!(place.herglotz_defect <= 1e-8, "{}: {:e}", entry.name, place.herglotz_defect);
-        }
-        assert!(check.statements.len() >= 12, "{}", entry.name);
-        for stated in &check.statements {
-            assert!(stated.residual <= 1e-9, "{}: {:?} {:e}", entry.name, stated.statement, stated.residual);
-        }
-    }
-}
-
-/// The energy decays with the conformal factor, to the requested accuracy, in any number of coordinates.
-#[test]
-fn one_to_sixteen_coordinates() {
-    for n in 1..=16 {
-        let text = "sum(i, 0, n-1, v[i]^2 - q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 + gamma*z";
-        let system = System::parse(text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
-        assert_eq!(system.dimension(), n);
-        let motion = Motion {
-            rows: Some(OutputTimes::Every(usize::MAX)),
-            columns: vec![Column::Energy, Column::LogFactor],
-            ..Motion::new(Start::new(0.0, vec![0.7; n], vec![0.1; n], 0.0), 5.0, accurate(1e-10))
-        };
-        let (outcome, rows) = system.record(&motion).unwrap();
-        let ([first, last], [from, to]) = ([rows[0][0], rows[1][0]], [rows[0][1], rows[1][1]]);
-        assert_eq!((outcome.status, from), (Status::Completed, 0.0));
-        assert!((to + 1.0).abs() < 1e-14, "the factor is e^(gamma t): {to}");
-        assert!((last / (first * to.exp()) - 1.0).abs() < 1e-9, "{n}: {first} to {last}");
-    }
-    let error = System::parse("q[0]", &["q[17]"], &[]).err().unwrap();
-    assert!(error.to_string().contains("1 to 16"), "{error}");
-}
-
-/// The general case in sixteen coordinates fits into the stack of a thread: masses that depend on all positions, a rate
-/// that depends on z.
-#[test]
-fn sixteen_coupled_coordinates() {
-    let mass = "sum(i, 0, n-1, v[i]^2) + 0.05*sum(i, 0, n-1, v[i]*cos(q[i]))^2";
-    let text = format!("({mass})/2 + sum(i, 0, n-1, cos(q[i])) + 0.1*cos(sum(i, 0, n-1, q[i])) - 0.05*z^2");
-    let system = System::parse(&text, &["x[16]"], &[]).unwrap();
-    let start = Start::new(0.0, vec![0.3; 16], (0..16).map(|i| 0.05 * f64::from(i)).collect::<Vec<_>>(), 0.5);
-    let of = |way: StepControl| system.run(&Motion::new(start.clone(), 2.0, way), &mut ()).unwrap();
-    let exact = of(accurate(1e-10));
-    let six = of(StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) });
-    assert_eq!((exact.status, six.status), (Status::Completed, Status::Completed));
-    for (a, b) in exact.q.iter().zip(&six.q).chain(exact.p.iter().zip(&six.p)) {
-        assert!((a - b).abs() < 1e-9, "{a} and {b}");
-    }
-    let all = |_: usize| start.clone();
-    let many = Ensemble {
-        count: 12,
-        start: &all,
-        t0: 0.0,
-        varied: None,
-        end: 2.0,
-        way: StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
-        rows: None,
-        columns: &[],
-        events: &[],
-        threads: Some(2),
-    };
-    for member in members(&system, &many) {
-        let ending = member.ending.unwrap();
-        assert!(ending.q.iter().zip(&six.q).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", ending.q);
-    }
-}
-
-/// Ten coordinates are computed with the kernel for sixteen, and the other six are not visible: the motion is that of
-/// its two parts, which have kernels of their own, and the geometry is that of ten coordinates.
-#[test]
-fn what_fills_a_kernel_is_not_seen() {
-    // Pendula with masses 1, 2, ..., coupled by springs.
-    let chain = |from: usize, to: usize, mass: usize| {
-        let springs = format!("sum(i, {from}+1, {to}, (q[i] - q[i-1])^4)");
-        format!("(sum(i, {from}, {to}, v[i]^2*(i + {mass})) + sum(i, {from}, {to}, cos(q[i])) - {springs})/2")
-    };
-    let whole = format!("{} + {} + gamma*z", chain(0, 6, 1), chain(7, 9, 1));
-    let system = System::parse(&whole, &["x[10]"], &[("gamma", -0.2)]).unwrap();
-    let (q, v): (Vec<f64>, Vec<f64>) = (0..10).map(|i| (0.1 * f64::from(i) - 0.3, 0.4 - 0.07 * f64::from(i))).unzip();
-    let start = Start::new(0.0, q.clone(), v.clone(), 0.0);
-    let event = Event::new(system.formula().expression("x[8] - x'[9]").unwrap());
-    let motion = Motion {
-        nodes: true,
-        resumable: true,
-        events: vec![event],
-        rows: Some(OutputTimes::Every(8)),
-        columns: vec![Column::Position(9), Column::parse("sum(i, 0, n-1, q[i])", system.formula()).unwrap()],
-        ..Motion::new(start.clone(), 6.0, by_steps(24))
-    };
-    let mut seen = Seen::default();
-    let outcome = system.run(&motion, &mut seen).unwrap();
-    assert_eq!((outcome.q.len(), outcome.p.len(), outcome.v.as_ref().unwrap().len()), (10, 10, 10));
-    let last = seen.rows.last().unwrap();
-    assert_eq!(last[0], outcome.q[9]);
-    assert!((last[1] - outcome.q.iter().sum::<f64>()).abs() < 1e-14);
-    assert!(!seen.crossings.is_empty());
-    assert!(seen.crossings.iter().all(|c| c.q.len() == 10 && (c.q[8] - c.v[9]).abs() < 1e-9), "{:?}", seen.crossings);
-    for range in [0..7, 7..10] {
-        let n = range.len();
-        let text = format!("{} + gamma*z", chain(0, n - 1, range.start + 1));
-        let part = System::parse(&text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
-        let start = Start::new(0.0, &q[range.clone()], &v[range.clone()], 0.0);
-        let alone = part.run(&Motion::new(start, 6.0, by_steps(24)), &mut ()).unwrap();
-        for (a, b) in alone.q.iter().zip(&outcome.q[range.clone()]).chain(alone.p.iter().zip(&outcome.p[range])) {
-            assert!((a - b).abs() < 1e-13, "{n}: {a} and {b}");
-        }
-    }
-    let member = Ensemble {
-        count: 1,
-        start: &|_| start.clone(),
-        t0: 0.0,
-        varied: None,
-        end: 6.0,
-        way: by_steps(24),
-        rows: None,
-        columns: &[],
-        events: &[],
-        threads: Some(1),
-    };
-    let member = members(&system, &member).remove(0).ending.unwrap();
-    assert!(member.q.iter().zip(&outcome.q).all(|(a, b)| (a - b).abs() < 1e-13) && member.q.len() == 10);
-
-    // W = diag(1, ..., 10).
-    let geometry = system.geometry(&start).unwrap();
-    assert_eq!((geometry.mass.len(), geometry.mass[9].len(), geometry.momentum.len()), (10, 10, 10));
-    assert_eq!([&geometry.eta, &geometry.reeb, &geometry.herglotz_field].map(Vec::len), [21; 3]);
-    let factorial: f64 = (1..=10).map(f64::from).product();
-    assert!((geometry.condition - 10.0).abs() < 1e-12, "{}", geometry.condition);
-    assert!((geometry.volume + factorial * factorial).abs() < 1e-9 * factorial.powi(2), "{:e}", geometry.volume);
-    assert_eq!(geometry.eta[20], 1.0);
-
-    let check = system.check(&motion, 2).unwrap();
-    assert!(check.places.iter().all(|place| place.contact_defect < 1e-9), "{:?}", check.places);
-    assert!(check.statements.iter().all(|stated| stated.residual < 1e-9), "{:?}", check.statements);
-    let free = System::parse("sum(i, 0, n-1, v[i]^2)/2 - q[1]^2", &["x[9]"], &[]).unwrap();
-    assert_eq!(free.symmetries().iter().filter(|s| matches!(s, SeenSymmetry::Translation(_))).count(), 8);
-    assert!(system.to_rust("Halves").unwrap().contains("impl Lagrangian<10> for Halves"));
 }
 
 /// Records of a motion.
@@ -328,7 +148,7 @@ fn quantities_in_columns_and_events() {
         t0: 1.0,
         varied: Some(Varied { names: &["gamma"], values: &|i| vec![-0.1 * i as f64] }),
         end: 6.0,
-        way: StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
+        step_control: StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
         rows: None,
         columns: &["sigma", "energy"].map(column),
         events: &[event("sigma - 0.75")],
@@ -422,113 +242,6 @@ fn members(system: &System, ensemble: &Ensemble<'_>) -> Vec<MemberEnd> {
     all
 }
 
-#[test]
-fn members_are_single_runs_whatever_the_threads() {
-    let system = pendulum();
-    let start = |i: usize| Start::new(0.0, [0.1 + 0.01 * i as f64], [0.0], 0.0);
-    // One member has an invalid parameter.
-    let values = |i: usize| vec![if i == 7 { f64::NAN } else { -0.05 - 0.001 * i as f64 }];
-    let columns = [Column::Position(0), Column::Energy];
-    let of = |threads| Ensemble {
-        count: 20,
-        start: &start,
-        t0: 0.0,
-        varied: Some(Varied { names: &["gamma"], values: &values }),
-        end: 10.0,
-        way: by_steps(40),
-        rows: None,
-        columns: &columns,
-        events: &[],
-        threads: Some(threads),
-    };
-    let (one, three) = (members(&system, &of(1)), members(&system, &of(3)));
-    for (i, (a, b)) in one.iter().zip(&three).enumerate() {
-        // Compared as text, since NaN is not equal to itself.
-        assert_eq!((a.index, format!("{:?}", a.ending)), (i, format!("{:?}", b.ending)));
-        let Ok(ending) = &a.ending else {
-            assert_eq!(i, 7);
-            continue;
-        };
-        let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
-        let outcome = own.run(&Motion::new(start(i), 10.0, by_steps(40)), &mut ()).unwrap();
-        // The sine of the SIMD lanes differs by some units in the last place, and the motion does not amplify the
-        // difference.
-        let near = |x: f64, y: f64| (x - y).abs() < 1e-14;
-        assert!(near(ending.q[0], outcome.q[0]) && near(ending.p[0], outcome.p[0]), "{i}: {ending:?} {outcome:?}");
-        assert_eq!(ending.columns[0], ending.q[0]);
-    }
-    assert!(one[7].ending.is_err());
-
-    // Rows are those of a single run.
-    let recorded = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])), varied: None, ..of(2) };
-    let all = members(&system, &recorded);
-    let motion =
-        Motion { rows: recorded.rows.clone(), columns: columns.to_vec(), ..Motion::new(start(4), 10.0, by_steps(40)) };
-    assert_eq!(all[4].rows, system.record(&motion).unwrap().1);
-    // The final state does not depend on the rows, also where the last row is before the end.
-    let early = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0])), varied: None, ..of(2) };
-    let ending = members(&system, &early).swap_remove(4).ending.unwrap();
-    let end_of_all = all[4].ending.clone().unwrap();
-    assert_eq!((ending.v, ending.columns), (end_of_all.v, end_of_all.columns));
-    // With a requested accuracy.
-    let accurate = Ensemble { way: accurate(1e-8), ..of(2) };
-    for (a, b) in members(&system, &accurate).iter().zip(&one) {
-        if let (Ok(a), Ok(b)) = (&a.ending, &b.ending) {
-            assert!((a.q[0] - b.q[0]).abs() < 1e-8, "{a:?} {b:?}");
-        }
-    }
-}
-
-/// The events of each member are those of a single run with its parameters. A terminal event ends its member only, and
-/// nothing beyond it is reported.
-#[test]
-fn events_of_members_are_those_of_single_runs() {
-    let system = pendulum();
-    // All start below the upper equilibrium with weak damping, so that all pass the lower equilibrium.
-    let start = |i: usize| Start::new(0.0, [0.3 + 0.05 * i as f64], [0.0], 0.0);
-    let values = |i: usize| vec![-0.01 * i as f64];
-    let columns = [Column::Time, Column::Velocity(0)];
-    let of = |text: &str| system.formula().expression(text).unwrap();
-    for terminal in [false, true] {
-        // One event contains a parameter of the member.
-        let slow = Event::new(of("theta' - gamma*theta"));
-        let down = Event { direction: Direction::Falling, terminal, ..Event::new(of("theta")) };
-        let events = [slow, down];
-        let rows = Some(OutputTimes::At((0..=8).map(f64::from).collect()));
-        let many = Ensemble {
-            count: 40,
-            start: &start,
-            t0: 0.0,
-            varied: Some(Varied { names: &["gamma"], values: &values }),
-            end: 8.0,
-            way: by_steps(32),
-            rows: rows.clone(),
-            columns: &columns,
-            events: &events,
-            threads: Some(2),
-        };
-        for member in members(&system, &many) {
-            let i = member.index;
-            let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
-            // Events that are parsed again have the parameter values of the member.
-            let of = |text: &str| own.formula().expression(text).unwrap();
-            let slow = Event { function: of("theta' - gamma*theta"), ..events[0].clone() };
-            let motion = Motion {
-                rows: rows.clone(),
-                columns: columns.to_vec(),
-                events: vec![slow, events[1].clone()],
-                ..Motion::new(start(i), 8.0, by_steps(32))
-            };
-            let mut alone = Seen::default();
-            let outcome = own.run(&motion, &mut alone).unwrap();
-            let ending = member.ending.unwrap();
-            assert_eq!((ending.t, &ending.q, &ending.p), (outcome.t, &outcome.q, &outcome.p), "{i}");
-            assert_eq!(ending.t < 8.0, terminal, "{i}");
-            assert_eq!((member.rows, member.crossings), (alone.rows, alone.crossings), "{i}");
-        }
-    }
-}
-
 /// The comparison shows the orders, and the best run is the fastest of those that are accurate enough.
 #[test]
 fn a_comparison_ranks_integrators() {
@@ -552,8 +265,9 @@ fn a_comparison_ranks_integrators() {
 #[test]
 fn bad_input_says_what_is_wrong() {
     let system = pendulum();
-    let run =
-        |start: Start, way: StepControl| system.run(&Motion::new(start, 1.0, way), &mut ()).unwrap_err().to_string();
+    let run = |start: Start, step_control: StepControl| {
+        system.run(&Motion::new(start, 1.0, step_control), &mut ()).unwrap_err().to_string()
+    };
     let good = || Start::new(0.0, [1.0], [0.0], 0.0);
     assert!(run(Start::new(0.0, [1.0, 2.0], [0.0], 0.0), by_steps(1)).contains("`q` has 2 numbers"));
     assert!(run(Start::new(0.0, [1.0], [f64::NAN], 0.0), by_steps(1)).contains("`v[0]` is NaN"));
@@ -574,24 +288,13 @@ fn bad_input_says_what_is_wrong() {
     assert!(matches!(Column::parse("energy", &formula), Ok(Column::Expression(_))));
 }
 
-#[test]
-fn symmetries_and_source() {
-    let kepler = System::new(&CatalogueEntry::find("kepler").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(kepler.symmetries(), [SeenSymmetry::Rotation(vec![(0, 1)])]);
-    let free = System::new(&CatalogueEntry::find("free_particle").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(free.symmetries(), [SeenSymmetry::Translation(vec![0])]);
-    assert!(free.structure().separable && free.is_smooth());
-    assert!(free.to_rust("Free").unwrap().contains("impl Lagrangian<1> for Free"));
-    assert!(free.to_rust("not a type").is_err());
-}
-
 /// With the factor 0, or one that is not finite, the pullback is not a contact form.
 #[test]
 fn a_factor_that_is_none_is_not_contact() {
     let check = |sigma: f64| {
         let (contact_defect, herglotz_defect, momenta) = (0.0, 0.0, Vec::new());
-        let place = Place { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
-        Check { integrator: String::new(), step_size: 1.0, places: vec![place], statements: Vec::new() }
+        let sample = Sample { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
+        Check { integrator: String::new(), step_size: 1.0, samples: vec![sample], statements: Vec::new() }
     };
     assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
     for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {

@@ -41,7 +41,7 @@ fn the_oscillator_between_two_positions() {
             assert!((found.v[k] - found.p[k]).abs() < 1e-14, "{name}, {k}");
         }
         let start = Start::new(1.0, [0.0], [found.v[0]], 0.5);
-        let motion = Motion::new(start, t1, StepControl::Accuracy { wanted: 1e-12, by: None });
+        let motion = Motion::new(start, t1, StepControl::Accuracy { error: 1e-12, by: None });
         let z = system.run(&motion, &mut ()).unwrap().z.unwrap();
         assert!((found.z[40] - z).abs() < 10.0 * error && (found.action() - (z - 0.5)).abs() < 10.0 * error);
         // The truncation error is estimated for discrete Lagrangians of order one and two.

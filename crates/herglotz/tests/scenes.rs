@@ -201,14 +201,14 @@ fn a_scene_is_what_it_says() {
     let motion = scene.motion();
     assert_eq!((motion.start.t, motion.start.z, motion.end), (2.0, 0.125, -1.0));
     assert_eq!(motion.start.q, [1.0, 2.5, 0.5]);
-    assert_eq!(motion.start.rate, InitialVelocity::Momentum(vec![0.25, -1.0, 3.0]));
+    assert_eq!(motion.start.velocity, InitialVelocity::Momentum(vec![0.25, -1.0, 3.0]));
     let (members, close) = (scene.members(), |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs());
     assert_eq!(members.count(), 6);
     // The last swept quantity varies fastest.
     assert_eq!((members.values(0), members.values(2), members.values(3)[0]), (vec![1.0, 1.0], vec![1.0, 100.0], 2.0));
     assert!(close(members.values(4)[1], 10.0), "{:?}", members.values(4));
     let start = members.start(5);
-    assert_eq!((start.q[2], start.rate), (2.0, InitialVelocity::Momentum(vec![0.25, 100.0, 3.0])));
+    assert_eq!((start.q[2], start.velocity), (2.0, InitialVelocity::Momentum(vec![0.25, 100.0, 3.0])));
 }
 
 #[test]

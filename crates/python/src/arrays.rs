@@ -49,9 +49,10 @@ pub fn word(name: &str, from: &Bound<'_, PyAny>, example: &str) -> PyResult<Stri
 
 /// The representation of an object for an error message, truncated where it is long.
 pub fn shown(from: &Bound<'_, PyAny>) -> String {
-    const LONGEST: usize = 60;
+    /// The number of characters from which the text is truncated.
+    const MAX_LENGTH: usize = 60;
     let text = from.repr().map_or_else(|_| "an object".to_owned(), |text| text.to_string());
-    if text.chars().count() <= LONGEST { text } else { text.chars().take(LONGEST).chain("...".chars()).collect() }
+    if text.chars().count() <= MAX_LENGTH { text } else { text.chars().take(MAX_LENGTH).chain("...".chars()).collect() }
 }
 
 /// The finite numbers of a one-dimensional argument; a single number gives a vector of length 1.

@@ -1,7 +1,7 @@
 //! Motions of systems of many coordinates.
 
 use crate::arrays::{number, numbers, value_error};
-use crate::run::{Kept, Record, record};
+use crate::run::{Record, RowStore, record};
 use crate::signals::Signals;
 use herglotz::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError,
@@ -58,11 +58,11 @@ fn run(
     request: Request<'_>,
     system: impl Send + FnOnce() -> Result<Assembled, RuntimeError>,
 ) -> PyResult<Record> {
-    let ((q, rate, is_momentum, z), t, every, (integrator, step, steps), conformal_factor) = request;
-    let rate = if is_momentum {
-        InitialVelocity::Momentum(numbers("p0", &rate)?)
+    let ((q, velocity, is_momentum, z), t, every, (integrator, step, steps), conformal_factor) = request;
+    let velocity = if is_momentum {
+        InitialVelocity::Momentum(numbers("p0", &velocity)?)
     } else {
-        InitialVelocity::Velocity(numbers("v0", &rate)?)
+        InitialVelocity::Velocity(numbers("v0", &velocity)?)
     };
     let times = crate::motion::times(&t)?;
     let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
@@ -77,13 +77,13 @@ fn run(
             ));
         }
     };
-    let start = Start { t: first, q: numbers("q0", &q)?, rate, z: number("z0", &z)? };
+    let start = Start { t: first, q: numbers("q0", &q)?, velocity, z: number("z0", &z)? };
     let rows = every.map_or(OutputTimes::At(times), OutputTimes::Every);
     let motion = AssembledMotion { rows, conformal_factor, ..AssembledMotion::new(start, end, by, steps) };
     let (kept, outcome) = py
         .detach(move || {
             let system = system()?;
-            let mut kept = Kept::new(system.dimension(), conformal_factor, Signals::new());
+            let mut kept = RowStore::new(system.dimension(), conformal_factor, Signals::new());
             let outcome = system.run(&motion, &mut kept)?;
             Ok::<_, RuntimeError>((kept, outcome))
         })

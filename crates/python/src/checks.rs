@@ -2,7 +2,7 @@
 
 use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
-use crate::signals::heard;
+use crate::signals::with_signals;
 use crate::system::System;
 use herglotz::runtime::{Interrupt, Start};
 use pyo3::prelude::*;
@@ -32,38 +32,38 @@ pub fn geometry<'py>(
     Ok(all)
 }
 
-/// A place of a check: t, sigma, the logarithm of the conformal factor, the two defects, and the momenta with their
+/// A sample of a check: t, sigma, the logarithm of the conformal factor, the two defects, and the momenta with their
 /// predictions.
-type Place = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
+type Sample = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
 
-/// A check: the integrator, the step, the places, the theorems, and whether every step is a contact transformation.
-type Checked = (String, f64, Vec<Place>, Vec<(String, String, f64)>, bool);
+/// A check: the integrator, the step, the samples, the theorems, and whether every step is a contact transformation.
+type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool);
 
 /// Whether the steps of a motion are contact transformations, and the residuals of the theorems of the discrete theory
 /// along it.
 #[pyfunction]
 pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyResult<Checked> {
-    let places = whole("places", &places, 1)?;
+    let count = whole("places", &places, 1)?;
     // A check runs on threads of its own, on which Python does not handle signals.
-    let (found, raised) = heard(py, |ended| {
+    let (found, raised) = with_signals(py, |ended| {
         let ended = ended.clone();
         let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
-        let asked = herglotz::runtime::Motion { interrupt, ..motion.motion.clone() };
-        motion.system.check(&asked, places)
+        let request = herglotz::runtime::Motion { interrupt, ..motion.motion.clone() };
+        motion.system.check(&request, count)
     })?;
     if let Some(raised) = raised {
         return Err(raised);
     }
     let found = found.map_err(value_error)?;
     let is_contact = found.is_contact();
-    let place = |place: herglotz::runtime::Place| {
-        let momenta = place.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
-        (place.t, place.sigma, place.log_factor, place.contact_defect, place.herglotz_defect, momenta)
+    let sample = |sample: herglotz::runtime::Sample| {
+        let momenta = sample.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
+        (sample.t, sample.sigma, sample.log_factor, sample.contact_defect, sample.herglotz_defect, momenta)
     };
-    let places = found.places.into_iter().map(place).collect();
+    let samples = found.samples.into_iter().map(sample).collect();
     let stated = |s: herglotz::runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
-    Ok((found.integrator, found.step_size, places, statements, is_contact))
+    Ok((found.integrator, found.step_size, samples, statements, is_contact))
 }
 
 /// A run of a comparison: integrator, order, step, steps, evaluations, error and seconds.
@@ -75,8 +75,8 @@ type Compared = (Vec<Work>, String, Vec<(String, String)>);
 /// Run time against error for all integrators that apply.
 #[pyfunction]
 pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
-    let mut go_on = |_: f64| motion.signals.look().is_continue();
-    let found = py.detach(|| motion.system.compare(&motion.motion, &[], &mut go_on));
+    let mut is_continued = |_: f64| motion.signals.check().is_continue();
+    let found = py.detach(|| motion.system.compare(&motion.motion, &[], &mut is_continued));
     if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }

@@ -18,7 +18,7 @@ struct Nodes {
     z: Vec<f64>,
 }
 
-struct Keeps {
+struct NodeStore {
     nodes: Nodes,
     /// The time beyond which no node is needed, and whether it has been reached.
     until: f64,
@@ -26,7 +26,7 @@ struct Keeps {
     signals: Signals,
 }
 
-impl RunMonitor for Keeps {
+impl RunMonitor for NodeStore {
     fn node(&mut self, t: f64, [q, v, p]: [&[f64]; 3], z: f64) {
         if self.done {
             return;
@@ -41,7 +41,7 @@ impl RunMonitor for Keeps {
     }
 
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        if self.done { ControlFlow::Break(()) } else { self.signals.look() }
+        if self.done { ControlFlow::Break(()) } else { self.signals.check() }
     }
 }
 
@@ -63,17 +63,17 @@ type States =
 #[pyfunction]
 pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     let signals = motion.signals.clone();
-    let mut keeps = Keeps { nodes: Nodes::default(), until, done: false, signals };
+    let mut store = NodeStore { nodes: Nodes::default(), until, done: false, signals };
     let by = py.detach(|| {
         let plan = motion.system.plan(&motion.motion)?;
-        let by = match motion.motion.way {
+        let by = match motion.motion.step_control {
             StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Ok(by),
             StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
         };
         let Ok(by) = by else { return Ok(None) };
         let again = herglotz::runtime::Motion {
             // A motion whose end is its start has no step.
-            way: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
+            step_control: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
             columns: Vec::new(),
             events: Vec::new(),
@@ -81,7 +81,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             nodes: true,
             ..motion.motion.clone()
         };
-        motion.system.run(&again, &mut keeps)?;
+        motion.system.run(&again, &mut store)?;
         Ok(Some(by))
     });
     if let Some(raised) = motion.signals.take() {
@@ -89,7 +89,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     }
     let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
     let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes, until })
+    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, until })
 }
 
 impl Dense {
@@ -101,14 +101,14 @@ impl Dense {
         let start = Start {
             t: at(t, k),
             q: part(q),
-            rate: InitialVelocity::MomentumNear { p: part(p), v: part(v) },
+            velocity: InitialVelocity::MomentumNear { p: part(p), v: part(v) },
             z: at(z, k),
         };
-        let way = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
+        let step_control = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
         let motion = herglotz::runtime::Motion {
             rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
-            ..herglotz::runtime::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), way)
+            ..herglotz::runtime::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), step_control)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)
     }

@@ -1,8 +1,8 @@
 //! Ensembles: many motions of one formula.
 
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
-use crate::motion::{self, GivenEvent, GivenWay};
-use crate::signals::heard;
+use crate::motion::{self, GivenEvent, GivenStepControl};
+use crate::signals::with_signals;
 use crate::system::System;
 use herglotz::runtime::{
     Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Stores the final states of the members, or their rows.
-struct Kept {
+struct RowStore {
     n: usize,
     /// The number of rows of each member, where rows are requested.
     rows: Option<usize>,
@@ -30,7 +30,7 @@ struct Kept {
     ended: Arc<AtomicBool>,
 }
 
-impl Kept {
+impl RowStore {
     fn states(&mut self, row: &[f64]) {
         let mut rest = row;
         for (part, count) in self.parts.iter_mut().zip([self.n, self.n, self.n, 1, self.extra]) {
@@ -42,7 +42,7 @@ impl Kept {
     }
 }
 
-impl Kept {
+impl RowStore {
     /// Adds the members that were not started because of an interruption.
     fn fill(&mut self, count: usize) {
         while self.success.len() < count {
@@ -58,7 +58,7 @@ impl Kept {
     }
 }
 
-impl EnsembleMonitor for Kept {
+impl EnsembleMonitor for RowStore {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         let MemberEnd { index, ending, rows, crossings } = member;
         self.crossings.extend(crossings.into_iter().map(|crossing| (index, crossing)));
@@ -139,7 +139,7 @@ pub fn run_ensemble(
     system: &System,
     start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
     t: Bound<'_, PyAny>,
-    way: GivenWay<'_>,
+    step_control: GivenStepControl<'_>,
     names: Vec<String>,
     values: Vec<Bound<'_, PyAny>>,
     events: Vec<GivenEvent<'_>>,
@@ -147,12 +147,12 @@ pub fn run_ensemble(
     threads: Option<Bound<'_, PyAny>>,
 ) -> PyResult<EnsembleRecord> {
     let n = system.inner.dimension();
-    let (q, rate, is_momentum, z) = start;
+    let (q, velocity, is_momentum, z) = start;
     let (count, q) = table("q0", &q, n)?;
-    let rate_name = if is_momentum { "p0" } else { "v0" };
-    let (rates, rate) = table(rate_name, &rate, n)?;
-    if rates != count {
-        return Err(value_error(format!("`{rate_name}` has {rates} rows, where `q0` has {count}")));
+    let argument = if is_momentum { "p0" } else { "v0" };
+    let (velocity_count, velocity) = table(argument, &velocity, n)?;
+    if velocity_count != count {
+        return Err(value_error(format!("`{argument}` has {velocity_count} rows, where `q0` has {count}")));
     }
     let members = |name: &str, of: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
         let found = numbers(name, of)?;
@@ -167,7 +167,7 @@ pub fn run_ensemble(
     for (name, value) in names.iter().zip(&values) {
         varied.push(members(&format!("parameters[{name:?}]"), value)?);
     }
-    let way = motion::way(&way)?;
+    let step_control = motion::step_control(&step_control)?;
     let threads = threads.map(|threads| whole("threads", &threads, 1)).transpose()?;
     let times = motion::times(&t)?;
     let (Some(&t0), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
@@ -180,7 +180,7 @@ pub fn run_ensemble(
         columns.push(Column::parse(text, system.inner.formula()).map_err(value_error)?);
     }
     let events = motion::events(events, system.inner.formula())?;
-    let mut kept = Kept {
+    let mut kept = RowStore {
         n,
         rows: rows.as_ref().map(Vec::len),
         extra: observed.len(),
@@ -194,9 +194,12 @@ pub fn run_ensemble(
     };
     let start = |i: usize| {
         let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
-        let rate =
-            if is_momentum { InitialVelocity::Momentum(part(&rate)) } else { InitialVelocity::Velocity(part(&rate)) };
-        Start { t: t0, q: part(&q), rate, z: z.get(i).copied().unwrap_or(f64::NAN) }
+        let velocity = if is_momentum {
+            InitialVelocity::Momentum(part(&velocity))
+        } else {
+            InitialVelocity::Velocity(part(&velocity))
+        };
+        Start { t: t0, q: part(&q), velocity, z: z.get(i).copied().unwrap_or(f64::NAN) }
     };
     let of_member = |i: usize| varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -208,7 +211,7 @@ pub fn run_ensemble(
             t0,
             varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
             end,
-            way,
+            step_control,
             rows: rows.clone().map(OutputTimes::At),
             columns: &columns,
             events: &events,
@@ -216,7 +219,7 @@ pub fn run_ensemble(
         };
         system.inner.ensemble(&ensemble, &mut kept)
     };
-    let (tally, raised) = heard(py, run)?;
+    let (tally, raised) = with_signals(py, run)?;
     let tally = match tally {
         // The ensemble was interrupted before it began.
         Err(_) if raised.is_some() => Tally::default(),

@@ -1,7 +1,7 @@
 //! The exact discrete Lagrangian, the contact exponential map and its inverse.
 
 use crate::arrays::{number, numbers, value_error};
-use crate::signals::heard_at_once;
+use crate::signals::leaving_at_signals;
 use crate::system::System;
 use ::exact_lagrangian::ExactLagrangian;
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -71,7 +71,7 @@ fn of_system(
         }
     }
     let formula = system.inner.formula().clone();
-    heard_at_once(py, move || match n {
+    leaving_at_signals(py, move || match n {
         1 => found::<1>(&formula, what, &at),
         2 => found::<2>(&formula, what, &at),
         3 => found::<3>(&formula, what, &at),

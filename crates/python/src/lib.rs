@@ -10,6 +10,7 @@ mod dense;
 mod ensemble;
 mod exact;
 mod motion;
+mod operators;
 mod path;
 mod run;
 mod signals;
@@ -40,11 +41,13 @@ mod _core {
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]
+    use crate::operators::symbols;
+    #[pymodule_export]
     use crate::path::{PathRecord, search_path};
     #[pymodule_export]
     use crate::run::{Record, resume, run};
     #[pymodule_export]
-    use crate::symbol::{Symbol, symbols};
+    use crate::symbol::Symbol;
     #[pymodule_export]
     use crate::system::{System, velocity_names};
     #[pymodule_export]

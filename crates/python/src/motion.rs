@@ -24,11 +24,11 @@ pub struct Motion {
 type GivenStart<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, PyAny>, Option<Vec<f64>>);
 
 /// The arguments accuracy, integrator, step and steps.
-pub type GivenWay<'py> = [Option<Bound<'py, PyAny>>; 4];
+pub type GivenStepControl<'py> = [Option<Bound<'py, PyAny>>; 4];
 
 /// The step control that these arguments specify.
-pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<StepControl> {
-    /// The default accuracy.
+pub fn step_control([accuracy, integrator, step, steps]: &GivenStepControl<'_>) -> PyResult<StepControl> {
+    /// The default accuracy: that of the Python documentation.
     const ACCURACY: f64 = 1e-9;
     let named = |name: &Bound<'_, PyAny>| -> PyResult<AnyIntegrator> {
         word("integrator", name, "\"gauss_8\"")?.parse().map_err(value_error)
@@ -46,8 +46,8 @@ pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<StepC
         }
         (Some(_), None, None) => Err(value_error("a step is given without `integrator`: name one, as \"gauss_8\"")),
         (Some(steps), Some(by), None) => Ok(StepControl::Steps { by, steps }),
-        (None, by, None) => Ok(StepControl::Accuracy { wanted: ACCURACY, by }),
-        (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { wanted: number("accuracy", accuracy)?, by }),
+        (None, by, None) => Ok(StepControl::Accuracy { error: ACCURACY, by }),
+        (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { error: number("accuracy", accuracy)?, by }),
     }
 }
 
@@ -125,7 +125,7 @@ impl Motion {
         start: GivenStart<'_>,
         t: Bound<'_, PyAny>,
         every: Option<Bound<'_, PyAny>>,
-        way: GivenWay<'_>,
+        step_control: GivenStepControl<'_>,
         events: Vec<GivenEvent<'_>>,
         columns: Vec<String>,
         conformal_factor: bool,
@@ -133,21 +133,21 @@ impl Motion {
         scales: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let formula = system.inner.formula();
-        let (q, rate, is_momentum, z, near) = start;
+        let (q, velocity, is_momentum, z, near) = start;
         let q = numbers("q0", &q)?;
-        let rate = if is_momentum {
-            InitialVelocity::Momentum(numbers("p0", &rate)?)
+        let velocity = if is_momentum {
+            InitialVelocity::Momentum(numbers("p0", &velocity)?)
         } else {
-            InitialVelocity::Velocity(numbers("v0", &rate)?)
+            InitialVelocity::Velocity(numbers("v0", &velocity)?)
         };
         // The velocity of a motion that is continued.
-        let rate = match (rate, near) {
+        let velocity = match (velocity, near) {
             (InitialVelocity::Momentum(p), Some(v)) if v.len() == p.len() && v.iter().all(|v| v.is_finite()) => {
                 InitialVelocity::MomentumNear { p, v }
             }
-            (rate, _) => rate,
+            (velocity, _) => velocity,
         };
-        let length = match &rate {
+        let length = match &velocity {
             InitialVelocity::Velocity(v) => ("v0", v.len()),
             InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => ("p0", p.len()),
         };
@@ -171,13 +171,13 @@ impl Motion {
             times
         };
         let rows = Some(every.map_or(OutputTimes::At(times), OutputTimes::Every));
-        let way = self::way(&way)?;
+        let step_control = self::step_control(&step_control)?;
         let mut all = self::columns(expected, conformal_factor);
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);
         }
         let events = self::events(events, formula)?;
-        let start = Start { t: first, q, rate, z: number("z0", &z)? };
+        let start = Start { t: first, q, velocity, z: number("z0", &z)? };
         let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();
         let motion = herglotz::runtime::Motion {
@@ -188,7 +188,7 @@ impl Motion {
             estimate,
             scales,
             interrupt: Some(signals.interrupt()),
-            ..herglotz::runtime::Motion::new(start, end, way)
+            ..herglotz::runtime::Motion::new(start, end, step_control)
         };
         Ok(Motion { system: system.inner.clone(), motion, conformal_factor, signals })
     }

@@ -1,7 +1,7 @@
 //! Paths between given ends.
 
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole, word};
-use crate::signals::heard_at_once;
+use crate::signals::leaving_at_signals;
 use crate::system::System;
 use herglotz::runtime::{BoundaryProblem, FoundPath, PathStatus};
 use numpy::{PyArray1, PyArray2};
@@ -54,7 +54,7 @@ pub fn search_path(
         guess,
     };
     let of = system.inner.clone();
-    let found = heard_at_once(py, move || of.path(&problem))?.map_err(value_error)?;
+    let found = leaving_at_signals(py, move || of.path(&problem))?.map_err(value_error)?;
     let FoundPath { q, p, z, residual, log_factor, regularity, error_estimate, iterations, .. } = found;
     Ok(PathRecord {
         q: matrix(py, q, n)?,

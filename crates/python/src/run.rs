@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use std::ops::ControlFlow;
 
 /// Stores the parts of the rows of a motion.
-pub struct Kept {
+pub struct RowStore {
     n: usize,
     /// The number of columns in addition to the state.
     extra: usize,
@@ -33,7 +33,7 @@ pub struct Kept {
     halted: Option<ResumeState>,
 }
 
-impl RunMonitor for Kept {
+impl RunMonitor for RowStore {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
         let n = self.n;
         let mut rest = numbers;
@@ -61,7 +61,7 @@ impl RunMonitor for Kept {
     }
 
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        self.signals.look()
+        self.signals.check()
     }
 
     fn interrupted(&mut self, at: ResumeState) {
@@ -104,7 +104,7 @@ pub struct Record {
 /// Runs a motion with the interpreter lock released.
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
-    let (mut kept, request) = (Kept::of(motion), &motion.motion);
+    let (mut kept, request) = (RowStore::of(motion), &motion.motion);
     let outcome = py.detach(|| motion.system.run(request, &mut kept));
     record(py, kept, whole(motion, outcome)?)
 }
@@ -112,7 +112,7 @@ pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
 /// Resumes a motion that was interrupted at a time, and keeps the remaining rows.
 #[pyfunction]
 pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
-    let (mut kept, mut request) = (Kept::of(motion), motion.motion.clone());
+    let (mut kept, mut request) = (RowStore::of(motion), motion.motion.clone());
     let from = ResumeState::from_bytes(halted).map_err(value_error)?;
     if let Some(OutputTimes::At(times)) = &mut request.rows {
         let onward = request.end >= request.start.t;
@@ -125,15 +125,15 @@ pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResu
 /// The outcome of a motion, also where its plan was interrupted.
 fn whole(motion: &Motion, outcome: Result<Outcome, RuntimeError>) -> PyResult<Outcome> {
     match outcome {
-        Err(RuntimeError::Input(InputError::Interrupted)) => Ok(nothing_yet(motion)),
+        Err(RuntimeError::Input(InputError::Interrupted)) => Ok(outcome_of_start(motion)),
         outcome => outcome.map_err(value_error),
     }
 }
 
 /// The outcome of a motion whose plan was interrupted: its start, without rows.
-fn nothing_yet(motion: &Motion) -> Outcome {
+fn outcome_of_start(motion: &Motion) -> Outcome {
     let start = &motion.motion.start;
-    let p = match &start.rate {
+    let p = match &start.velocity {
         InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => Some(p.clone()),
         InitialVelocity::Velocity(_) => motion.system.geometry(start).ok().map(|geometry| geometry.momentum),
     };
@@ -145,7 +145,7 @@ fn nothing_yet(motion: &Motion) -> Outcome {
         q: start.q.clone(),
         p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),
         // Where several velocities correspond to the momentum, the initial one.
-        v: match &start.rate {
+        v: match &start.velocity {
             InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. } => Some(v.clone()),
             InitialVelocity::Momentum(_) => None,
         },
@@ -156,19 +156,19 @@ fn nothing_yet(motion: &Motion) -> Outcome {
     }
 }
 
-impl Kept {
+impl RowStore {
     fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
         let own = crate::motion::columns(n, motion.conformal_factor).len();
-        Kept {
+        RowStore {
             extra: motion.motion.columns.len() - own,
-            ..Kept::new(n, motion.conformal_factor, motion.signals.clone())
+            ..RowStore::new(n, motion.conformal_factor, motion.signals.clone())
         }
     }
 
     /// An empty record for n coordinates, without columns in addition to the state.
     pub fn new(n: usize, conformal_factor: bool, signals: Signals) -> Self {
-        Kept {
+        RowStore {
             n,
             extra: 0,
             conformal_factor,
@@ -189,9 +189,9 @@ impl Kept {
 }
 
 /// Converts the result of a run for Python.
-pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Record> {
+pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<Record> {
     kept.raised = kept.signals.take();
-    let Kept { n, extra, .. } = kept;
+    let RowStore { n, extra, .. } = kept;
     let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
     let crossings = kept.crossings.into_iter().map(|c| (c.event, c.t, c.q, c.v, c.p, c.z)).collect();
     Ok(Record {

@@ -9,38 +9,38 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The time between two checks for signals: short for a user, long for a run.
-const BETWEEN: Duration = Duration::from_millis(50);
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The time of the last check, and the exception that a signal handler has raised.
-struct Looked(Instant, Option<PyErr>);
+struct SignalState(Instant, Option<PyErr>);
 
 /// Checks for signals at intervals, while the interpreter lock is released. Clones share their state.
 #[derive(Clone)]
-pub struct Signals(Arc<Mutex<Looked>>);
+pub struct Signals(Arc<Mutex<SignalState>>);
 
 impl Signals {
     pub fn new() -> Self {
-        Signals(Arc::new(Mutex::new(Looked(Instant::now(), None))))
+        Signals(Arc::new(Mutex::new(SignalState(Instant::now(), None))))
     }
 
-    fn looked(&self) -> MutexGuard<'_, Looked> {
+    fn state(&self) -> MutexGuard<'_, SignalState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Checks whether to continue.
-    pub fn look(&self) -> ControlFlow<()> {
-        let mut looked = self.looked();
-        if looked.1.is_some() {
+    pub fn check(&self) -> ControlFlow<()> {
+        let mut state = self.state();
+        if state.1.is_some() {
             return ControlFlow::Break(());
         }
-        if looked.0.elapsed() < BETWEEN {
+        if state.0.elapsed() < SIGNAL_INTERVAL {
             return ControlFlow::Continue(());
         }
-        looked.0 = Instant::now();
+        state.0 = Instant::now();
         match Python::attach(|py| py.check_signals()) {
             Ok(()) => ControlFlow::Continue(()),
             Err(raised) => {
-                looked.1 = Some(raised);
+                state.1 = Some(raised);
                 ControlFlow::Break(())
             }
         }
@@ -49,18 +49,21 @@ impl Signals {
     /// The same check as an interrupt of plans.
     pub fn interrupt(&self) -> Interrupt {
         let signals = self.clone();
-        Interrupt::when(move || signals.look().is_break())
+        Interrupt::when(move || signals.check().is_break())
     }
 
     /// The exception that a signal handler has raised; it is cleared.
     pub fn take(&self) -> Option<PyErr> {
-        self.looked().1.take()
+        self.state().1.take()
     }
 }
 
 /// Runs `work` on a thread of its own, while this thread, the only one on which Python handles signals, checks for
 /// them. An exception of a handler is signalled to the work by the flag, and is returned together with its result.
-pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T + Send) -> PyResult<(T, Option<PyErr>)> {
+pub fn with_signals<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Arc<AtomicBool>) -> T + Send,
+) -> PyResult<(T, Option<PyErr>)> {
     let ended = Arc::new(AtomicBool::new(false));
     let (done, waits) = channel();
     let (found, raised) = py.detach(move || {
@@ -72,7 +75,7 @@ pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T +
                 drop(done);
                 found
             })?;
-            while let Err(RecvTimeoutError::Timeout) = waits.recv_timeout(BETWEEN) as Result<(), _> {
+            while let Err(RecvTimeoutError::Timeout) = waits.recv_timeout(SIGNAL_INTERVAL) as Result<(), _> {
                 if raised.is_none()
                     && let Err(error) = Python::attach(|py| py.check_signals())
                 {
@@ -91,12 +94,12 @@ pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T +
 
 /// Runs `work` on a thread of its own: a computation that cannot be interrupted but ends after about a second. An
 /// exception of a signal handler is raised at once, and the thread is left to finish.
-pub fn heard_at_once<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+pub fn leaving_at_signals<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let (done, waits) = channel();
     std::thread::Builder::new().spawn(move || done.send(work()))?;
     py.detach(move || {
         loop {
-            match waits.recv_timeout(BETWEEN) {
+            match waits.recv_timeout(SIGNAL_INTERVAL) {
                 Ok(found) => return Ok(found),
                 Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
                 Err(RecvTimeoutError::Disconnected) => {

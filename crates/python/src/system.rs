@@ -1,7 +1,7 @@
 //! Systems given by a formula.
 
 use crate::arrays::value_error;
-use herglotz::runtime::SeenSymmetry;
+use herglotz::runtime::FormulaSymmetry;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
@@ -115,9 +115,9 @@ impl System {
     /// the pairs of its coordinates.
     #[getter]
     fn symmetries(&self) -> Vec<Vec<Vec<usize>>> {
-        let of = |symmetry: SeenSymmetry| match symmetry {
-            SeenSymmetry::Translation(moved) => moved.into_iter().map(|i| vec![i]).collect(),
-            SeenSymmetry::Rotation(pairs) => pairs.into_iter().map(|(i, j)| vec![i, j]).collect(),
+        let of = |symmetry: FormulaSymmetry| match symmetry {
+            FormulaSymmetry::Translation(moved) => moved.into_iter().map(|i| vec![i]).collect(),
+            FormulaSymmetry::Rotation(pairs) => pairs.into_iter().map(|(i, j)| vec![i, j]).collect(),
         };
         self.inner.symmetries().into_iter().map(of).collect()
     }

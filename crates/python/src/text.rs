@@ -12,7 +12,7 @@ pub struct Names {
 }
 
 /// The nesting depth of brackets above which a subexpression gets a name: a quarter of what the parser accepts.
-const DEEPEST: usize = 50;
+const MAX_DEPTH: usize = 50;
 
 /// The text of a node. Subexpressions that are used more than once or are deeply nested become definitions before it.
 pub fn text(graph: &Graph, root: Id, names: &Names) -> String {
@@ -41,7 +41,7 @@ pub fn text(graph: &Graph, root: Id, names: &Names) -> String {
         };
         let mut text = expression(&node, &mut of, names);
         let leaf = node.operands().next().is_none();
-        if id != root && !leaf && (uses.get(&id).is_some_and(|uses| *uses > 1) || depth > DEEPEST) {
+        if id != root && !leaf && (uses.get(&id).is_some_and(|uses| *uses > 1) || depth > MAX_DEPTH) {
             count += 1;
             let name = format!("_{count}");
             let _ = writeln!(definitions, "{name} = {text}");

@@ -116,9 +116,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
         if const { !L::HINTS.time_transformation } {
             check_stages(self.stages)?;
-            return Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`)",
-            });
+            return Err(InputError::NoTimeTransformation);
         }
         check_transformed(lagrangian, self.stages)
     }
@@ -134,7 +132,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         if const { L::HINTS.time_transformation } {
             Ok(Box::new(TransformedStepper::new(problem, self.stages, h, StatedTransformation(problem.lagrangian))?))
         } else {
-            Err(InputError::Unclaimed { claim: "a time transformation" })
+            Err(InputError::NoTimeTransformation)
         }
     }
 }

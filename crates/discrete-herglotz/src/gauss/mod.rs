@@ -76,6 +76,11 @@ impl<L> Gauss<L> {
         Ok(Gauss { lagrangian, forward: Products::new(stages, h), backward: Products::new(stages, -h) })
     }
 
+    /// The Lagrangian.
+    pub fn lagrangian(&self) -> &L {
+        &self.lagrangian
+    }
+
     /// The number of stages.
     pub fn stages(&self) -> usize {
         self.forward.s

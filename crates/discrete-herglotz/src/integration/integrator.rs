@@ -74,7 +74,8 @@ pub trait Integrator<'a, L, const N: usize> {
     /// Checks that a Lagrangian satisfies the hypotheses of the method.
     ///
     /// # Errors
-    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], [`InputError::Stages`].
+    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`],
+    /// [`InputError::NoTimeTransformation`], [`InputError::Stages`].
     fn check(&self, lagrangian: &L) -> Result<(), InputError>;
 
     /// A stepper at the initial state of a problem, with steps of length h, which are negative for a run backward in

@@ -1,6 +1,6 @@
 //! Conjugate points, at which the exponential map is not a local diffeomorphism.
 
-use crate::map::exact_lagrangian::seeded;
+use crate::map::velocity_seed::seeded;
 use crate::{ContactExponential, ExactError, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, numbers::max_abs_or_nan};
@@ -8,6 +8,7 @@ use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, numbers::max_abs
 /// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there
 /// again, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ConjugatePoint {
     /// The time since the start of the motion.
     pub after: f64,
@@ -17,7 +18,8 @@ pub struct ConjugatePoint {
     pub smallest: f64,
 }
 
-/// The number of samples of a motion between which conjugate points are searched.
+/// The number of samples of a motion between which conjugate points are searched: four times as many as for
+/// [`Retraction::conjugate`](crate::Retraction::conjugate).
 const SAMPLES: usize = 128;
 
 /// The variation of the end of a motion with its initial velocity, as needed to detect a fold of the exponential map.
@@ -126,6 +128,7 @@ fn bisect<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> 
 
 /// The minimum of a function between two points, by golden section search.
 fn lowest<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> Result<(f64, f64), E> {
+    // The golden ratio minus one: each evaluation reduces the interval by this factor.
     let golden = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
     let (mut at_a, mut at_b) = (f(a)?, f(b)?);

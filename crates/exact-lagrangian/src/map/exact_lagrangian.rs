@@ -1,6 +1,7 @@
 //! The exact discrete Lagrangian.
 
 use crate::map::retraction::Retraction;
+use crate::map::velocity_seed::seeded;
 use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::linear::solve;
@@ -83,7 +84,10 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         DiscreteJet::new(motion.action, -p0 * sigma, p1, motion.b.exp_m1()).with_sigma(sigma)
     }
 
-    /// The velocity at which `L_v` is a given momentum, by Newton's method with the Jacobian W.
+    /// The velocity at which `L_v` is a given momentum, by Newton's method with the Jacobian W. It differs from
+    /// [`legendre_inverse`](discrete_herglotz::theory::legendre_inverse) in its Jacobian, which is differentiated with the
+    /// momentum by the same dual numbers as the motion, and in its criterion of convergence, so that the results differ in
+    /// the last digit.
     fn velocity(&self, t: f64, x: &PhasePoint<N>, guess: &SVector<f64, N>) -> Result<SVector<f64, N>, StepError> {
         let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
         let (mut before, mut residual) = (f64::INFINITY, f64::INFINITY);
@@ -132,16 +136,6 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         let end = PhasePoint { q: end.q, p, z: end.z };
         DiscreteStep { end, velocity: motion.displacement / duration, sigma: forward.exp(), iterations: 1 }.checked()
     }
-}
-
-/// A point on dual numbers, with the components of the velocity as directions.
-pub(crate) fn seeded<const N: usize>(x: &VelocityPoint<N>) -> VelocityPoint<N, Dual<f64, SVector<f64, N>>> {
-    let still = Dual::<f64, SVector<f64, N>>::constant;
-    let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
-    for i in 0..N {
-        y.v[i].d[i] = 1.0;
-    }
-    y
 }
 
 impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian<L, N> {

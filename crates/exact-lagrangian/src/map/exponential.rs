@@ -31,6 +31,7 @@ pub(crate) type Varied<const N: usize> = Motion<N, Dual<f64, ChartVector<N>>>;
 
 /// The exponential map's value and derivatives at a point of TQ x R.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ExponentialDifferential<const N: usize> {
     /// The image `(q0, q1, z0)`.
     pub image: DiscretePoint<N>,

@@ -10,6 +10,7 @@ use discrete_herglotz::{
 
 /// Two steps through an intermediate point `q1`, with the change of the action over both.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct JoinedSteps<const N: usize> {
     /// The intermediate point.
     pub q1: SVector<f64, N>,

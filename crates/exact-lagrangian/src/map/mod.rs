@@ -5,7 +5,7 @@ pub(crate) mod exact_flow;
 pub(crate) mod exact_lagrangian;
 pub(crate) mod exponential;
 pub(crate) mod joined_steps;
+mod retract;
 pub(crate) mod retraction;
 mod shooting;
-
-pub(crate) use shooting::ITERATIONS;
+mod velocity_seed;

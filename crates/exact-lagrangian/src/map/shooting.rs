@@ -2,27 +2,27 @@
 //! Newton's method, and continuation.
 
 use super::conjugate::Fold;
-use super::exact_lagrangian::seeded;
 use super::exponential::singular_values;
+use super::velocity_seed::seeded;
 use crate::numerics::flow::{ACCURACY, Herglotz, Work, integrate};
 use crate::numerics::panel::{End, Floor, Problem, Rates, State, collocate};
 use crate::{ContactExponential, ExactError, Motion, Retraction, RetractionRoute};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::linear::solve;
 use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, numbers::max_or_nan};
-use discrete_herglotz::solve::last_correction;
+use discrete_herglotz::solve::{ITERATION_LIMIT, last_correction};
 
-/// The largest number of Newton iterations of a retraction.
-pub(crate) const ITERATIONS: u32 = 50;
+/// The accuracy of the first Newton iterations, whose result is only a guess for the last ones: the next
+/// correction, which is quadratic, leaves an error of about 1e-12.
+const FIRST_ACCURACY: f64 = 1e-6;
 
-/// The accuracy of the first Newton iterations, whose result is only a guess for the last ones.
-const ROUGH: f64 = 1e-6;
+/// The [`regularity`] of a shot below which the end points count as conjugate, some units of
+/// round-off, to which the derivative is known.
+const MIN_REGULARITY: f64 = 64.0 * f64::EPSILON;
 
-/// The sine of a [`Fold`], or the [`regularity`] of a shot, below which the end points count as conjugate.
-const CONJUGATE: f64 = 64.0 * f64::EPSILON;
-
-/// The same where the derivative is known to [`ROUGH`] accuracy only.
-const NEARLY: f64 = 1e-4;
+/// The same where the derivative is known to [`FIRST_ACCURACY`] only: a hundred times that accuracy, so that at least two
+/// digits of the inverse are correct.
+const MIN_REGULARITY_AT_FIRST: f64 = 1e-4;
 
 /// Whether a matrix reverses orientation.
 pub(super) fn reverses<const N: usize>(mut m: SMatrix<f64, N, N>) -> bool {
@@ -73,7 +73,7 @@ impl<L> ContactExponential<L> {
         x: &DiscretePoint<N>,
         v0: &mut SVector<f64, N>,
         inverse: &SMatrix<f64, N, N>,
-        patience: f64,
+        max_contraction: f64,
     ) -> Result<Option<(Retraction<N>, f64)>, ExactError<N>>
     where
         L: Lagrangian<N>,
@@ -81,7 +81,7 @@ impl<L> ContactExponential<L> {
         let rates = Herglotz(&self.lagrangian);
         let from = State { q: x.q0, v: *v0, z: x.z0, b: 0.0 };
         let start = rates.at(t, &from)?;
-        let end = End { displacement: &(x.q1 - x.q0), inverse, patience };
+        let end = End { displacement: &(x.q1 - x.q0), inverse, max_contraction };
         let (floor, mut evaluations) = (Floor::default(), 1);
         let problem =
             Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY, floor, part: 1.0, narrow: None };
@@ -104,14 +104,19 @@ impl<L> ContactExponential<L> {
     }
 
     /// The retraction completed by the time by which its motion has met a conjugate point.
-    pub(super) fn marked<const N: usize>(&self, t: f64, found: Retraction<N>) -> Result<Retraction<N>, ExactError<N>>
+    pub(super) fn with_conjugate_time<const N: usize>(
+        &self,
+        t: f64,
+        found: Retraction<N>,
+    ) -> Result<Retraction<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
+        // The resolution at which `Retraction::conjugate` is documented; `conjugate_points` searches more closely.
         const PARTS: u32 = 32;
         let (part, mut at, mut work) = (self.h / f64::from(PARTS), seeded(&found.start), Work::default());
         for k in 0..PARTS {
-            at = self.shot(t + f64::from(k) * part, &at, part, ROUGH, &mut work)?.end;
+            at = self.shot(t + f64::from(k) * part, &at, part, FIRST_ACCURACY, &mut work)?.end;
             if reverses(SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j])) {
                 return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
             }
@@ -135,7 +140,7 @@ impl<L> ContactExponential<L> {
         integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy, work)
     }
 
-    /// The inverse of `dq1/dv0` along the motion from a start, to [`ROUGH`] accuracy; `None` where the derivative is
+    /// The inverse of `dq1/dv0` along the motion from a start, to [`FIRST_ACCURACY`] accuracy; `None` where the derivative is
     /// nearly singular or the motion is not defined.
     pub(super) fn slope_inverse<const N: usize>(
         &self,
@@ -146,8 +151,8 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
-        let shot = self.shot(t, &seeded(start), self.h, ROUGH, work).ok()?;
-        slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > NEARLY)
+        let shot = self.shot(t, &seeded(start), self.h, FIRST_ACCURACY, work).ok()?;
+        slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > MIN_REGULARITY_AT_FIRST)
     }
 
     /// Newton's method on `exp_h`, first to a few digits. Further digits are computed by collocation with the
@@ -162,12 +167,12 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
-        let rough = self.shoot(t, x, guess, (self.h, ROUGH), work)?;
+        let rough = self.shoot(t, x, guess, (self.h, FIRST_ACCURACY), work)?;
         let near = rough.retraction.start.v;
-        let regular = rough.regularity > NEARLY;
+        let regular = rough.regularity > MIN_REGULARITY_AT_FIRST;
         if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
             // Accept only the motion that Newton's method has found.
-            if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
+            if (found.start.v - near).amax() <= FIRST_ACCURACY.sqrt() * near.amax() {
                 return Ok(Retraction { route: RetractionRoute::Newton, ..found });
             }
         }
@@ -191,7 +196,7 @@ impl<L> ContactExponential<L> {
         let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
         let (mut before, mut nearest) = (f64::INFINITY, f64::INFINITY);
         let mut last = None;
-        for _ in 0..ITERATIONS {
+        for _ in 0..ITERATION_LIMIT {
             let start = VelocityPoint { q: x.q0, v, z: x.z0 };
             let shot = match self.shot(t, &seeded(&start), h, accuracy, work) {
                 Ok(shot) => shot,
@@ -225,7 +230,7 @@ impl<L> ContactExponential<L> {
             if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {
                 let Some(inverse) = slope.try_inverse() else { break };
                 let regularity = regularity(&shot, &inverse, h);
-                if regularity.is_nan() || regularity <= CONJUGATE {
+                if regularity.is_nan() || regularity <= MIN_REGULARITY {
                     break;
                 }
                 return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse, regularity });
@@ -251,7 +256,12 @@ impl<L> ContactExponential<L> {
 
     /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s increasing to 1, where each
     /// is the guess for the next.
-    pub(super) fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, work: &mut Work) -> Option<Found<N>>
+    pub(super) fn by_continuation<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        work: &mut Work,
+    ) -> Option<Found<N>>
     where
         L: Lagrangian<N>,
     {
@@ -260,7 +270,7 @@ impl<L> ContactExponential<L> {
         while step > 1e-3 && !work.is_done() {
             let next = f64::min(s + step, 1.0);
             let target = DiscretePoint { q1: x.q0 + (x.q1 - x.q0) * next, ..*x };
-            let accuracy = if next < 1.0 { ROUGH } else { ACCURACY };
+            let accuracy = if next < 1.0 { FIRST_ACCURACY } else { ACCURACY };
             match self.shoot(t, &target, &v, (next * self.h, accuracy), work) {
                 Ok(found) if next == 1.0 => return Some(found),
                 Ok(found) => {

@@ -64,6 +64,7 @@ pub(crate) fn flow_between_jumps<const N: usize>(
 
 /// A motion: its end, and the integrals along it. On dual numbers, with the derivatives of all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Motion<const N: usize, T = f64> {
     /// The end `phi_t(q0, v0, z0)`.
     pub end: VelocityPoint<N, T>,
@@ -120,7 +121,9 @@ pub fn herglotz_flow<T: Scalar, const N: usize>(
     integrate(&Herglotz(lagrangian), t0, &from, duration, ACCURACY, &mut Work::default())
 }
 
-/// A compensated sum, after Kahan.
+/// A compensated sum, after Kahan. It differs from the compensated sum of `discrete-herglotz` in scalar and algorithm: it
+/// adds terms over any scalar, so that derivatives are compensated too, where that one adds pairs of `f64` by Knuth's
+/// TwoSum; their results differ in the last digit.
 #[derive(Clone, Copy)]
 struct Sum<T> {
     value: T,
@@ -219,12 +222,17 @@ fn with_last_digits_changed<const N: usize, T: Scalar>(x: &State<N, T>) -> State
     State { q: of(&x.q, up, down), v: of(&x.v, down, up), z: changed(x.z, up), b: x.b }
 }
 
-/// Numbers of refusals: after `HALVING` the distance to the end of the refused panel is halved, after `NARROW` the
-/// panels are [narrow](Problem::narrow), and after `CLOSED` the motion is given up; `CLOSED` exceeds the number of
-/// halvings from any length to a rounding of it.
-const HALVING: u32 = 8;
-const NARROW: u32 = 14;
-const CLOSED: u32 = 250;
+/// The number of refusals after which the distance to the end of the refused panel is halved with each panel. Before,
+/// the length follows from the estimated error, which has no meaning at a jump or a singularity.
+const HALVE_DISTANCE: u32 = 8;
+
+/// The number of refusals after which the panels are [narrow](Problem::narrow): the distance has then been
+/// halved six times.
+const NARROW_PANELS: u32 = 14;
+
+/// The number of refusals after which the motion is given up. It exceeds the number of halvings from any length to a
+/// rounding of it.
+const MAX_REFUSALS: u32 = 250;
 
 /// Returns an error if an entry is not finite.
 fn finite<T: Scalar>(what: &'static str, entries: &[T]) -> Result<(), GeometryError> {
@@ -288,15 +296,15 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
             z: at.z.re(),
         };
         // A singularity is closer than round-off.
-        let closed = refusals < HALVING && h.abs() <= 4.0 * f64::EPSILON * duration.abs() && !ends;
-        if closed || refusals > CLOSED || h == 0.0 {
+        let closed = refusals < HALVE_DISTANCE && h.abs() <= 4.0 * f64::EPSILON * duration.abs() && !ends;
+        if closed || refusals > MAX_REFUSALS || h == 0.0 {
             return Err(ExactError::OutsideDomain { t, reached: reached().into(), cause });
         }
         if work.is_done() {
             return Err(ExactError::Unfinished { t, reached: reached().into() });
         }
         units = [units[0].or(Size::of(&at.v)), units[1].or(Size::of([&at.z])), Size([1.0, f64::INFINITY])];
-        let narrow = (refusals >= NARROW).then_some(units);
+        let narrow = (refusals >= NARROW_PANELS).then_some(units);
         // At rest, velocities are determined up to the rounding of the positions over the time of a panel.
         let time = if panels == 0 { duration.abs() } else { scale };
         let at_rest = [units[0].or(Size::of(&at.q).times(1.0 / time)), units[1], units[2]];
@@ -325,16 +333,16 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                 ended = ends;
                 start = panel.last;
                 // Beyond some twenty iterations two panels of half the length are less expensive.
-                let slow = if panel.sweeps > 20 { 0.7 } else { f64::INFINITY };
+                let slow = if panel.iterations > 20 { 0.7 } else { f64::INFINITY };
                 longest = h.abs() * stretch(&panel, accuracy).min(slow).clamp(0.5, 3.0);
                 suspect = if h.abs() >= 0.999 * suspect { f64::INFINITY } else { suspect - h.abs() };
                 wall -= h.abs();
                 if wall <= 0.0 {
-                    if refusals >= NARROW {
+                    if refusals >= NARROW_PANELS {
                         longest = usual;
                     }
                     (refusals, wall) = (0, f64::INFINITY);
-                } else if refusals >= HALVING {
+                } else if refusals >= HALVE_DISTANCE {
                     refusals += 1;
                     longest = longest.min(2.0 * wall);
                 }
@@ -343,7 +351,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                 if refusals == 0 {
                     usual = h.abs();
                 }
-                if refusals == 0 || refusals >= HALVING {
+                if refusals == 0 || refusals >= HALVE_DISTANCE {
                     // The effect of rounding on the rates here, which no panel can resolve.
                     counted += 3;
                     let later = t + 2.0 * f64::EPSILON * t.abs();
@@ -367,7 +375,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                     Err(_) => h.abs() * 0.4,
                 };
                 wall = wall.min(h.abs());
-                if refusals >= HALVING {
+                if refusals >= HALVE_DISTANCE {
                     longest = longest.min(0.5 * wall);
                 }
             }

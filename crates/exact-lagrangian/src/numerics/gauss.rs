@@ -4,11 +4,12 @@ use contact_geom::support::legendre_polynomials;
 use std::array::from_fn;
 use std::sync::LazyLock;
 
-/// The largest number of nodes of a panel.
-pub(crate) const MOST: usize = 24;
+/// The largest number of nodes of a panel: order 48.
+pub(crate) const MAX_NODES: usize = 24;
 
-/// The numbers of nodes that a panel may have: few for a short one, many for a long one.
-const SIZES: [usize; 4] = [4, 8, 14, MOST];
+/// The numbers of nodes that a panel may have: few for a short one, many for a long one. Each is at most twice the
+/// one before, so that the solution with few nodes is a good guess for that with more.
+const NODE_COUNTS: [usize; 4] = [4, 8, 14, MAX_NODES];
 
 /// The golden ratio minus one: of all numbers, the fractional parts of its multiples are the most evenly distributed.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -18,24 +19,24 @@ pub(crate) struct Gauss {
     /// The number of nodes.
     pub s: usize,
     /// The nodes.
-    pub c: [f64; MOST],
+    pub c: [f64; MAX_NODES],
     /// The weights.
-    pub b: [f64; MOST],
+    pub b: [f64; MAX_NODES],
     /// The integrals of the Lagrange polynomials from 0 to each node: `v_i = v0 + h sum_j a_ij a_j`.
-    pub a: [[f64; MOST]; MOST],
+    pub a: [[f64; MAX_NODES]; MAX_NODES],
     /// The square of that matrix: `q_i = q0 + h c_i v0 + h^2 sum_j aa_ij a_j`.
-    pub aa: [[f64; MOST]; MOST],
+    pub aa: [[f64; MAX_NODES]; MAX_NODES],
     /// `b_j (1 - c_j)`: the position at the end is `q0 + h v0 + h^2 sum_j end_j a_j`.
-    pub end: [f64; MOST],
+    pub end: [f64; MAX_NODES],
     /// The functionals that give the last two Legendre coefficients of a function from its values at the nodes.
-    pub tail: [[f64; MOST]; 2],
+    pub tail: [[f64; MAX_NODES]; 2],
     /// The functionals that give the two coefficients halfway to the last.
-    pub middle: [[f64; MOST]; 2],
+    pub middle: [[f64; MAX_NODES]; 2],
     /// The interpolation matrix: from the values at these nodes to the values of their polynomial at the nodes of the
     /// next larger collocation.
-    pub refine: [[f64; MOST]; MOST],
+    pub refine: [[f64; MAX_NODES]; MAX_NODES],
     /// The weights of the value at 0 of the polynomial with given values at the nodes.
-    pub start: [f64; MOST],
+    pub start: [f64; MAX_NODES],
     /// The points other than the nodes at which a solution is compared with its equations: the end; the Gauss points of
     /// one node more; and multiples of the golden ratio modulo 1, of which any number of the first are evenly
     /// distributed.
@@ -49,21 +50,23 @@ pub(crate) struct Probe {
     /// Its weight in Gauss quadrature with one more node; 0 if it is not a node of that.
     pub weight: f64,
     /// The weights of the rates.
-    pub value: [f64; MOST],
+    pub value: [f64; MAX_NODES],
     /// The weights of the integral of the rates from 0.
-    pub once: [f64; MOST],
+    pub once: [f64; MAX_NODES],
     /// The weights of the integral of that integral.
-    pub twice: [f64; MOST],
+    pub twice: [f64; MAX_NODES],
 }
 
-/// The number of probes.
+/// The number of points at which a long motion is checked in total, at least: their largest distance is
+/// about a hundredth of the motion.
 pub(crate) const PROBES: usize = 128;
 
-/// The number of probes of the collocation with fewest nodes.
-pub(crate) const PROBES_STILL: usize = 1024;
+/// The number of points at which a panel without any force is checked. Such a panel may be as long as the whole motion, so
+/// that it is checked more closely.
+pub(crate) const PROBES_WITHOUT_FORCE: usize = 1024;
 
 /// The number of Legendre polynomials that is sufficient for any number of nodes.
-const POLYNOMIALS: usize = MOST + 2;
+const POLYNOMIALS: usize = MAX_NODES + 2;
 
 /// The Gauss weight on `[0, 1]` of a node x, one of s nodes on `[-1, 1]`.
 fn weight(s: usize, x: f64) -> f64 {
@@ -73,7 +76,7 @@ fn weight(s: usize, x: f64) -> f64 {
 
 impl Gauss {
     /// The nodes on `[-1, 1]`, 0 beyond the last.
-    fn nodes(s: usize) -> [f64; MOST + 1] {
+    fn nodes(s: usize) -> [f64; MAX_NODES + 1] {
         let n = s as f64;
         from_fn(|i| {
             if i >= s {
@@ -92,12 +95,12 @@ impl Gauss {
 
     fn new(s: usize, next: usize) -> Self {
         let (nodes, beyond, between) = (Self::nodes(s), Self::nodes(next), Self::nodes(s + 1));
-        let polynomials: [_; MOST] = from_fn(|j| legendre_polynomials::<_, POLYNOMIALS>(s, nodes[j]));
+        let polynomials: [_; MAX_NODES] = from_fn(|j| legendre_polynomials::<_, POLYNOMIALS>(s, nodes[j]));
         let c = from_fn(|j| (1.0 + nodes[j]) * 0.5);
-        let rough: [f64; MOST] = from_fn(|j| if j < s { weight(s, nodes[j]) } else { 0.0 });
+        let rough: [f64; MAX_NODES] = from_fn(|j| if j < s { weight(s, nodes[j]) } else { 0.0 });
         // The closed formula amplifies the rounding of the nodes. The exact integrals of the Legendre polynomials are
         // known; one correction by them makes all weights accurate to the last digit.
-        let defects: [f64; MOST] = from_fn(|k| {
+        let defects: [f64; MAX_NODES] = from_fn(|k| {
             let sum: f64 = (0..s).map(|j| rough[j] * polynomials[j][k]).sum();
             if k == 0 { 1.0 - sum } else { -sum }
         });
@@ -107,7 +110,7 @@ impl Gauss {
         });
         // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k is a difference of
         // two Legendre polynomials.
-        let integrals = |x: f64| -> [f64; MOST] {
+        let integrals = |x: f64| -> [f64; MAX_NODES] {
             let at = legendre_polynomials::<_, POLYNOMIALS>(s, x);
             from_fn(|j| {
                 let p = polynomials[j];
@@ -115,7 +118,7 @@ impl Gauss {
                 b[j] * 0.5 * (1.0 + x + rest)
             })
         };
-        let a: [[f64; MOST]; MOST] = from_fn(|i| if i < s { integrals(nodes[i]) } else { [0.0; MOST] });
+        let a: [[f64; MAX_NODES]; MAX_NODES] = from_fn(|i| if i < s { integrals(nodes[i]) } else { [0.0; MAX_NODES] });
         let aa = from_fn(|i| from_fn(|j| (0..s).map(|k| a[i][k] * a[k][j]).sum()));
         let coefficient = |k: usize| from_fn(|j| (2 * k + 1) as f64 * b[j] * polynomials[j][k]);
         // The values of the Lagrange polynomials, and their integrals from -1, at x.
@@ -132,11 +135,11 @@ impl Gauss {
                 _ if k <= s + 1 => (0.5 * (1.0 + between[k - 1]), weight(s + 1, between[k - 1])),
                 _ => (((k - s - 1) as f64 * GOLDEN).fract(), 0.0),
             };
-            let once: [f64; MOST] = integrals(2.0 * c - 1.0);
+            let once: [f64; MAX_NODES] = integrals(2.0 * c - 1.0);
             let twice = from_fn(|j| (0..s).map(|k| once[k] * a[k][j]).sum());
             Probe { c, weight, value: lagrange(2.0 * c - 1.0), once, twice }
         };
-        let refine = from_fn(|i| if i < next { lagrange(beyond[i]) } else { [0.0; MOST] });
+        let refine = from_fn(|i| if i < next { lagrange(beyond[i]) } else { [0.0; MAX_NODES] });
         Gauss {
             s,
             refine,
@@ -147,7 +150,7 @@ impl Gauss {
             tail: [s - 1, s - 2].map(coefficient),
             middle: [s / 2, s / 2 - 1].map(coefficient),
             start: lagrange(-1.0),
-            probes: (0..if s == SIZES[0] { PROBES_STILL } else { PROBES }).map(probe).collect(),
+            probes: (0..if s == NODE_COUNTS[0] { PROBES_WITHOUT_FORCE } else { PROBES }).map(probe).collect(),
             a,
         }
     }
@@ -155,7 +158,7 @@ impl Gauss {
 
 /// The tables, computed once.
 static TABLES: LazyLock<[Gauss; 4]> =
-    LazyLock::new(|| from_fn(|i| Gauss::new(SIZES[i], *SIZES.get(i + 1).unwrap_or(&SIZES[i]))));
+    LazyLock::new(|| from_fn(|i| Gauss::new(NODE_COUNTS[i], *NODE_COUNTS.get(i + 1).unwrap_or(&NODE_COUNTS[i]))));
 
 /// The collocations from the one with fewest nodes to the one with most.
 pub(crate) fn collocations() -> &'static [Gauss; 4] {
@@ -177,7 +180,8 @@ mod tests {
                 assert!((sum - 1.0 / (k + 1) as f64).abs() < eps, "s = {}, degree {k}: {sum}", g.s);
             }
             for (i, k) in (0..g.s).flat_map(|i| (0..g.s).map(move |k| (i, k))) {
-                let row = |m: &[[f64; MOST]; MOST]| (0..g.s).map(|j| m[i][j] * g.c[j].powi(k as i32)).sum::<f64>();
+                let row =
+                    |m: &[[f64; MAX_NODES]; MAX_NODES]| (0..g.s).map(|j| m[i][j] * g.c[j].powi(k as i32)).sum::<f64>();
                 let (once, n) = (g.c[i].powi(k as i32 + 1), (k + 1) as f64);
                 assert!((row(&g.a) - once / n).abs() < eps, "s = {}, row {i}, degree {k}", g.s);
                 if k + 1 < g.s {

@@ -1,6 +1,6 @@
 //! One panel of a motion: collocation at Gauss points, solved by fixed-point iteration to round-off.
 
-use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
+use crate::numerics::gauss::{Gauss, MAX_NODES, PROBES, Probe, collocations};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{GeometryError, Scalar};
@@ -31,7 +31,7 @@ impl<const N: usize, T: Scalar> Rate<N, T> {
 
     /// The sum of the rates at the nodes with these weights.
     #[inline(always)]
-    fn sum(nodes: &[Self], weights: &[f64; MOST]) -> Self {
+    fn sum(nodes: &[Self], weights: &[f64; MAX_NODES]) -> Self {
         let mut sum = Self::zero();
         for (rate, w) in nodes.iter().zip(weights) {
             for i in 0..N {
@@ -74,7 +74,7 @@ pub(crate) struct Panel<const N: usize, T> {
     /// The number of nodes.
     pub nodes: usize,
     /// The number of iterations with the last number of nodes.
-    pub sweeps: u32,
+    pub iterations: u32,
 }
 
 /// The position at a panel's end, where it is given instead of the velocity at the start.
@@ -84,7 +84,7 @@ pub(crate) struct End<'a, const N: usize, T> {
     /// times.
     pub inverse: &'a SMatrix<f64, N, N>,
     /// The contraction factor above which the iteration is given up, because a better inverse is needed.
-    pub patience: f64,
+    pub max_contraction: f64,
 }
 
 /// The reason why a panel could not be solved; a shorter panel may succeed.
@@ -102,8 +102,9 @@ pub(crate) enum Refused {
 /// The smallest positive number, which is the spacing of the numbers below [`f64::MIN_POSITIVE`].
 pub(crate) const SMALLEST: f64 = f64::MIN_POSITIVE * f64::EPSILON;
 
-/// The number of iterations after which the iteration counts as not contracting.
-const SWEEPS: u32 = 40;
+/// The largest number of iterations of a panel; an iteration that needs more counts as not contracting. Twice as many as
+/// those above which shorter panels are less expensive (see [`integrate`](crate::numerics::flow::integrate)).
+const MAX_ITERATIONS: u32 = 40;
 
 /// The largest absolute value, of the values alone and of the values with their differentials. On duals both must
 /// converge; they are kept apart so that neither masks the other.
@@ -112,7 +113,7 @@ pub(crate) struct Size(pub [f64; 2]);
 
 impl Size {
     #[inline(always)]
-    fn see<T: Scalar>(&mut self, x: T) {
+    fn include<T: Scalar>(&mut self, x: T) {
         // Comparisons instead of `f64::max`: an extent is never NaN, and for a plain number it is the modulus.
         let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
         let modulus = if plain { extent } else { x.pivot_size() };
@@ -127,7 +128,7 @@ impl Size {
     #[inline]
     pub fn of<'a, T: Scalar>(entries: impl IntoIterator<Item = &'a T>) -> Self {
         let mut size = Size::default();
-        entries.into_iter().for_each(|e| size.see(*e));
+        entries.into_iter().for_each(|e| size.include(*e));
         size
     }
 
@@ -173,8 +174,8 @@ impl Floor {
     /// The floor, limited to rates that change velocity, action and b by four roundings of these units along a panel.
     /// Where rounding has a larger effect, the motion is not determined by its rounded state.
     pub fn below(self, units: &[Size; 3], h: f64) -> Self {
-        let most = |i: usize, k: usize| 4.0 * f64::EPSILON * units[i].0[k] / h.abs();
-        Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(most(i, k))))))
+        let largest = |i: usize, k: usize| 4.0 * f64::EPSILON * units[i].0[k] / h.abs();
+        Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(largest(i, k))))))
     }
 
     /// The larger of each pair of sizes.
@@ -193,22 +194,22 @@ impl Floor {
 
 /// The changes of the rates in one iteration and the scales to compare them with, for velocity, action and b.
 #[derive(Default)]
-struct Sweep {
+struct IterationChange {
     changes: [Size; 3],
     scales: [Size; 3],
 }
 
-impl Sweep {
+impl IterationChange {
     #[inline]
-    fn see<const N: usize, T: Scalar>(&mut self, x: &State<N, T>, new: &Rate<N, T>, old: &Rate<N, T>) {
+    fn include<const N: usize, T: Scalar>(&mut self, x: &State<N, T>, new: &Rate<N, T>, old: &Rate<N, T>) {
         for i in 0..N {
-            self.changes[0].see(new.a[i] - old.a[i]);
-            self.scales[0].see(x.v[i]);
+            self.changes[0].include(new.a[i] - old.a[i]);
+            self.scales[0].include(x.v[i]);
         }
-        self.changes[1].see(new.z - old.z);
-        self.scales[1].see(new.z);
-        self.changes[2].see(new.b - old.b);
-        self.scales[2].see(new.b);
+        self.changes[1].include(new.z - old.z);
+        self.scales[1].include(new.z);
+        self.changes[2].include(new.b - old.b);
+        self.scales[2].include(new.b);
     }
 
     /// The largest relative change: that of the velocity relative to the velocity, those of the rates of z and b
@@ -251,17 +252,17 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
     v0: &mut SVector<T, N>,
     evaluations: &mut u64,
 ) -> Result<Panel<N, T>, Refused> {
-    let mut nodes = [guess; MOST];
+    let mut nodes = [guess; MAX_NODES];
     let mut contraction = 0.0;
     let sizes = if problem.narrow.is_some() { 2 } else { collocations().len() };
     for (k, g) in collocations()[..sizes].iter().enumerate() {
         let largest = k + 1 == sizes;
-        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
+        let (mut panel, changes) = iterate(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
         contraction = max_or_nan(panel.contraction, contraction);
         panel.contraction = contraction;
         if panel.error <= problem.accuracy {
             let start = problem.end.is_none().then_some(&guess);
-            panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &seen, start, evaluations)?;
+            panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &changes, start, evaluations)?;
             return Ok(panel);
         }
         if largest {
@@ -280,7 +281,7 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
 ///
 /// The number of probes is such that a long motion, which changes its position or its velocity by as much as they are,
 /// is checked at [`PROBES`] points or more in total; a motion without any force is checked at
-/// [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) points.
+/// [`PROBES_WITHOUT_FORCE`](crate::numerics::gauss::PROBES_WITHOUT_FORCE) points.
 #[expect(clippy::too_many_arguments, reason = "the panel, its rates, and what is counted")]
 fn between_nodes<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
@@ -288,26 +289,26 @@ fn between_nodes<const N: usize, T: Scalar>(
     g: &Gauss,
     nodes: &[Rate<N, T>],
     panel: &Panel<N, T>,
-    seen: &Sweep,
+    changes: &IterationChange,
     start: Option<&Rate<N, T>>,
     evaluations: &mut u64,
 ) -> Result<Rate<N, T>, Refused> {
     let Problem { t, h, from, accuracy, .. } = *problem;
     let sizes =
         |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, max_or_nan), r.z.pivot_size(), r.b.pivot_size()];
-    let most = |rates: &[Rate<N, T>]| {
+    let largest_of = |rates: &[Rate<N, T>]| {
         rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| max_or_nan(m[i], e[i])))
     };
-    let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
+    let (largest, tails) = (largest_of(nodes), largest_of(&g.tail.map(|row| Rate::sum(nodes, &row))));
     let floor = problem.floor.over(h, 64.0);
     let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, max_or_nan);
     // The defect of a rate that is accepted: the polynomial's own error, and what changes the state by roundings.
-    let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
+    let state = [changes.scales[0].0[0], from.z.pivot_size(), 1.0];
     let allowed: [f64; 3] = std::array::from_fn(|i| {
         let rounding = max_or_nan(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
         max_or_nan(16.0 * tails[i], rounding) + floor[i].0[0]
     });
-    let defect = |found: &Rate<N, T>, row: &[f64; MOST]| {
+    let defect = |found: &Rate<N, T>, row: &[f64; MAX_NODES]| {
         let continued = Rate::sum(nodes, row);
         Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b }
     };
@@ -318,13 +319,13 @@ fn between_nodes<const N: usize, T: Scalar>(
         return Err(Refused::Hidden(0.0));
     }
     let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, max_or_nan);
-    let still = largest[0] == 0.0;
+    let without_force = largest[0] == 0.0;
     // For a motion of many panels the change of the velocity also counts: the motion may have come to rest.
     let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
-    let share = if still { 1.0 } else { max_or_nan(moved / max_or_nan(position, moved), faster).min(1.0) };
-    let places = if still { g.probes.len() } else { PROBES };
-    let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
-    let count = wanted.max(g.s + 2).min(g.probes.len());
+    let share = if without_force { 1.0 } else { max_or_nan(moved / max_or_nan(position, moved), faster).min(1.0) };
+    let probes = if without_force { g.probes.len() } else { PROBES };
+    let requested = (probes as f64 * problem.part.abs() * share * share) as usize;
+    let count = requested.max(g.s + 2).min(g.probes.len());
     *evaluations += count as u64;
     let (mut last, mut missed) = (None, [Rate::zero(); 2]);
     for Probe { c, weight, value, once, twice } in &g.probes[..count] {
@@ -364,7 +365,7 @@ fn between_nodes<const N: usize, T: Scalar>(
 /// Each iteration evaluates the rates node by node, from the latest values. It ends when the next change, predicted
 /// from the last two, is below the accuracy, when changes within round-off no longer decrease, or when it is clear that
 /// the nodes do not resolve the motion.
-fn sweeps<const N: usize, T: Scalar>(
+fn iterate<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
     g: &Gauss,
@@ -372,12 +373,12 @@ fn sweeps<const N: usize, T: Scalar>(
     v0: &mut SVector<T, N>,
     last: bool,
     evaluations: &mut u64,
-) -> Result<(Panel<N, T>, Sweep), Refused> {
+) -> Result<(Panel<N, T>, IterationChange), Refused> {
     let Problem { t, h, from, end, accuracy, narrow, .. } = problem;
     let (t, h) = (*t, *h);
     let (nothing, rounding) = (Floor::default().over(h, 1.0), problem.floor.over(h, 16.0));
     let (mut before, mut contraction) = (f64::INFINITY, 0.0f64);
-    for sweep in 1..=SWEEPS {
+    for iteration in 1..=MAX_ITERATIONS {
         if let Some(End { displacement, inverse, .. }) = end {
             let twice = Rate::sum(nodes, &g.end).a;
             let missed = SVector::<T, N>::from_fn(|i, _| displacement[i] - (v0[i] + twice[i] * h) * h);
@@ -385,7 +386,7 @@ fn sweeps<const N: usize, T: Scalar>(
                 v0[i] += missed[j] * inverse[(i, j)];
             }
         }
-        let mut seen = Sweep::default();
+        let mut changes = IterationChange::default();
         *evaluations += g.s as u64;
         for i in 0..g.s {
             let (mut once, mut twice) = (Rate::<N, T>::zero(), SVector::<T, N>::from_element(T::zero()));
@@ -404,35 +405,35 @@ fn sweeps<const N: usize, T: Scalar>(
                 b: from.b + once.b * h,
             };
             let rate = rates.at(t + g.c[i] * h, &x).map_err(Refused::Undefined)?;
-            seen.see(&x, &rate, &nodes[i]);
+            changes.include(&x, &rate, &nodes[i]);
             nodes[i] = rate;
         }
         if let Some([v, z, b]) = narrow {
             let units = [*v, z.times(1.0 / h.abs()), b.times(1.0 / h.abs())];
-            seen.scales = std::array::from_fn(|i| seen.scales[i].or(units[i]));
+            changes.scales = std::array::from_fn(|i| changes.scales[i].or(units[i]));
         }
-        let change = seen.max_abs_or_nan(h, &nothing);
+        let change = changes.max_abs_or_nan(h, &nothing);
         if !change.is_finite() {
             // After a first guess of zero rates a scale may be zero; in later iterations the reason is a value that is
             // not finite.
-            if sweep > 1 {
+            if iteration > 1 {
                 return Err(Refused::NonFinite);
             }
             continue;
         }
-        let error = estimate(problem, nodes, &seen, g);
+        let error = estimate(problem, nodes, &changes, g);
         let ratio = if before.is_finite() { change / before } else { 1.0 };
         let above_noise = change > 1e3 * f64::EPSILON;
-        if sweep > 2 && above_noise {
+        if iteration > 2 && above_noise {
             contraction = contraction.max(ratio);
         }
         // The first ratio involves the change from a guess, and may be far below those that follow.
-        let expected = if sweep < 3 { ratio.max(1e-3) } else { ratio };
+        let expected = if iteration < 3 { ratio.max(1e-3) } else { ratio };
         let predicted = change * expected <= 0.5 * accuracy;
         // After few iterations a larger change may still decrease.
-        let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
+        let noise = if iteration < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
         let stagnant =
-            before.is_finite() && ratio >= 1.0 && (change <= noise || seen.max_abs_or_nan(h, &rounding) == 0.0);
+            before.is_finite() && ratio >= 1.0 && (change <= noise || changes.max_abs_or_nan(h, &rounding) == 0.0);
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
         if predicted || stagnant || unresolved {
             let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);
@@ -448,12 +449,12 @@ fn sweeps<const N: usize, T: Scalar>(
                 error,
                 contraction,
                 nodes: g.s,
-                sweeps: sweep,
+                iterations: iteration,
             };
-            return Ok((panel, seen));
+            return Ok((panel, changes));
         }
-        let patience = end.as_ref().map_or(1.0, |end| end.patience);
-        if (ratio >= 1.0 && sweep > 8) || (ratio > patience && sweep > 3 && above_noise) {
+        let max_contraction = end.as_ref().map_or(1.0, |end| end.max_contraction);
+        if (ratio >= 1.0 && iteration > 8) || (ratio > max_contraction && iteration > 3 && above_noise) {
             return Err(Refused::Slow);
         }
         before = change;
@@ -469,7 +470,12 @@ fn sweeps<const N: usize, T: Scalar>(
 /// that is applied. This holds where the coefficients decrease geometrically, so that the tail is the square of the
 /// relative size of the coefficients halfway to it. For a function with a kink they decrease algebraically; the second
 /// factor is then the square of their decrease from halfway to the end.
-fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N, T>], seen: &Sweep, g: &Gauss) -> f64 {
+fn estimate<const N: usize, T: Scalar>(
+    problem: &Problem<N, T>,
+    nodes: &[Rate<N, T>],
+    changes: &IterationChange,
+    g: &Gauss,
+) -> f64 {
     let h = problem.h;
     let floor = problem.floor.over(h, 32.0);
     let [tails, middle] = [&g.tail, &g.middle].map(|rows| {
@@ -477,7 +483,7 @@ fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N,
         [Size::of(one.a.iter().chain(two.a.iter())), Size::of([&one.z, &two.z]), Size::of([&one.b, &two.b])]
     });
     let accelerations = Size::of(nodes.iter().flat_map(|r| r.a.iter()));
-    let scales = [accelerations, seen.scales[1], seen.scales[2]];
+    let scales = [accelerations, changes.scales[1], changes.scales[2]];
     let relative: [f64; 3] = std::array::from_fn(|i| {
         let tail = tails[i].over(scales[i], floor[i]);
         let fall = tails[i].over(middle[i], floor[i]);
@@ -486,7 +492,7 @@ fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N,
     });
     let velocity = match relative[0] {
         0.0 => 0.0,
-        tail => tail * accelerations.over(seen.scales[0], Size::default()) * h.abs(),
+        tail => tail * accelerations.over(changes.scales[0], Size::default()) * h.abs(),
     };
     max_or_nan(max_or_nan(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
 }

@@ -71,6 +71,7 @@ impl<const N: usize, C: Curve<N>, V: Curve<N>> Curve<N> for VariedCurve<'_, C, V
 
 /// The action along a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CurveAction {
     /// The end value `Z = z(t1)` of the action.
     pub z: f64,
@@ -129,7 +130,7 @@ struct AlongCurve<'a, L, C, V, const N: usize> {
 type CurvePoint<const N: usize> = (SVector<f64, N>, SVector<f64, N>);
 
 /// The number of times that are kept, sufficient for a panel and the one before.
-const KEPT: usize = 64;
+const STORED_TIMES: usize = 64;
 
 impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> for AlongCurve<'_, L, C, V, N> {
     fn at(&self, s: f64, x: &State<N>) -> Result<Rate<N>, GeometryError> {
@@ -154,8 +155,8 @@ impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> AlongCurve<'_, 
         }
         let rest = (SVector::zeros(), SVector::zeros());
         let points = [self.curve.at(s)?, self.variation.map_or(Ok(rest), |variation| variation.at(s))?];
-        if read.len() == KEPT {
-            read.drain(..KEPT / 2);
+        if read.len() == STORED_TIMES {
+            read.drain(..STORED_TIMES / 2);
         }
         read.push((s, points));
         Ok(points)

@@ -63,7 +63,7 @@ pub struct ExtendedMotion<const N: usize, T = f64> {
     pub defect: f64,
 }
 
-/// The number of parts of a motion, at whose ends the constraint is checked.
+/// The number of parts of a motion, at whose ends the constraint is checked: enough to see a drift that grows along it.
 const PARTS: usize = 8;
 
 impl<L> NonHolonomic<L> {

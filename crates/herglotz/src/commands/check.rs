@@ -1,19 +1,19 @@
 //! `herglotz check`.
 
-use super::SceneArguments;
 use super::plan::momentum;
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
-use herglotz::runtime::CONTACT;
+use herglotz::runtime::MAX_CONTACT_DEFECT;
 
 #[derive(Args)]
 pub(crate) struct Check {
     #[command(flatten)]
     scene: SceneArguments,
     /// The number of places along the motion.
-    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
-    places: u16,
+    #[arg(long = "places", value_name = "PLACES", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    samples: u16,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -22,9 +22,10 @@ pub(crate) struct Check {
 impl Check {
     pub fn run(&self) -> Result<(), Failure> {
         let scene = self.scene.read()?;
-        let checked = scene.system.check(&scene.bare_motion(), self.places.into());
+        let checked = scene.system.check(&scene.bare_motion(), self.samples.into());
         let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
+        let momenta: Vec<String> =
+            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
             print_json(&of_json(&check, &momenta))?;
         } else {
@@ -35,15 +36,15 @@ impl Check {
 }
 
 fn of_json(check: &herglotz::runtime::Check, momenta: &[String]) -> serde_json::Value {
-    let place = |place: &herglotz::runtime::Place| {
+    let sample = |sample: &herglotz::runtime::Sample| {
         let of = |(name, m): (&String, &herglotz::runtime::MomentumSample)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
         serde_json::json!({
-            "t": json(place.t),
-            "sigma_d": json(place.sigma),
-            "log_factor": json(place.log_factor),
-            "contact_defect": json(place.contact_defect),
-            "herglotz_defect": json(place.herglotz_defect),
-            "momenta": momenta.iter().zip(&place.momenta).map(of).collect::<Vec<_>>(),
+            "t": json(sample.t),
+            "sigma_d": json(sample.sigma),
+            "log_factor": json(sample.log_factor),
+            "contact_defect": json(sample.contact_defect),
+            "herglotz_defect": json(sample.herglotz_defect),
+            "momenta": momenta.iter().zip(&sample.momenta).map(of).collect::<Vec<_>>(),
         })
     };
     let stated = |stated: &herglotz::runtime::StatementResidual| {
@@ -60,7 +61,7 @@ fn of_json(check: &herglotz::runtime::Check, momenta: &[String]) -> serde_json::
         "contact": check.is_contact(),
         "contact_defect": json(check.contact_defect()),
         "momentum_defect": json(check.momentum_defect()),
-        "places": check.places.iter().map(place).collect::<Vec<_>>(),
+        "places": check.samples.iter().map(sample).collect::<Vec<_>>(),
         "statements": check.statements.iter().map(stated).collect::<Vec<_>>(),
     })
 }
@@ -70,12 +71,12 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     let mut header = words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"]);
     header.extend(momenta.iter().flat_map(|name| [name.clone(), "predicted".to_owned()]));
-    let mut places = vec![header];
-    for place in &check.places {
-        let mut row = vec![short(place.t), short(place.sigma), short(place.log_factor)];
-        row.extend([size(place.contact_defect), size(place.herglotz_defect)]);
-        row.extend(place.momenta.iter().flat_map(|m| [short(m.momentum), short(m.predicted)]));
-        places.push(row);
+    let mut samples = vec![header];
+    for sample in &check.samples {
+        let mut row = vec![short(sample.t), short(sample.sigma), short(sample.log_factor)];
+        row.extend([size(sample.contact_defect), size(sample.herglotz_defect)]);
+        row.extend(sample.momenta.iter().flat_map(|m| [short(m.momentum), short(m.predicted)]));
+        samples.push(row);
     }
     let mut statements = vec![words(&["statement", "by", "residual"])];
     for stated in &check.statements {
@@ -89,10 +90,10 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     let (defect, herglotz::runtime::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
     let mut parts = vec![
         format!(
-            "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {CONTACT:.0e}",
+            "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {MAX_CONTACT_DEFECT:.0e}",
             short(*step_size)
         ),
-        table(&places),
+        table(&samples),
     ];
     if !momenta.is_empty() {
         parts.push(format!("the momenta are predicted to {:.1e} of their size", check.momentum_defect()));

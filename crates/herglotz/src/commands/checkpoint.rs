@@ -61,7 +61,7 @@ impl Checkpoint {
 }
 
 /// Writes the checkpoints of a run.
-pub(crate) struct Saves {
+pub(crate) struct CheckpointWriter {
     directory: Directory,
     scene: String,
     integrator: String,
@@ -71,10 +71,10 @@ pub(crate) struct Saves {
     last: Instant,
 }
 
-impl Saves {
+impl CheckpointWriter {
     /// Checkpoints in a directory at an interval of time.
     pub fn new(directory: &Directory, scene: &Scene, plan: &Plan, every: Duration) -> Self {
-        Saves {
+        CheckpointWriter {
             directory: directory.clone(),
             scene: scene.fingerprint(),
             integrator: plan.integrator.name.to_string(),
@@ -92,7 +92,7 @@ impl Saves {
 
     /// Saves the state after a number of steps.
     pub fn save(&mut self, taken: usize, written: Written, state: &ResumeState) -> Result<(), Failure> {
-        let Saves { scene, integrator, count, in_transformed_time, .. } = &*self;
+        let CheckpointWriter { scene, integrator, count, in_transformed_time, .. } = &*self;
         let checkpoint = Checkpoint {
             scene: scene.clone(),
             integrator: integrator.clone(),

@@ -1,7 +1,7 @@
 //! `herglotz compare`.
 
-use super::SceneArguments;
 use super::run::progress_bar;
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, short};
 use crate::peer::Dop853;
@@ -10,7 +10,7 @@ use clap::Args;
 use herglotz::runtime::{Comparison, Work};
 use std::path::PathBuf;
 
-/// The errors for which the best integrator is reported.
+/// The errors for which the best integrator is reported: from a figure's to nearly round-off.
 const ERRORS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 
 #[derive(Args)]

@@ -1,6 +1,6 @@
 //! `herglotz run` for a lattice.
 
-use super::run::{ROWS, Run, progress_bar, stop_flag};
+use super::run::{ROWS, Run, interrupt_flag, progress_bar};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, json, print, print_json, short};
 use crate::plot;
@@ -59,7 +59,7 @@ impl Run {
             count: 0,
             drawn: self.plot.then(Vec::new),
             bar: progress_bar(!self.json),
-            stop: stop_flag(),
+            stop: interrupt_flag(),
             failure: None,
         };
         let outcome = scene.system.run(&scene.motion, &mut writer);

@@ -9,15 +9,31 @@ mod list;
 mod new;
 mod plan;
 mod run;
+mod scene_arguments;
 mod sweep;
 
-use crate::Program;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
-use clap::{Args, CommandFactory, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use herglotz::Scene;
-use std::path::PathBuf;
+
+/// Contact mechanics from scene files: runs, plans, checks, comparisons and parameter sweeps of solutions of Herglotz'
+/// equation.
+///
+/// Begin with `herglotz new pendulum > pendulum.toml` and `herglotz run pendulum.toml`.
+#[derive(Parser)]
+#[command(name = "herglotz", version, about)]
+pub(crate) struct Program {
+    #[command(subcommand)]
+    command: Command,
+}
+
+impl Program {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), Failure> {
+        self.command.run()
+    }
+}
 
 /// The subcommands.
 #[derive(Subcommand)]
@@ -66,35 +82,5 @@ impl Command {
             }
             Command::Schema => print_json(&herglotz::schema()),
         }
-    }
-}
-
-/// A scene file, with overrides.
-#[derive(Args)]
-pub(crate) struct SceneArguments {
-    /// The scene file.
-    pub(crate) file: PathBuf,
-    /// Override a value of the scene: a parameter, start.NAME, run.time, run.accuracy, run.step, run.steps or
-    /// run.integrator.
-    #[arg(long = "set", value_name = "NAME=VALUE")]
-    pub(crate) changes: Vec<String>,
-}
-
-impl SceneArguments {
-    /// Reads the scene.
-    pub fn read(&self) -> Result<Scene, Failure> {
-        Scene::read_with(&self.text()?, &self.changes).map_err(|error| self.explain(error))
-    }
-
-    /// The text of the file.
-    pub fn text(&self) -> Result<String, Failure> {
-        let text = std::fs::read(&self.file).map_err(Failure::of_file(&self.file))?;
-        String::from_utf8(text)
-            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))
-    }
-
-    /// An error with the name of the file.
-    pub fn explain(&self, error: herglotz::SceneError) -> Failure {
-        error.in_file(self.file.display().to_string()).into()
     }
 }

@@ -1,11 +1,11 @@
 //! `herglotz plan`.
 
-use super::SceneArguments;
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
 use herglotz::Scene;
-use herglotz::runtime::SeenSymmetry;
+use herglotz::runtime::FormulaSymmetry;
 
 #[derive(Args)]
 pub(crate) struct Plan {
@@ -17,12 +17,12 @@ pub(crate) struct Plan {
 }
 
 /// The momentum of a symmetry, as a formula.
-pub(crate) fn momentum(scene: &Scene, symmetry: &SeenSymmetry) -> String {
+pub(crate) fn momentum(scene: &Scene, symmetry: &FormulaSymmetry) -> String {
     let names = scene.system.formula().coordinates();
     let name = |i: usize| names.get(i).map(String::as_str).unwrap_or_default();
     let all: Vec<_> = match symmetry {
-        SeenSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
-        SeenSymmetry::Rotation(pairs) => {
+        FormulaSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
+        FormulaSymmetry::Rotation(pairs) => {
             pairs.iter().map(|(i, j)| format!("{x}*p_{y} - {y}*p_{x}", x = name(*i), y = name(*j))).collect()
         }
     };
@@ -49,7 +49,8 @@ impl Plan {
         let scene = self.scene.read()?;
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let proved = proved(&scene);
-        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
+        let momenta: Vec<String> =
+            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
             let of = |item: &herglotz::runtime::PlanEntry| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
             let proved: serde_json::Map<_, _> =
@@ -71,7 +72,7 @@ impl Plan {
         let holding = proved.iter().filter(|(_, holds, _)| *holds);
         lines.extend(holding.map(|(name, _, meaning)| format!("  {name}: {meaning}")));
         lines.extend(momenta.iter().map(|momentum| format!("  {momentum} decays as the conformal factor")));
-        if !scene.knobs.is_empty() {
+        if !scene.swept.is_empty() {
             lines.push(format!("a sweep has {} members", scene.members().count()));
         }
         print(&lines.join("\n"))

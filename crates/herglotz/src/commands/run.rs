@@ -1,7 +1,7 @@
 //! `herglotz run`.
 
-use super::SceneArguments;
-use super::checkpoint::{Checkpoint, Saves, Written};
+use super::checkpoint::{Checkpoint, CheckpointWriter, Written};
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
@@ -63,7 +63,7 @@ struct Writer {
     stop: Arc<AtomicBool>,
     interrupt_at: Option<f64>,
     interrupted: Option<ResumeState>,
-    saves: Saves,
+    checkpoints: CheckpointWriter,
     failure: Option<Failure>,
 }
 
@@ -75,7 +75,7 @@ impl Writer {
         Ok(Written { rows: self.row_count, rows_bytes, events: self.event_count, events_bytes })
     }
 
-    fn keep(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
+    fn continue_unless_failed(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
         match written {
             Ok(()) => ControlFlow::Continue(()),
             Err(failure) => {
@@ -96,7 +96,7 @@ impl RunMonitor for Writer {
             *count += usize::from(!x.is_finite());
         }
         let written = self.rows.numbers(numbers);
-        self.keep(written)
+        self.continue_unless_failed(written)
     }
 
     fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
@@ -105,14 +105,14 @@ impl RunMonitor for Writer {
         };
         self.event_count += 1;
         let written = table.record([name.clone()].into_iter().chain(numbers_of_event(&self.scene, crossing)));
-        self.keep(written)
+        self.continue_unless_failed(written)
     }
 
     fn poll(&mut self, part: f64) -> ControlFlow<()> {
         self.bar.set_position((part * 1000.0) as u64);
         // At the end of the motion an interruption has no effect.
-        let wanted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
-        if wanted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let is_interrupted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
+        if is_interrupted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn interrupted(&mut self, at: ResumeState) {
@@ -120,12 +120,12 @@ impl RunMonitor for Writer {
     }
 
     fn wants_checkpoint(&mut self) -> bool {
-        self.saves.is_due()
+        self.checkpoints.is_due()
     }
 
     fn checkpoint(&mut self, taken: usize, at: ResumeState) -> ControlFlow<()> {
-        let saved = self.written().and_then(|written| self.saves.save(taken, written, &at));
-        self.keep(saved)
+        let saved = self.written().and_then(|written| self.checkpoints.save(taken, written, &at));
+        self.continue_unless_failed(saved)
     }
 }
 
@@ -136,7 +136,7 @@ pub(crate) fn numbers_of_event(scene: &Scene, crossing: &Crossing) -> impl Itera
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
-pub(crate) fn stop_flag() -> Arc<AtomicBool> {
+pub(crate) fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = flag.clone();
     let handler = move || {
@@ -184,19 +184,19 @@ impl Run {
         let plan = match &saved {
             // The steps are known, and are not determined again.
             Some(saved) if !saved.in_transformed_time => {
-                motion.way = steps(&saved.integrator, saved.count).unwrap_or(motion.way);
+                motion.step_control = steps(&saved.integrator, saved.count).unwrap_or(motion.step_control);
                 scene.system.plan(&motion).map_err(explain)?
             }
             _ => scene.system.plan(&motion).map_err(explain)?,
         };
         // The run takes the steps of the plan, which are determined once.
         if !plan.integrator.in_transformed_time {
-            motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
+            motion.step_control = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.step_control);
         }
         let from = saved.as_ref().map(|saved| saved.state(&directory)).transpose()?;
         let every = Duration::from_secs(self.checkpoint_every.into());
-        let saves = Saves::new(&directory, &scene, &plan, every);
-        let mut writer = self.writer(&directory, &scene, saves, saved.as_ref())?;
+        let checkpoints = CheckpointWriter::new(&directory, &scene, &plan, every);
+        let mut writer = self.writer(&directory, &scene, checkpoints, saved.as_ref())?;
         if saved.is_none() {
             Checkpoint::remove(&directory)?;
         }
@@ -207,7 +207,7 @@ impl Run {
         writer.bar.finish_and_clear();
         let outcome = outcome.map_err(explain)?;
         let written = writer.written()?;
-        let Writer { not_finite, interrupted, mut saves, failure, .. } = writer;
+        let Writer { not_finite, interrupted, mut checkpoints, failure, .. } = writer;
         if let Some(failure) = failure {
             return Err(failure);
         }
@@ -215,7 +215,7 @@ impl Run {
             eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
         match &interrupted {
-            Some(state) => saves.save(outcome.steps, written, state)?,
+            Some(state) => checkpoints.save(outcome.steps, written, state)?,
             None => Checkpoint::remove(&directory)?,
         }
         if self.plot {
@@ -228,7 +228,7 @@ impl Run {
                 directory.write("section.svg", &figure)?;
             }
         }
-        self.tell(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
+        self.report(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
     }
 
     /// The output files: new ones, or those of the run that is resumed.
@@ -236,7 +236,7 @@ impl Run {
         &self,
         directory: &Directory,
         scene: &Scene,
-        saves: Saves,
+        checkpoints: CheckpointWriter,
         saved: Option<&Checkpoint>,
     ) -> Result<Writer, Failure> {
         directory.create()?;
@@ -245,8 +245,8 @@ impl Run {
         let before = saved.map(|saved| saved.written);
         let (rows, events) = match before {
             Some(before) => {
-                let events = has_events.then(|| Table::go_on(events_at, before.events_bytes)).transpose()?;
-                (Table::go_on(rows_at, before.rows_bytes)?, events)
+                let events = has_events.then(|| Table::resume(events_at, before.events_bytes)).transpose()?;
+                (Table::resume(rows_at, before.rows_bytes)?, events)
             }
             None => {
                 let header = header_of_events(scene);
@@ -268,16 +268,16 @@ impl Run {
             not_finite: vec![0; scene.columns.len()],
             skip,
             bar: progress_bar(!self.json),
-            stop: stop_flag(),
+            stop: interrupt_flag(),
             interrupt_at: self.interrupt_at,
             interrupted: None,
-            saves,
+            checkpoints,
             failure: None,
         })
     }
 
     /// Prints the final state.
-    fn tell(
+    fn report(
         &self,
         scene: &Scene,
         plan: &Plan,

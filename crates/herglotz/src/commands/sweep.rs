@@ -1,7 +1,7 @@
 //! `herglotz sweep`.
 
-use super::SceneArguments;
-use super::run::{EVENTS, header_of_events, numbers_of_event, progress_bar, stop_flag};
+use super::run::{EVENTS, header_of_events, interrupt_flag, numbers_of_event, progress_bar};
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, print, print_json};
 use crate::plot;
@@ -117,7 +117,7 @@ impl Sweep {
         let scene = self.scene.read()?;
         let members = scene.members();
         let refuse = |why: &str| Failure::Input(format!("{}: {why}", self.scene.file.display()));
-        if scene.knobs.is_empty() {
+        if scene.swept.is_empty() {
             return Err(refuse(
                 "there is nothing to sweep; add [sweep] with a parameter, as in gamma = { from = -1.0, to = 0.0, count = 11 }",
             ));
@@ -133,8 +133,8 @@ impl Sweep {
         let shown = scene.columns.iter().filter(|(_, column)| !matches!(column, Column::Time));
         let (names, columns): (Vec<&str>, Vec<Column>) =
             shown.map(|(name, column)| (name.as_str(), column.clone())).unzip();
-        let knobs = scene.knobs.iter().map(|knob| knob.name.as_str());
-        let swept: Vec<&str> = ["index"].into_iter().chain(knobs).collect();
+        let swept = scene.swept.iter().map(|quantity| quantity.name.as_str());
+        let swept: Vec<&str> = ["index"].into_iter().chain(swept).collect();
         let header = swept.iter().copied().chain(["status", "why", "steps", "t"]).chain(names.iter().copied());
         let of_events = header_of_events(&scene);
         let header_of_events = swept.iter().copied().chain(of_events.iter().map(String::as_str));
@@ -151,7 +151,7 @@ impl Sweep {
             columns: columns.len(),
             drawn: self.plot.then(Default::default),
             bar: progress_bar(!self.json),
-            stop: stop_flag(),
+            stop: interrupt_flag(),
             members: 0,
             failure: None,
         };
@@ -166,7 +166,7 @@ impl Sweep {
             t0: members.t0(),
             varied: (!parameters.is_empty()).then_some(varied),
             end: motion.end,
-            way: motion.way,
+            step_control: motion.step_control,
             rows: None,
             columns: &columns,
             events: &events,
@@ -181,24 +181,24 @@ impl Sweep {
         if let Some(failure) = failure {
             return Err(failure);
         }
-        let knob = scene.knobs.first().map(|knob| knob.name.as_str()).unwrap_or_default();
+        let quantity = scene.swept.first().map(|quantity| quantity.name.as_str()).unwrap_or_default();
         let at_first = scene.columns_of_first_event();
         let at_first: Vec<&str> = at_first.iter().map(String::as_str).collect();
         let [ends, at_events] = drawn.unwrap_or_default();
         for (file, names, points) in [("sweep", &names, ends), ("sweep_events", &at_first, at_events)] {
             for (i, name) in names.iter().enumerate() {
                 let of = |(value, numbers): &Drawn| Some((*value, *numbers.get(i)?)).filter(|p| p.1.is_finite());
-                if let Some(figure) = plot::of_sweep(&scene, knob, name, points.iter().filter_map(of).collect()) {
+                if let Some(figure) = plot::of_sweep(&scene, quantity, name, points.iter().filter_map(of).collect()) {
                     directory.write(&format!("{file}_{i}.svg"), &figure)?;
                 }
             }
         }
         let herglotz::runtime::Tally { completed, stopped, failed, unresolved, .. } = tally;
         if self.json {
-            let told = serde_json::json!({
+            let summary = serde_json::json!({
                 "members": written, "completed": completed, "stopped": stopped, "failed": failed, "unresolved": unresolved,
             });
-            print_json(&told)?;
+            print_json(&summary)?;
         } else {
             let stopped = if stopped > 0 { format!(", {stopped} stopped by an event") } else { String::new() };
             print(&format!(

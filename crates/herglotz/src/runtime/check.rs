@@ -2,7 +2,7 @@
 
 use contact_geom::Statement;
 
-/// The momentum of a symmetry at a place, and the prediction of Noether's theorem.
+/// The momentum of a symmetry at a sample of a motion, and the prediction of Noether's theorem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentumSample {
     /// The momentum.
@@ -11,9 +11,9 @@ pub struct MomentumSample {
     pub predicted: f64,
 }
 
-/// A place along a motion.
+/// A sample of a motion: a state at the end of a step, and the step that starts there.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct Sample {
     /// The time.
     pub t: f64,
     /// The conformal factor of the step that starts there.
@@ -32,6 +32,7 @@ pub struct Place {
 
 /// A statement of the paper on the discrete theory, evaluated at two points of the motion.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StatementResidual {
     /// The statement.
     pub statement: Statement,
@@ -53,38 +54,38 @@ pub struct Check {
     pub integrator: String,
     /// The step.
     pub step_size: f64,
-    /// The places along the motion.
-    pub places: Vec<Place>,
-    /// The theorems, with the largest residual over a few places.
+    /// The samples of the motion, in the order of the motion.
+    pub samples: Vec<Sample>,
+    /// The theorems, with the largest residual over a few samples.
     pub statements: Vec<StatementResidual>,
 }
 
 /// The largest defect of a step that counts as contact. Differences of sixth order give 1e-11 for steps of the
 /// catalogue's systems; a step of the classical Runge-Kutta method over a tenth of a pendulum's period gives 1e-4.
-pub const CONTACT: f64 = 1e-9;
+pub const MAX_CONTACT_DEFECT: f64 = 1e-9;
 
 impl Check {
     /// The largest contact defect.
     pub fn contact_defect(&self) -> f64 {
-        contact_geom::numbers::max_abs_or_nan(self.places.iter().map(|place| place.contact_defect))
+        contact_geom::numbers::max_abs_or_nan(self.samples.iter().map(|sample| sample.contact_defect))
     }
 
-    /// Whether every step that was checked is contact to within [`CONTACT`], with a conformal factor that is finite and
+    /// Whether every step that was checked is contact to within [`MAX_CONTACT_DEFECT`], with a conformal factor that is finite and
     /// not 0: with the factor 0 the pullback is not a contact form.
     pub fn is_contact(&self) -> bool {
-        self.contact_defect() <= CONTACT && !self.loses_the_form()
+        self.contact_defect() <= MAX_CONTACT_DEFECT && !self.loses_the_form()
     }
 
     /// Whether the conformal factor of a step is 0 or not finite, as where the drag within one step exceeds the range
     /// of floating-point numbers.
     pub fn loses_the_form(&self) -> bool {
-        self.places.iter().any(|place| place.sigma == 0.0 || !place.sigma.is_finite())
+        self.samples.iter().any(|sample| sample.sigma == 0.0 || !sample.sigma.is_finite())
     }
 
     /// The largest difference between a momentum and its prediction, in units of the largest momentum of any symmetry,
     /// since a momentum that vanishes gives no scale.
     pub fn momentum_defect(&self) -> f64 {
-        let all = || self.places.iter().flat_map(|place| &place.momenta);
+        let all = || self.samples.iter().flat_map(|sample| &sample.momenta);
         let size = contact_geom::numbers::max_abs_or_nan(all().map(|m| m.predicted));
         let apart = contact_geom::numbers::max_abs_or_nan(all().map(|m| m.momentum - m.predicted));
         if size > 0.0 { apart / size } else { apart }

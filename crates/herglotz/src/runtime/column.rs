@@ -5,6 +5,7 @@ use formula_lagrangian::{Expression, Formula};
 
 /// A quantity recorded in each row.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Column {
     /// The time.
     Time,

@@ -16,24 +16,27 @@ const BUDGET: Duration = Duration::from_millis(2000);
 
 /// The share of an integrator is at least this multiple of the run time of the reference with half its steps, so that
 /// long motions get enough time for a comparison.
-const OF_REFERENCE: u32 = 4;
+const REFERENCE_TIMES: u32 = 4;
 
 /// The number of runs of each integrator that are made regardless of their run time, so that every integrator appears;
 /// the first runs have few steps.
-const LEAST: usize = 6;
+const MIN_RUNS: usize = 6;
 
-/// A run is repeated until this time, or this number of repetitions, is reached; the smallest time counts.
-const REPEATED: Duration = Duration::from_millis(2);
-const REPETITIONS: usize = 5;
+/// A run is repeated until this time is reached, which is long compared with the resolution of the clock; the smallest
+/// time counts.
+const MAX_REPETITION_TIME: Duration = Duration::from_millis(2);
 
-/// The maximal number of step sizes of an integrator, each half the one before.
-const HALVINGS: u32 = 20;
+/// The maximal number of runs for one time.
+const MAX_REPETITIONS: usize = 5;
 
-/// The number of tolerances of a peer: 0.1, 0.01, and so on.
-const TOLERANCES: u32 = 14;
+/// The maximal number of step sizes of an integrator, each half the one before: from the longest to a millionth of it.
+const MAX_HALVINGS: u32 = 20;
+
+/// The number of tolerances of a peer: 0.1, 0.01, and so on to 1e-14, some tens of units of round-off.
+const PEER_TOLERANCES: u32 = 14;
 
 /// A peer has this multiple of the share of an integrator: there are few peers, and the plot shows each of them.
-const OF_PEER: u32 = 8;
+const PEER_SHARE: u32 = 8;
 
 /// One run of a [`Comparison`].
 #[derive(Clone, Debug, PartialEq)]
@@ -97,9 +100,9 @@ fn apart((q, p): (&[f64], &[f64]), b: &Outcome) -> f64 {
 }
 
 /// Ends a run when its interrupt is set.
-struct Asking<'i>(Option<&'i Interrupt>);
+struct UntilInterrupted<'i>(Option<&'i Interrupt>);
 
-impl RunMonitor for Asking<'_> {
+impl RunMonitor for UntilInterrupted<'_> {
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
         if self.0.is_some_and(Interrupt::is_wanted) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -120,15 +123,15 @@ impl System {
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
-        let bare = |way: StepControl| Motion {
+        let without_output = |step_control: StepControl| Motion {
             action: false,
             interrupt: motion.interrupt.clone(),
-            ..Motion::new(motion.start.clone(), motion.end, way)
+            ..Motion::new(motion.start.clone(), motion.end, step_control)
         };
         let by = AnyIntegrator::Gauss { stages: 16 };
         let mut count = Err(RuntimeError::from(InputError::NoSteps));
-        for wanted in REFERENCES {
-            let plan = self.plan(&bare(StepControl::Accuracy { wanted, by: Some(by) }));
+        for error in REFERENCES {
+            let plan = self.plan(&without_output(StepControl::Accuracy { error, by: Some(by) }));
             let refused = matches!(plan, Err(RuntimeError::Input(InputError::Accuracy { .. })));
             count = plan.map(|plan| plan.steps);
             if !refused {
@@ -138,8 +141,8 @@ impl System {
         let (count, span) = (count?, motion.end - motion.start.t);
         let run = |by: AnyIntegrator, count: usize| {
             self.run(
-                &bare(StepControl::Steps { by, steps: Steps::Count(count) }),
-                &mut Asking(motion.interrupt.as_ref()),
+                &without_output(StepControl::Steps { by, steps: Steps::Count(count) }),
+                &mut UntilInterrupted(motion.interrupt.as_ref()),
             )
         };
         let (coarse, reference) = (run(by, count)?, run(by, 2 * count)?);
@@ -156,7 +159,7 @@ impl System {
         let begin = Instant::now();
         run(by, count)?;
         let applicable = all.iter().filter(|by| self.check_integrator(**by).is_ok()).count();
-        let part = (BUDGET / ((applicable + peers.len()) as u32).max(1)).max(OF_REFERENCE * begin.elapsed());
+        let part = (BUDGET / ((applicable + peers.len()) as u32).max(1)).max(REFERENCE_TIMES * begin.elapsed());
         for (i, by) in all.iter().copied().enumerate() {
             if !progress(i as f64 / all.len() as f64) {
                 comparison.ended = true;
@@ -174,22 +177,26 @@ impl System {
             let first = count.div_ceil(8).max(1);
             let run = |halving: u32| {
                 let outcome = run(by, first.checked_shl(halving)?).ok().filter(|outcome| outcome.t == reference.t)?;
-                Some(Done { steps: outcome.steps, evaluations: outcome.evaluations, end: (outcome.q, outcome.p) })
+                Some(FinishedRun {
+                    steps: outcome.steps,
+                    evaluations: outcome.evaluations,
+                    end: (outcome.q, outcome.p),
+                })
             };
             let error = |(q, p): &(Vec<f64>, Vec<f64>)| Some(apart((q, p), &reference));
             let measure = Measure { span, part, reference_error, of: (&by.to_string(), by.order()) };
-            comparison.rows.extend(work_of(&measure, HALVINGS, &run, &error, LEAST));
+            comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
         }
         let first_order = if peers.is_empty() { None } else { Some(FirstOrder::new(self, motion, &reference)?) };
         for (peer, motion) in peers.iter().zip(first_order.iter().cycle()) {
             let run = |k: u32| {
                 let PeerEnd { state, steps, evaluations } = peer.run(motion, 10f64.powi(-(k as i32) - 1))?;
-                Some(Done { end: state, steps, evaluations })
+                Some(FinishedRun { end: state, steps, evaluations })
             };
             let error = |state: &Vec<f64>| motion.end_of(self, state).map(|(q, p)| apart((&q, &p), &reference));
-            let measure = Measure { span, part: OF_PEER * part, reference_error, of: (peer.name(), peer.order()) };
+            let measure = Measure { span, part: PEER_SHARE * part, reference_error, of: (peer.name(), peer.order()) };
             // A peer may fail only after a long time.
-            comparison.peers.extend(work_of(&measure, TOLERANCES, &run, &error, 1));
+            comparison.peers.extend(work_of(&measure, PEER_TOLERANCES, &run, &error, 1));
         }
         progress(1.0);
         Ok(comparison)
@@ -197,7 +204,7 @@ impl System {
 }
 
 /// The end of a run, with the work it took.
-struct Done<E> {
+struct FinishedRun<E> {
     end: E,
     steps: usize,
     evaluations: u64,
@@ -221,7 +228,7 @@ struct Measure<'m> {
 fn work_of<E>(
     by: &Measure<'_>,
     runs: u32,
-    run: &dyn Fn(u32) -> Option<Done<E>>,
+    run: &dyn Fn(u32) -> Option<FinishedRun<E>>,
     error: &dyn Fn(&E) -> Option<f64>,
     least_runs: usize,
 ) -> Vec<Work> {
@@ -229,14 +236,14 @@ fn work_of<E>(
     let (mut least, mut worse, beginning) = (f64::INFINITY, 0, Instant::now());
     for k in 0..runs {
         let begin = Instant::now();
-        let done = run(k);
+        let finished = run(k);
         let mut seconds = begin.elapsed();
-        let with_error = done.and_then(|done| Some((error(&done.end)?, done)));
-        if let Some((error, done)) = with_error {
+        let with_error = finished.and_then(|finished| Some((error(&finished.end)?, finished)));
+        if let Some((error, finished)) = with_error {
             let error = max_abs_or_nan([error, by.reference_error]);
             let mut spent = seconds;
-            for _ in 1..REPETITIONS {
-                if spent > REPEATED {
+            for _ in 1..MAX_REPETITIONS {
+                if spent > MAX_REPETITION_TIME {
                     break;
                 }
                 let begin = Instant::now();
@@ -248,9 +255,9 @@ fn work_of<E>(
                 found.push(Work {
                     integrator: by.of.0.to_owned(),
                     order: by.of.1,
-                    step_size: by.span / done.steps.max(1) as f64,
-                    steps: done.steps,
-                    evaluations: done.evaluations,
+                    step_size: by.span / finished.steps.max(1) as f64,
+                    steps: finished.steps,
+                    evaluations: finished.evaluations,
                     error,
                     seconds: seconds.as_secs_f64(),
                 });

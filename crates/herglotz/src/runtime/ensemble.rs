@@ -1,7 +1,7 @@
 //! Many motions of one formula.
 
-use crate::runtime::{Column, Crossing, Event, Interrupt, OutputTimes, RuntimeError, Start, StepControl, System};
-use discrete_herglotz::{InputError, Status, UnresolvedStep, ensemble::Tally};
+use crate::runtime::{Column, Crossing, Event, Interrupt, OutputTimes, Start, StepControl};
+use discrete_herglotz::{InputError, Status, UnresolvedStep};
 use std::ops::ControlFlow;
 
 /// Parameter values as functions of a member's index.
@@ -26,7 +26,7 @@ pub struct Ensemble<'a> {
     /// The final time.
     pub end: f64,
     /// How the motions are advanced.
-    pub way: StepControl,
+    pub step_control: StepControl,
     /// The times at which rows are recorded.
     pub rows: Option<OutputTimes>,
     /// The columns of a row, which are also evaluated at the end.
@@ -52,6 +52,7 @@ pub struct MemberEnd {
 
 /// The final state of a member's motion.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Ending {
     /// How it ended.
     pub status: Status,
@@ -94,16 +95,5 @@ pub trait EnsembleMonitor {
 impl<F: FnMut(MemberEnd) -> ControlFlow<()>> EnsembleMonitor for F {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         self(member)
-    }
-}
-
-impl System {
-    /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others
-    /// continue. The result of a member does not depend on the number of threads.
-    ///
-    /// # Errors
-    /// Errors that concern all members.
-    pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        self.kernel.ensemble(ensemble, watch)
     }
 }

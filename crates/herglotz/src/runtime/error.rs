@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// Invalid input to a system that is defined at run time.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RuntimeError {
     /// A formula, a column or the function of an event.
     #[error(transparent)]
@@ -100,6 +101,13 @@ pub enum RuntimeError {
     },
 }
 
+impl RuntimeError {
+    /// The error of an invalid argument: its name, and what is wrong with it.
+    pub(crate) fn argument(argument: &'static str, why: impl Into<String>) -> Self {
+        RuntimeError::Argument { argument, why: why.into() }
+    }
+}
+
 /// Error message for users who wrote a formula or a function. The structure of such a Lagrangian is proved and cannot
 /// be claimed, it has no time transformation, and the message has no Rust names.
 pub fn in_words(error: &InputError) -> String {
@@ -117,7 +125,7 @@ pub fn in_words(error: &InputError) -> String {
             };
             format!("the Lagrangian is not {claim}, as this integrator needs; take another integrator")
         }
-        InputError::Hypothesis { hypothesis } if hypothesis.contains("time transformation") => {
+        InputError::NoTimeTransformation => {
             "the integrator needs a time transformation, which Lagrangians by a formula or a function do not have; take another integrator".to_owned()
         }
         InputError::Hypothesis { hypothesis } => format!("the integrator needs {hypothesis}; take another integrator"),

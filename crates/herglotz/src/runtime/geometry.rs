@@ -3,6 +3,7 @@
 /// The contact geometry of a Lagrangian at a time and a point `(q, v, z)` of TQ x R. Vectors and covectors on TQ x R
 /// have the order q, v, z; matrices are given by rows.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Geometry {
     /// The value of L.
     pub lagrangian: f64,

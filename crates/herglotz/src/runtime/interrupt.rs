@@ -19,7 +19,7 @@ impl Interrupt {
     }
 
     /// The same condition in the form that integrators take.
-    pub(crate) fn asked(&self) -> discrete_herglotz::Interrupt<'_> {
+    pub(crate) fn for_integrators(&self) -> discrete_herglotz::Interrupt<'_> {
         discrete_herglotz::Interrupt::when(&*self.0)
     }
 }

@@ -12,7 +12,7 @@
 //! let motion = Motion {
 //!     rows: Some(OutputTimes::At((0..=10).map(f64::from).collect())),
 //!     columns: vec![Column::Time, Column::parse("theta", pendulum.formula())?, Column::Energy],
-//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-10, by: None })
+//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { error: 1e-10, by: None })
 //! };
 //! let (outcome, rows) = pendulum.record(&motion)?;
 //! println!("{}: {rows:?}", outcome.status);
@@ -34,11 +34,12 @@ mod parameters;
 mod path;
 mod peer;
 mod request;
+mod symmetry;
 mod system;
 
 pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
-pub use check::{CONTACT, Check, MomentumSample, Place, StatementResidual};
+pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
 pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
@@ -50,7 +51,8 @@ pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
-pub use system::{SeenSymmetry, System};
+pub use symmetry::FormulaSymmetry;
+pub use system::System;
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{

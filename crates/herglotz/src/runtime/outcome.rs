@@ -31,6 +31,7 @@ pub struct Outcome {
 
 /// A sign change of an event.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Crossing {
     /// The time.
     pub t: f64,
@@ -50,6 +51,7 @@ pub struct Crossing {
 
 /// The plan of a run: what will be computed, and what is skipped.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Plan {
     /// A description in plain text.
     pub text: String,

@@ -1,7 +1,5 @@
 //! Discrete boundary value problems: paths between given ends.
 
-use crate::runtime::kernel::path;
-use crate::runtime::{RuntimeError, System};
 use discrete_herglotz::{AnyIntegrator, UnresolvedStep, boundary::PathStatus};
 
 /// A discrete boundary value problem: find a path between two positions that is critical for the discrete action of
@@ -41,6 +39,7 @@ impl BoundaryProblem {
 
 /// The last path of a search, with measures of its quality. Vectors are stored point by point.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FoundPath {
     /// The times of the points.
     pub t: Vec<f64>,
@@ -83,16 +82,5 @@ impl FoundPath {
             [first, .., last] => last - first,
             _ => f64::NAN,
         }
-    }
-}
-
-impl System {
-    /// Searches for a path between two positions, of a system of one to eight coordinates. The status of the result
-    /// says whether a path was found.
-    ///
-    /// # Errors
-    /// [`RuntimeError`] for an invalid problem.
-    pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
-        path::search(self.formula(), problem)
     }
 }

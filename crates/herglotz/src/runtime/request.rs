@@ -29,7 +29,7 @@ pub struct Start {
     /// The position.
     pub q: Vec<f64>,
     /// The velocity, or the momentum.
-    pub rate: InitialVelocity,
+    pub velocity: InitialVelocity,
     /// The action.
     pub z: f64,
 }
@@ -37,7 +37,7 @@ pub struct Start {
 impl Start {
     /// At a time, a position, a velocity and an action.
     pub fn new(t: f64, q: impl Into<Vec<f64>>, v: impl Into<Vec<f64>>, z: f64) -> Self {
-        Start { t, q: q.into(), rate: InitialVelocity::Velocity(v.into()), z }
+        Start { t, q: q.into(), velocity: InitialVelocity::Velocity(v.into()), z }
     }
 }
 
@@ -47,7 +47,7 @@ pub enum StepControl {
     /// To a relative error of (q, p) and of v, with this integrator or with one that is chosen automatically.
     Accuracy {
         /// The error.
-        wanted: f64,
+        error: f64,
         /// The integrator.
         by: Option<AnyIntegrator>,
     },
@@ -123,7 +123,7 @@ impl Event {
 /// let motion = Motion {
 ///     rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])),
 ///     columns: vec![Column::Time, Column::Position(0), Column::Energy],
-///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-9, by: None })
+///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { error: 1e-9, by: None })
 /// };
 /// let (outcome, rows) = system.record(&motion)?;
 /// assert_eq!((outcome.t, rows.len()), (10.0, 3));
@@ -136,7 +136,7 @@ pub struct Motion {
     /// The final time, before or after the initial time.
     pub end: f64,
     /// How the motion is advanced.
-    pub way: StepControl,
+    pub step_control: StepControl,
     /// The times at which rows of the columns are recorded.
     pub rows: Option<OutputTimes>,
     /// The columns of a row.
@@ -164,11 +164,11 @@ pub struct Motion {
 
 impl Motion {
     /// From a start to a time, recording the final state only.
-    pub fn new(start: Start, end: f64, way: StepControl) -> Self {
+    pub fn new(start: Start, end: f64, step_control: StepControl) -> Self {
         Motion {
             start,
             end,
-            way,
+            step_control,
             rows: None,
             columns: Vec::new(),
             events: Vec::new(),

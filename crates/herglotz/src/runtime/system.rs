@@ -1,28 +1,22 @@
 //! Systems given by a formula.
 
-use crate::runtime::kernel::{Kernel, kernel_of};
+use crate::runtime::kernel::{self, Kernel, kernel_of};
 use crate::runtime::outcome::KeptRows;
-use crate::runtime::{Check, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start};
+use crate::runtime::{
+    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, FoundPath, Geometry, Motion, Outcome, Plan,
+    RunMonitor, RuntimeError, Start,
+};
 use contact_geom::Structure;
-use discrete_herglotz::{AnyIntegrator, InputError, ResumeState};
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
 use formula_lagrangian::Formula;
 use std::sync::Arc;
-
-/// A symmetry that is recognised in a formula; its momentum decays with the conformal factor.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SeenSymmetry {
-    /// L is invariant under translation of these coordinates by a common length.
-    Translation(Vec<usize>),
-    /// L is invariant under rotation of these pairs of coordinates by a common angle.
-    Rotation(Vec<(usize, usize)>),
-}
 
 /// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is inexpensive.
 ///
 /// ```
 /// use herglotz::runtime::{Motion, Start, System, StepControl};
 /// let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
-/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, StepControl::Accuracy { wanted: 1e-10, by: None });
+/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, StepControl::Accuracy { error: 1e-10, by: None });
 /// println!("{}", pendulum.plan(&motion)?.text);
 /// println!("theta = {}", pendulum.run(&motion, &mut ())?.q[0]);
 /// # Ok::<(), herglotz::runtime::RuntimeError>(())
@@ -78,7 +72,7 @@ impl System {
     }
 
     /// The symmetries that are recognised.
-    pub fn symmetries(&self) -> Vec<SeenSymmetry> {
+    pub fn symmetries(&self) -> Vec<FormulaSymmetry> {
         self.kernel.symmetries()
     }
 
@@ -111,8 +105,8 @@ impl System {
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
-    pub fn run(&self, motion: &Motion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, watch, None)
+    pub fn run(&self, motion: &Motion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
+        self.kernel.run(motion, monitor, None)
     }
 
     /// Continues an interrupted motion; the result is bitwise that of an uninterrupted run. Events and rows from there
@@ -125,9 +119,9 @@ impl System {
         &self,
         motion: &Motion,
         from: ResumeState,
-        watch: &mut dyn RunMonitor,
+        monitor: &mut dyn RunMonitor,
     ) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, watch, Some(from))
+        self.kernel.run(motion, monitor, Some(from))
     }
 
     /// Runs a motion and keeps its rows.
@@ -148,11 +142,29 @@ impl System {
         self.kernel.geometry(at)
     }
 
-    /// Checks at this number of places along a motion whether its steps are contact transformations.
+    /// Checks at this number of samples of a motion whether its steps are contact transformations.
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
-    pub fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
-        self.kernel.check(motion, places)
+    pub fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        self.kernel.check(motion, samples)
+    }
+
+    /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others
+    /// continue. The result of a member does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Errors that concern all members.
+    pub fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        self.kernel.ensemble(ensemble, monitor)
+    }
+
+    /// Searches for a path between two positions, of a system of one to eight coordinates. The status of the result
+    /// says whether a path was found.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] for an invalid problem.
+    pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
+        kernel::path::search(self.formula(), problem)
     }
 }

@@ -1,9 +1,12 @@
 //! Scenes of boundary value problems: paths between given ends.
 
-use super::file::{SystemTable, place_of_table};
+use super::SceneError;
+use super::checked::check_version;
+use super::file::{SystemTable, span_of_table};
 use super::location::{Location, Named, Numbers, Span};
 use super::start::Ends;
-use super::{SceneError, check_used, check_version, entry, formula, integrator};
+use super::step_control::integrator;
+use super::system::{check_used, entry, formula};
 use crate::runtime::{
     AnyIntegrator, BoundaryProblem, Column, InputError, RuntimeError, System, in_words, velocity_name,
 };
@@ -61,7 +64,7 @@ pub struct EndsScene {
 impl EndsScene {
     /// Whether a text is a scene with `[ends]`.
     pub fn is_one(text: &str) -> bool {
-        place_of_table(text, "ends").is_some()
+        span_of_table(text, "ends").is_some()
     }
 
     /// Reads a scene file with `[ends]`.
@@ -143,7 +146,9 @@ impl EndsScene {
             RuntimeError::Argument { argument: "integrator", .. } => self.integrator_at,
             RuntimeError::Argument { argument: "coordinates", .. } | RuntimeError::Formula(_) => self.system_at,
             RuntimeError::Input(E::Step { .. } | E::Count { .. } | E::TooMany { .. }) => self.steps_at,
-            RuntimeError::Input(E::Unclaimed { .. } | E::Hypothesis { .. } | E::Stages { .. }) => self.integrator_at,
+            RuntimeError::Input(
+                E::Unclaimed { .. } | E::Hypothesis { .. } | E::NoTimeTransformation | E::Stages { .. },
+            ) => self.integrator_at,
             _ => self.ends_at,
         };
         SceneError::at(&self.text, span, error.to_string())

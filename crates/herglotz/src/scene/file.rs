@@ -14,7 +14,7 @@ pub(crate) const VERSION: i64 = 1;
 
 /// The position of a table of this name, which determines the kind of a scene. Errors of the scene itself are left to
 /// its reader.
-pub(crate) fn place_of_table(text: &str, name: &str) -> Option<Span> {
+pub(crate) fn span_of_table(text: &str, name: &str) -> Option<Span> {
     toml::from_str::<BTreeMap<String, Location<IgnoredAny>>>(text).ok()?.get(name).map(Location::span)
 }
 

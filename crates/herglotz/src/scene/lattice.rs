@@ -1,9 +1,11 @@
 //! Scenes of lattices: any number of equal sites.
 
-use super::file::{RowsTable, RunTable, place_of_table};
+use super::SceneError;
+use super::checked::{check_version, finite};
+use super::file::{RowsTable, RunTable, span_of_table};
 use super::location::{Location, Named, Span};
 use super::output::{RowTimes, of_formula};
-use super::{SceneError, check_version, finite, way};
+use super::step_control::step_control;
 use crate::runtime::{
     AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError,
     Start, StepControl, Steps, velocity_name,
@@ -109,17 +111,17 @@ pub struct LatticeScene {
     /// The number of sites along each direction.
     pub sizes: Vec<usize>,
     text: String,
-    places: [(&'static str, Span); 6],
+    spans: [(&'static str, Span); 6],
     run: Span,
 }
 
-/// The maximal number of sites of a scene.
-const MOST_SITES: usize = 1_000_000;
+/// The maximal number of sites of a scene, each of which is a column of rows.csv.
+const MAX_SITES: usize = 1_000_000;
 
 impl LatticeScene {
     /// Whether a text is a scene with `[lattice]`.
     pub fn is_one(text: &str) -> bool {
-        place_of_table(text, "lattice").is_some()
+        span_of_table(text, "lattice").is_some()
     }
 
     /// Reads a scene file with `[lattice]`.
@@ -160,10 +162,9 @@ impl LatticeScene {
             Sizes::Many(sizes) => sizes.clone(),
         };
         let count = sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
-        if count.is_none_or(|count| count > MOST_SITES) {
-            let message = format!(
-                "the sites are more than {MOST_SITES}, each a column of rows.csv; take the library for so many"
-            );
+        if count.is_none_or(|count| count > MAX_SITES) {
+            let message =
+                format!("the sites are more than {MAX_SITES}, each a column of rows.csv; take the library for so many");
             return Err(SceneError::at(text, table.sites.span(), message));
         }
         let parameters: Vec<(String, f64)> =
@@ -182,7 +183,7 @@ impl LatticeScene {
         };
         let names = table.coordinates.as_ref().map_or(table.span(), Location::span);
         let parameters_at = table.parameters.0.first().map_or(table.span(), |(name, _)| name.span());
-        let places = [
+        let spans = [
             ("site", table.site.span()),
             ("bond", table.bond.as_ref().map_or(table.span(), Location::span)),
             ("sites", table.sites.span()),
@@ -190,7 +191,7 @@ impl LatticeScene {
             ("parameters", parameters_at),
             ("integrator", run.integrator.as_ref().map_or(run.span(), Location::span)),
         ];
-        let explain = |error: RuntimeError| explain(text, &places, table.span(), &error);
+        let explain = |error: RuntimeError| explain(text, &spans, table.span(), &error);
         let system = lattice.system().map_err(explain)?;
         let start = read_start(text, start, &coordinates, &sizes, &parameters)?;
         let end = finite(text, &run.time, "time")?;
@@ -204,12 +205,12 @@ impl LatticeScene {
             ));
         }
         let motion = AssembledMotion { rows, ..AssembledMotion::new(start, end, by, steps) };
-        Ok(LatticeScene { system, motion, coordinates, sizes, text: text.into(), places, run: run.span() })
+        Ok(LatticeScene { system, motion, coordinates, sizes, text: text.into(), spans, run: run.span() })
     }
 
     /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
-        explain(&self.text, &self.places, self.run, error)
+        explain(&self.text, &self.spans, self.run, error)
     }
 
     /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; with two
@@ -237,8 +238,8 @@ impl LatticeScene {
 }
 
 /// The error with the position of the argument that it names.
-fn explain(text: &str, places: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
-    let place = |name: &str| places.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
+fn explain(text: &str, spans: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
+    let place = |name: &str| spans.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
     match error {
         RuntimeError::Part { part, error: FormulaError::Parse(error) } => {
             let mut error = error.clone();
@@ -269,7 +270,7 @@ fn steps(text: &str, run: &Location<RunTable>) -> Result<(AnyIntegrator, Steps),
             "the run of a lattice needs an `integrator` and a `step`, as integrator = \"strang\" and step = 0.1";
         return Err(SceneError::at(text, run.span(), message));
     }
-    match way(text, run)? {
+    match step_control(text, run)? {
         StepControl::Steps { by, steps } => Ok((by, steps)),
         StepControl::Accuracy { .. } => {
             Err(SceneError::at(text, run.span(), "the run of a lattice needs an `integrator` and a `step`"))
@@ -335,8 +336,8 @@ fn read_start(
     let of = |all: &[Option<Vec<f64>>]| -> Vec<f64> {
         (0..sites * d).map(|k| all[k % d].as_ref().and_then(|x| x.get(k / d)).copied().unwrap_or(0.0)).collect()
     };
-    let rate = if by_momentum { InitialVelocity::Momentum(of(&p)) } else { InitialVelocity::Velocity(of(&v)) };
-    Ok(Start { t, q: of(&q), rate, z })
+    let velocity = if by_momentum { InitialVelocity::Momentum(of(&p)) } else { InitialVelocity::Velocity(of(&v)) };
+    Ok(Start { t, q: of(&q), velocity, z })
 }
 
 /// The values at all sites.

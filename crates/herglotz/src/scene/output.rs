@@ -1,17 +1,18 @@
 //! The requested output of a motion.
 
 use super::SceneError;
+use super::checked::{finite, positive};
 use super::file::{DirectionName, EventTable, RowsTable};
 use super::location::{Location, Span};
 use crate::runtime::{
     Column, Direction, Event, Expression, Formula, FormulaError, OutputTimes, RuntimeError, nearest_name, velocity_name,
 };
 
-/// The number of intervals between rows of a scene without `rows`.
+/// The number of intervals between rows of a scene without `rows`: as many as a figure resolves.
 const DEFAULT_ROWS: usize = 1000;
 
-/// The maximal number of rows at given times.
-const MOST_ROWS: f64 = 1e7;
+/// The maximal number of rows at given times, which are stored.
+const MAX_ROWS: f64 = 1e7;
 
 /// The times of the rows.
 #[derive(Clone, Debug)]
@@ -53,9 +54,9 @@ impl RowTimes {
         let Some(rows) = rows else { return Ok(RowTimes::Parts(DEFAULT_ROWS)) };
         match (&rows.every, &rows.at, &rows.every_step) {
             (Some(every), None, None) => {
-                let value = super::positive(text, every, "every")?;
-                if (end - t0).abs() / value > MOST_ROWS {
-                    let message = format!("these are more than {MOST_ROWS:e} rows; take a longer time between them");
+                let value = positive(text, every, "every")?;
+                if (end - t0).abs() / value > MAX_ROWS {
+                    let message = format!("these are more than {MAX_ROWS:e} rows; take a longer time between them");
                     return Err(SceneError::at(text, every.span(), message));
                 }
                 Ok(RowTimes::Every(value))
@@ -87,7 +88,7 @@ impl RowTimes {
 
 /// Checks that a time is between the start and the end of a motion.
 fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
-    let t = super::finite(text, time, name)?;
+    let t = finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
         let message = format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
         return Err(SceneError::at(text, time.span(), message));
@@ -220,14 +221,14 @@ impl EventColumns {
             if name == "event" || of_state.iter().any(|known| known == name) {
                 return refuse(format!("every event has `{name}` already; leave it out, or name it otherwise"));
             }
-            let place = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
-            if own.contains(&place) {
+            let index = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
+            if own.contains(&index) {
                 return refuse(format!("the event has two columns `{name}`; name one of them otherwise"));
             }
-            if place == self.names.len() {
+            if index == self.names.len() {
                 self.names.push(name.to_owned());
             }
-            own.push(place);
+            own.push(index);
         }
         self.of_event.push(own);
         Ok(())

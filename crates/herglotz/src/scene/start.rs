@@ -1,6 +1,7 @@
 //! The initial state of a motion.
 
 use super::SceneError;
+use super::checked::finite;
 use super::location::{Location, Named, Numbers, Span};
 use crate::runtime::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
 use std::ops::Range;
@@ -79,8 +80,8 @@ impl Given {
             Part::Action => return self.z = Some(value),
             Part::Time => return self.t = Some(value),
         };
-        if let Some(place) = vector.get_mut(entry) {
-            *place = Some(value);
+        if let Some(component) = vector.get_mut(entry) {
+            *component = Some(value);
         }
     }
 }
@@ -133,7 +134,7 @@ impl Ends {
 }
 
 /// The values that a table gives for these names.
-fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>) -> Result<Given, SceneError> {
+fn given(text: &str, keys: Vec<Key>, what: &str, table: Option<&Named<Numbers>>) -> Result<Given, SceneError> {
     let count = keys.iter().map(|key| key.entries.end).max().unwrap_or(0);
     let none = || vec![None; count];
     let mut given = Given { q: none(), v: none(), p: none(), ..Given::default() };
@@ -141,15 +142,15 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
         let Some(key) = keys.iter().find(|key| key.name == **name) else {
             let known = || keys.iter().map(|key| key.name.as_str());
             let all = known().collect::<Vec<_>>().join(", ");
-            let message = format!("there is no `{}` in {place}; there are {all}", **name);
+            let message = format!("there is no `{}` in {what}; there are {all}", **name);
             return Err(SceneError::unknown(text, name.span(), name, known(), message));
         };
         let wrong_count = |found: &str| {
-            let wanted = match key.entries.len() {
+            let expected = match key.entries.len() {
                 _ if !key.is_list => "a number".to_owned(),
                 count => format!("a list of {count} numbers, or one number for all,"),
             };
-            SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
+            SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {expected} is needed", **name))
         };
         let values: Vec<Location<f64>> = match &**numbers {
             // For an array, the number is the value of all its entries.
@@ -158,7 +159,7 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
             Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
         };
         for (i, x) in key.entries.clone().zip(&values) {
-            given.set(key.part, i, super::finite(text, x, name)?);
+            given.set(key.part, i, finite(text, x, name)?);
         }
     }
     Ok(given)
@@ -170,7 +171,7 @@ fn all(
     names: &[String],
     given: Vec<Option<f64>>,
     of_entry: Option<&[f64]>,
-    [what, place]: [&str; 2],
+    [what, end]: [&str; 2],
     at: Span,
     name: &dyn Fn(&str) -> String,
 ) -> Result<Vec<f64>, SceneError> {
@@ -182,9 +183,8 @@ fn all(
             // TOML keys of letters, digits and _ need no quotes.
             let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
             let key = if bare { name.clone() } else { format!("\"{name}\"") };
-            let table = if place == "end" { "ends" } else { "start" };
-            let message =
-                format!("the {what} `{name}` has no {place}; add `{key} = 0.0` to [{table}], or another value");
+            let table = if end == "end" { "ends" } else { "start" };
+            let message = format!("the {what} `{name}` has no {end}; add `{key} = 0.0` to [{table}], or another value");
             SceneError::at(text, at, message)
         })?);
     }
@@ -208,10 +208,10 @@ fn complete(
         let message = "the start has velocities and momenta; give one kind for all coordinates";
         return Err(SceneError::at(text, at, message));
     }
-    let rate = if by_momentum {
+    let velocity = if by_momentum {
         InitialVelocity::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
     } else {
         InitialVelocity::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
     };
-    Ok(Start { t: given.t.unwrap_or(0.0), q, rate, z: given.z.unwrap_or(0.0) })
+    Ok(Start { t: given.t.unwrap_or(0.0), q, velocity, z: given.z.unwrap_or(0.0) })
 }

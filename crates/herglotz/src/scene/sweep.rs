@@ -1,16 +1,17 @@
 //! The swept quantities of a scene.
 
 use super::SceneError;
+use super::checked::finite;
 use super::file::{RangeTable, Spacing, Swept, Values};
 use super::location::Location;
 use super::start::{Part, entry_of, single_names};
 use crate::runtime::{Formula, InitialVelocity, Start};
 
-/// The maximal number of members.
-const MOST: usize = 100_000_000;
+/// The maximal number of members: more rows than a table can be used with.
+const MAX_MEMBERS: usize = 100_000_000;
 
 /// The maximal number of values of one swept quantity, all of which are stored.
-const MOST_VALUES: usize = 10_000_000;
+const MAX_VALUES: usize = 10_000_000;
 
 /// The kind of a swept quantity.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +24,7 @@ pub(crate) enum Slot {
 
 /// A swept quantity, a parameter or a number of the initial state, with its values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knob {
+pub struct SweptQuantity {
     /// The name: that of the parameter, or `start.x`.
     pub name: String,
     /// The values.
@@ -33,7 +34,7 @@ pub struct Knob {
 
 /// Sets a number of an initial state.
 pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
-    let vector = match (part, &mut start.rate) {
+    let vector = match (part, &mut start.velocity) {
         (Part::Position, _) => &mut start.q,
         (Part::Velocity, InitialVelocity::Velocity(v)) => v,
         (Part::Momentum, InitialVelocity::Momentum(p)) => p,
@@ -41,26 +42,31 @@ pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
         (Part::Time, _) => return start.t = value,
         (Part::Velocity | Part::Momentum, _) => return,
     };
-    if let Some(place) = vector.get_mut(entry) {
-        *place = value;
+    if let Some(component) = vector.get_mut(entry) {
+        *component = value;
     }
 }
 
 /// The swept quantities of a table, validated against a formula and its initial state.
-pub(crate) fn read(text: &str, formula: &Formula, start: &Start, table: &Swept) -> Result<Vec<Knob>, SceneError> {
-    let mut knobs = Vec::new();
+pub(crate) fn read(
+    text: &str,
+    formula: &Formula,
+    start: &Start,
+    table: &Swept,
+) -> Result<Vec<SweptQuantity>, SceneError> {
+    let mut swept = Vec::new();
     let mut members: usize = 1;
     for (name, values) in &table.0 {
         let slot = slot(text, formula, start, name)?;
         let values_of = values_of(text, values)?;
         members = members.saturating_mul(values_of.len());
-        if members > MOST {
-            let message = format!("the sweep has more than {MOST} members; take fewer values");
+        if members > MAX_MEMBERS {
+            let message = format!("the sweep has more than {MAX_MEMBERS} members; take fewer values");
             return Err(SceneError::at(text, values.span(), message));
         }
-        knobs.push(Knob { name: (**name).clone(), values: values_of, slot });
+        swept.push(SweptQuantity { name: (**name).clone(), values: values_of, slot });
     }
-    Ok(knobs)
+    Ok(swept)
 }
 
 fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -> Result<Slot, SceneError> {
@@ -76,7 +82,7 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -
         let message = format!("there is no `{}` to be swept; there are {listed}", **name);
         return Err(SceneError::unknown(text, name.span(), name, all, message));
     };
-    match (entry_of(formula, of_start), &start.rate) {
+    match (entry_of(formula, of_start), &start.velocity) {
         (Some((Part::Time, _)), _) => refuse("all members start at one time; sweep another value"),
         (Some((Part::Velocity, _)), InitialVelocity::Momentum(_) | InitialVelocity::MomentumNear { .. }) => {
             refuse("the start has momenta; sweep one of them")
@@ -97,15 +103,15 @@ fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneErr
     let refuse = |message: &str| Err(SceneError::at(text, values.span(), message));
     let RangeTable { from, to, count, spacing } = match &**values {
         Values::List(list) if list.is_empty() => return refuse("no values; give at least one"),
-        Values::List(list) => return list.iter().map(|x| super::finite(text, x, "a value")).collect(),
+        Values::List(list) => return list.iter().map(|x| finite(text, x, "a value")).collect(),
         Values::Range(range) => range,
     };
-    let (a, b) = (super::finite(text, from, "from")?, super::finite(text, to, "to")?);
+    let (a, b) = (finite(text, from, "from")?, finite(text, to, "to")?);
     let count_at = count.span();
     let count = match **count {
         0 => return Err(SceneError::at(text, count.span(), "no values; give a `count` of at least 1")),
-        count if count > MOST_VALUES => {
-            let message = format!("these are more than {MOST_VALUES} values; take fewer");
+        count if count > MAX_VALUES => {
+            let message = format!("these are more than {MAX_VALUES} values; take fewer");
             return Err(SceneError::at(text, count_at, message));
         }
         count => count,

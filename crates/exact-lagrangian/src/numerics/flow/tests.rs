@@ -55,7 +55,7 @@ fn motion(system: &impl Lagrangian<1>, [q, v, z]: [f64; 3], duration: f64) -> Re
 }
 
 /// Positions that do not lie on any grid.
-fn place(k: u32) -> f64 {
+fn position(k: u32) -> f64 {
     1.0 + 8.0 * (f64::from(k) * std::f64::consts::SQRT_2).fract()
 }
 
@@ -75,7 +75,7 @@ fn what_is_narrow_is_met() {
                     Thing::Kick => (1.0, v + w * root_pi, 10.0),
                     _ => (1.0, v * (-w * root_pi).exp(), 10.0),
                 };
-                let system = Meeting { thing, c, at: place(k), w };
+                let system = Meeting { thing, c, at: position(k), w };
                 let found = motion(&system, [0.0, v, 0.3], duration).unwrap().end.v[0];
                 if (found - v).abs() < 1e-12 { missed += 1 } else { worst = max_or_nan(worst, (found - end).abs()) }
             }

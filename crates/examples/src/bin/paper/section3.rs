@@ -1,6 +1,5 @@
 //! Section 3: every statement for every system and every discretisation.
 
-use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
@@ -11,6 +10,9 @@ use discrete_herglotz::{
     rules::{Method, Quadrature, Rule, RuleVisitor},
     theory::{DiscretePath, derived_jet},
 };
+
+/// The time steps at which discretisations are checked, a factor of ten apart.
+pub const STEPS: [f64; 2] = [0.1, 0.01];
 
 /// The points at which each statement is checked for each system, discretisation and step.
 const SAMPLES: usize = 16;

@@ -2,9 +2,8 @@
 
 use crate::closed_exact::ClosedExact;
 use crate::explicit::Explicit;
-use crate::section3::straight_step;
+use crate::section3::{STEPS, straight_step};
 use crate::series::{Example, GAMMA, STEP};
-use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};

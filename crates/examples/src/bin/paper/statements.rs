@@ -5,9 +5,6 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// The time steps at which discretisations are checked.
-pub const STEPS: [f64; 2] = [0.1, 0.01];
-
 /// Checks every statement on everything that it applies to.
 pub fn check_all() -> Checks {
     let bar = ProgressBar::new(catalogue_size() as u64 + 1).with_style(

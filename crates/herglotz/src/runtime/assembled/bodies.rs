@@ -1,6 +1,6 @@
 //! Gravitating bodies.
 
-use super::{Assembled, argument};
+use super::system::Assembled;
 use crate::runtime::RuntimeError;
 use assembled_herglotz::systems::Gravitation;
 use assembled_herglotz::{AssembledSystem, Difference, Potential};
@@ -37,10 +37,16 @@ impl Bodies {
     pub fn system(&self) -> Result<Assembled, RuntimeError> {
         let Bodies { masses, dimensions, g, gamma } = self;
         if masses.len() < 2 {
-            return Err(argument("masses", format!("has {} bodies, where at least 2 are needed", masses.len())));
+            return Err(RuntimeError::argument(
+                "masses",
+                format!("has {} bodies, where at least 2 are needed", masses.len()),
+            ));
         }
         if let Some((i, m)) = masses.iter().enumerate().find(|(_, m)| !(**m > 0.0 && m.is_finite())) {
-            return Err(argument("masses", format!("has {m} for body {i}, where a positive finite number is needed")));
+            return Err(RuntimeError::argument(
+                "masses",
+                format!("has {m} for body {i}, where a positive finite number is needed"),
+            ));
         }
         for (what, value) in [("G", *g), ("gamma", *gamma)] {
             if !value.is_finite() {
@@ -55,10 +61,13 @@ impl Bodies {
             2 => attracting::<2, 4>(make()?, masses, *g)?,
             3 => attracting::<3, 6>(make()?, masses, *g)?,
             other => {
-                return Err(argument("q0", format!("has {other} components for each body, where 2 or 3 are possible")));
+                return Err(RuntimeError::argument(
+                    "q0",
+                    format!("has {other} components for each body, where 2 or 3 are possible"),
+                ));
             }
         };
-        Ok(Assembled { system, places: n, components: *dimensions, masses: each, full: true })
+        Ok(Assembled { system, sites: n, components: *dimensions, masses: each, full: true })
     }
 }
 
@@ -78,8 +87,8 @@ where
         masses.iter().zip(masses.iter().skip(apart)).enumerate().map(move |(i, m)| (i, i + apart, m))
     });
     let elements = pairs.map(|(i, j, (a, b))| {
-        let places: [usize; K] = std::array::from_fn(|k| k % D * n + if k < D { i } else { j });
-        (places, [g * a * b])
+        let sites: [usize; K] = std::array::from_fn(|k| k % D * n + if k < D { i } else { j });
+        (sites, [g * a * b])
     });
     Ok(system.with_potential(Difference(Gravitation), elements)?)
 }

@@ -1,7 +1,7 @@
 //! Lattices given by the formulas of a site and of a bond.
 
+use super::system::Assembled;
 use super::term::AtRest;
-use super::{Assembled, argument};
 use crate::runtime::RuntimeError;
 use assembled_herglotz::{AssembledSystem, FIXED};
 use contact_geom::nalgebra::SVector;
@@ -28,7 +28,10 @@ impl FromStr for Boundary {
             "periodic" => Ok(Boundary::Periodic),
             "fixed" => Ok(Boundary::Fixed),
             "free" => Ok(Boundary::Free),
-            _ => Err(argument("boundary", format!("is {name:?}, where \"periodic\", \"fixed\" or \"free\" is needed"))),
+            _ => Err(RuntimeError::argument(
+                "boundary",
+                format!("is {name:?}, where \"periodic\", \"fixed\" or \"free\" is needed"),
+            )),
         }
     }
 }
@@ -80,7 +83,10 @@ impl Lattice {
             1 => self.of::<1, 2>(),
             2 => self.of::<2, 4>(),
             3 => self.of::<3, 6>(),
-            found => Err(argument("coordinates", format!("has {found} names, where a site has 1 to 3 components"))),
+            found => Err(RuntimeError::argument(
+                "coordinates",
+                format!("has {found} names, where a site has 1 to 3 components"),
+            )),
         }
     }
 
@@ -88,12 +94,15 @@ impl Lattice {
     fn sites(&self) -> Result<usize, RuntimeError> {
         let least = if self.boundary == Boundary::Periodic && self.bond.is_some() { 2 } else { 1 };
         if let Some(size) = self.sizes.iter().find(|size| **size < least) {
-            return Err(argument("sites", format!("has {size} along a direction, where at least {least} are needed")));
+            return Err(RuntimeError::argument(
+                "sites",
+                format!("has {size} along a direction, where at least {least} are needed"),
+            ));
         }
         match self.sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size)) {
             Some(sites) if !self.sizes.is_empty() => Ok(sites),
-            Some(_) => Err(argument("sites", "has no direction, where at least one is needed")),
-            None => Err(argument("sites", "are more than can be counted")),
+            Some(_) => Err(RuntimeError::argument("sites", "has no direction, where at least one is needed")),
+            None => Err(RuntimeError::argument("sites", "are more than can be counted")),
         }
     }
 
@@ -109,7 +118,7 @@ impl Lattice {
             let mut used = [Some(&site), bond.as_ref()].into_iter().flatten().flat_map(Formula::used_parameters);
             if !used.any(|known| known == name) {
                 let where_to = if bond.is_some() { "neither in `site` nor in `bond`" } else { "not in `site`" };
-                return Err(argument("parameters", format!("has `{name}`, which is {where_to}")));
+                return Err(RuntimeError::argument("parameters", format!("has `{name}`, which is {where_to}")));
             }
         }
         let site = lagrangian::<D>("site", &site)?;
@@ -128,19 +137,19 @@ impl Lattice {
             system.with_timed_drag(move |t| rate(&timed, t))
         };
         // Component by component, so that the components of neighbours are contiguous in memory.
-        let places = (0..sites).map(|i| -> [usize; D] { std::array::from_fn(|c| c * sites + i) });
-        let mut system = system.with_potential(AtRest(site), places)?;
+        let indices = (0..sites).map(|i| -> [usize; D] { std::array::from_fn(|c| c * sites + i) });
+        let mut system = system.with_potential(AtRest(site), indices)?;
         if let Some(bond) = bond {
             check_bond(&bond)?;
             for along in 0..self.sizes.len() {
                 let ends = self.bonds(along, sites).into_iter().map(|ends| -> [usize; K] {
-                    let place = |c: usize, i: usize| if i == FIXED { FIXED } else { c * sites + i };
-                    std::array::from_fn(|k| place(k % D, ends[usize::from(k >= D)]))
+                    let index_of = |c: usize, i: usize| if i == FIXED { FIXED } else { c * sites + i };
+                    std::array::from_fn(|k| index_of(k % D, ends[usize::from(k >= D)]))
                 });
                 system = system.with_potential(AtRest(bond.clone()), ends)?;
             }
         }
-        Ok(Assembled { system, places: sites, components: D, masses: each, full: false })
+        Ok(Assembled { system, sites, components: D, masses: each, full: false })
     }
 
     fn parse(&self, part: &'static str, text: &str, names: &[&str]) -> Result<Formula, RuntimeError> {
@@ -152,10 +161,10 @@ impl Lattice {
     fn bonds(&self, along: usize, sites: usize) -> Vec<[usize; 2]> {
         let size = self.sizes.get(along).copied().unwrap_or(1);
         let stride: usize = self.sizes.iter().skip(along + 1).product();
-        let place = |i: usize| i / stride % size;
-        let walls = (0..sites).filter(|i| self.boundary == Boundary::Fixed && place(*i) == 0).map(|i| [FIXED, i]);
+        let index_of = |i: usize| i / stride % size;
+        let walls = (0..sites).filter(|i| self.boundary == Boundary::Fixed && index_of(*i) == 0).map(|i| [FIXED, i]);
         let inner = (0..sites).filter_map(|i| match self.boundary {
-            _ if place(i) + 1 < size => Some([i, i + stride]),
+            _ if index_of(i) + 1 < size => Some([i, i + stride]),
             Boundary::Periodic => Some([i, i + stride - size * stride]),
             Boundary::Fixed => Some([i, FIXED]),
             Boundary::Free => None,
@@ -182,7 +191,7 @@ fn rate<const N: usize>(site: &FormulaLagrangian<N>, t: f64) -> f64 {
 fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], RuntimeError> {
     let proved = site.proved();
     if !proved.is_affine_in_z() {
-        return Err(argument(
+        return Err(RuntimeError::argument(
             "site",
             "depends on z by more than `gamma*z` with a rate that is a number or a function of t",
         ));
@@ -192,13 +201,14 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
     let Some(m) = diagonal else {
         let what =
             "is not of the form m*x'^2/2 - V(t, x) + gamma*z with a number for m, and a square of each velocity alone";
-        return Err(argument("site", what));
+        return Err(RuntimeError::argument("site", what));
     };
     let masses = std::array::from_fn(|i| m[(i, i)]);
     match masses.iter().find(|m| !(**m > 0.0 && m.is_finite())) {
-        Some(m) => {
-            Err(argument("site", format!("has the mass {m}, where each component needs a positive one: m*x'^2/2")))
-        }
+        Some(m) => Err(RuntimeError::argument(
+            "site",
+            format!("has the mass {m}, where each component needs a positive one: m*x'^2/2"),
+        )),
         None => Ok(masses),
     }
 }
@@ -207,14 +217,17 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
 fn check_bond<const N: usize>(bond: &FormulaLagrangian<N>) -> Result<(), RuntimeError> {
     let proved = bond.proved();
     if !proved.z_free {
-        return Err(argument(
+        return Err(RuntimeError::argument(
             "bond",
             "depends on z; write the drag `gamma*z` in `site`, where it counts once for the lattice",
         ));
     }
     let masses = bond.closed_mass_matrix(0.0, &origin()).filter(|_| proved.separable);
     if masses.is_none_or(|m| m.iter().any(|m| *m != 0.0)) {
-        return Err(argument("bond", "depends on velocities; a bond is minus a potential energy of its two ends"));
+        return Err(RuntimeError::argument(
+            "bond",
+            "depends on velocities; a bond is minus a potential energy of its two ends",
+        ));
     }
     Ok(())
 }

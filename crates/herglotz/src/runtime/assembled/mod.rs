@@ -4,88 +4,10 @@ mod bodies;
 mod lattice;
 mod run;
 mod stepper;
+mod system;
 mod term;
 
 pub use bodies::Bodies;
 pub use lattice::{Boundary, Lattice};
 pub use run::AssembledMotion;
-
-use crate::runtime::outcome::KeptRows;
-use crate::runtime::{Outcome, RunMonitor, RuntimeError};
-use assembled_herglotz::AssembledSystem;
-
-/// A system of any number of coordinates as a sum of local terms: a [`Lattice`] or [`Bodies`], ready to be run.
-///
-/// ```
-/// use herglotz::runtime::{AssembledMotion, Boundary, Lattice, Start, Steps};
-/// let chain = Lattice {
-///     site: "x'^2/2 - (1 - cos(x)) + gamma*z".into(),
-///     bond: Some("-k*(xr - xl)^2/2".into()),
-///     sizes: vec![100],
-///     boundary: Boundary::Periodic,
-///     parameters: vec![("k".into(), 4.0), ("gamma".into(), -0.1)],
-///     ..Lattice::default()
-/// };
-/// let q: Vec<f64> = (0..100).map(|i| (0.2 * std::f64::consts::PI * f64::from(i)).sin()).collect();
-/// let start = Start::new(0.0, q, vec![0.0; 100], 0.0);
-/// let motion = AssembledMotion::new(start, 10.0, "strang".parse().unwrap(), Steps::Size(0.1));
-/// let (outcome, rows) = chain.system()?.record(&motion)?;
-/// assert_eq!((outcome.steps, rows.len()), (100, 101));
-/// # Ok::<(), herglotz::runtime::RuntimeError>(())
-/// ```
-pub struct Assembled {
-    system: AssembledSystem,
-    /// The number of sites or bodies, and of components at each.
-    places: usize,
-    components: usize,
-    /// The mass of each coordinate, in the order of the assembled system.
-    masses: Vec<f64>,
-    /// Whether all coordinates interact, so that the matrices of a step are full.
-    full: bool,
-}
-
-impl Assembled {
-    /// The number of coordinates. In a start and in rows, the components of one site or body follow each other.
-    pub fn dimension(&self) -> usize {
-        self.places * self.components
-    }
-
-    /// Runs a motion. Each row has `t`, the positions, the velocities, the momenta, `z` and the energy, followed by the
-    /// logarithm of the conformal factor where it is requested. A failure during the run is reported in the status of
-    /// the outcome, whose state is then that of the last row.
-    ///
-    /// # Errors
-    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument;
-    /// [`RuntimeError::Assembly`].
-    pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
-        run::run(self, motion, watch)
-    }
-
-    /// Runs a motion and keeps its rows.
-    ///
-    /// # Errors
-    /// Those of [`run`](Self::run).
-    pub fn record(&self, motion: &AssembledMotion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
-        let mut kept = KeptRows::default();
-        let outcome = self.run(motion, &mut kept)?;
-        Ok((outcome, kept.0))
-    }
-
-    /// Reorders from the order of users (the components of each place together) to that of the assembled system (each
-    /// component of all places), in which neighbours are contiguous in memory.
-    fn inward(&self, x: &[f64]) -> Vec<f64> {
-        let (n, d) = (self.places, self.components);
-        (0..n * d).map(|k| x.get(k % n * d + k / n).copied().unwrap_or(f64::NAN)).collect()
-    }
-
-    /// The inverse reordering, appended to a row.
-    fn outward(&self, x: &[f64], row: &mut Vec<f64>) {
-        let (n, d) = (self.places, self.components);
-        row.extend((0..n * d).map(|k| x.get(k % d * n + k / d).copied().unwrap_or(f64::NAN)));
-    }
-}
-
-/// The error of an invalid argument.
-fn argument(argument: &'static str, why: impl Into<String>) -> RuntimeError {
-    RuntimeError::Argument { argument, why: why.into() }
-}
+pub use system::Assembled;

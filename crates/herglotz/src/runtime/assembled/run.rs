@@ -1,15 +1,18 @@
 //! Runs of systems of many coordinates.
 
-use super::stepper::{Place, Stepper};
-use super::{Assembled, argument};
+use super::stepper::{OwnedState, Stepper};
+use super::system::Assembled;
+use crate::runtime::outcome::KeptRows;
 use crate::runtime::{InitialVelocity, Outcome, OutputTimes, RunMonitor, RuntimeError, Start};
 use discrete_herglotz::{AnyIntegrator, InputError, Status, StepError, StepFailure, Steps};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// The time between two polls, and the maximal number of steps between them.
-const BETWEEN: Duration = Duration::from_millis(20);
-const MOST: usize = 256;
+/// The time between two polls: short for a user, long for a step.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// The maximal number of steps between two polls, as for motions of few coordinates.
+const MAX_STEPS_BETWEEN_POLLS: usize = 256;
 
 /// A motion of a system of many coordinates.
 #[derive(Clone, Debug)]
@@ -43,14 +46,14 @@ impl AssembledMotion {
                 "ends at {}, where the motion starts at {}; give a later or earlier end",
                 self.end, self.start.t
             );
-            return Err(argument("t", why));
+            return Err(RuntimeError::argument("t", why));
         }
         let count = match self.steps {
             Steps::Count(0) => return Err(InputError::NoSteps.into()),
             Steps::Count(count) => return Ok((span / count as f64, count)),
             Steps::Size(h) => {
                 if !(h > 0.0 && h.is_finite()) {
-                    return Err(argument(
+                    return Err(RuntimeError::argument(
                         "step",
                         format!("is {h}, where a positive number is needed; the end says the direction"),
                     ));
@@ -63,7 +66,7 @@ impl AssembledMotion {
         // Integers up to here are exact in floating point.
         const LARGEST: f64 = (1u64 << 53) as f64;
         if count > LARGEST {
-            return Err(argument(
+            return Err(RuntimeError::argument(
                 "step",
                 format!("gives {count:.1e} steps, more than can be counted; take a longer one"),
             ));
@@ -73,7 +76,7 @@ impl AssembledMotion {
 }
 
 /// The state of a run in progress.
-struct RunInfo<'a, 'w> {
+struct AssembledRun<'a, 'w> {
     of: &'a Assembled,
     motion: &'a AssembledMotion,
     stepper: Stepper<'a>,
@@ -81,11 +84,11 @@ struct RunInfo<'a, 'w> {
     count: usize,
     taken: usize,
     /// The number of steps between two polls.
-    some: usize,
+    steps_between_polls: usize,
     log_factor: f64,
-    last: Place,
+    last: OwnedState,
     numbers: Vec<f64>,
-    watch: &'w mut dyn RunMonitor,
+    monitor: &'w mut dyn RunMonitor,
 }
 
 /// Why a motion ends early.
@@ -110,31 +113,61 @@ impl From<RuntimeError> for Ended {
     }
 }
 
-pub(super) fn run(
-    of: &Assembled,
-    motion: &AssembledMotion,
-    watch: &mut dyn RunMonitor,
-) -> Result<Outcome, RuntimeError> {
+impl Assembled {
+    /// Runs a motion. Each row has `t`, the positions, the velocities, the momenta, `z` and the energy, followed by the
+    /// logarithm of the conformal factor where it is requested. A failure during the run is reported in the status of
+    /// the outcome, whose state is then that of the last row.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument;
+    /// [`RuntimeError::Assembly`].
+    pub fn run(&self, motion: &AssembledMotion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
+        run(self, motion, monitor)
+    }
+
+    /// Runs a motion and keeps its rows.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn record(&self, motion: &AssembledMotion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
+        let mut kept = KeptRows::default();
+        let outcome = self.run(motion, &mut kept)?;
+        Ok((outcome, kept.0))
+    }
+}
+
+fn run(of: &Assembled, motion: &AssembledMotion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
     let (h, count) = motion.step()?;
     check_rows(motion)?;
-    let start = place(of, &motion.start)?;
+    let start = initial_state(of, &motion.start)?;
     let stepper = Stepper::new(of, motion.by, h, &start)?;
     let numbers = Vec::with_capacity(4 + 3 * of.dimension());
-    let mut course =
-        RunInfo { of, motion, stepper, h, count, taken: 0, some: 1, log_factor: 0.0, last: start, numbers, watch };
-    let status = match course.go() {
+    let mut run = AssembledRun {
+        of,
+        motion,
+        stepper,
+        h,
+        count,
+        taken: 0,
+        steps_between_polls: 1,
+        log_factor: 0.0,
+        last: start,
+        numbers,
+        monitor,
+    };
+    let status = match run.run() {
         Ok(()) => Status::Completed,
-        Err(Ended::Stopped) => Status::Stopped { step: course.taken, t: course.time(course.taken), by: "the watch" },
-        Err(Ended::Failed(cause)) => Status::Failed { step: course.taken, t: course.time(course.taken), cause },
+        Err(Ended::Stopped) => Status::Stopped { step: run.taken, t: run.time(run.taken), by: "the watch" },
+        Err(Ended::Failed(cause)) => Status::Failed { step: run.taken, t: run.time(run.taken), cause },
         Err(Ended::Refused(error)) => return Err(error),
     };
-    Ok(course.outcome(status))
+    Ok(run.outcome(status))
 }
 
 /// Checks the times of the rows.
 fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
-        OutputTimes::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
+        OutputTimes::Every(0) => return Err(RuntimeError::argument("every", "is 0, where at least 1 is needed")),
         OutputTimes::Every(_) => return Ok(()),
         OutputTimes::At(times) => times,
     };
@@ -151,7 +184,7 @@ fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
 }
 
 /// The start, validated.
-fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
+fn initial_state(of: &Assembled, start: &Start) -> Result<OwnedState, RuntimeError> {
     for (what, value) in [("t", start.t), ("z", start.z)] {
         if !value.is_finite() {
             return Err(RuntimeError::NotFinite { what: what.into(), value });
@@ -166,22 +199,22 @@ fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
             None => Ok(of.inward(x)),
         }
     };
-    let v = match &start.rate {
+    let v = match &start.velocity {
         InitialVelocity::Velocity(v) => vector("v", v)?,
         InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => {
             vector("p", p)?.iter().zip(&of.masses).map(|(p, m)| p / m).collect()
         }
     };
-    Ok(Place { t: start.t, q: vector("q", &start.q)?, v, z: start.z })
+    Ok(OwnedState { t: start.t, q: vector("q", &start.q)?, v, z: start.z })
 }
 
-impl RunInfo<'_, '_> {
+impl AssembledRun<'_, '_> {
     /// The time after a number of steps.
     fn time(&self, taken: usize) -> f64 {
         if taken == self.count { self.motion.end } else { self.motion.start.t + taken as f64 * self.h }
     }
 
-    fn go(&mut self) -> Result<(), Ended> {
+    fn run(&mut self) -> Result<(), Ended> {
         match &self.motion.rows {
             OutputTimes::Every(every) => {
                 self.row()?;
@@ -195,7 +228,7 @@ impl RunInfo<'_, '_> {
                     self.row_at(*time)?;
                 }
                 self.advance(self.count)?;
-                self.look()?;
+                self.update_state()?;
             }
         }
         Ok(())
@@ -206,18 +239,23 @@ impl RunInfo<'_, '_> {
         while self.taken < to {
             let begin = Instant::now();
             // The conformal factor is that of a single step, so it is read after each.
-            let some = if self.motion.conformal_factor { 1 } else { self.some.min(to - self.taken) };
-            if let Err(StepFailure { taken, cause }) = self.stepper.advance(some) {
+            let steps_between_polls =
+                if self.motion.conformal_factor { 1 } else { self.steps_between_polls.min(to - self.taken) };
+            if let Err(StepFailure { taken, cause }) = self.stepper.advance(steps_between_polls) {
                 self.taken += taken;
                 return Err(cause.into());
             }
-            self.taken += some;
+            self.taken += steps_between_polls;
             if self.motion.conformal_factor {
                 self.log_factor += self.stepper.sigma().ln();
             }
-            let slow = begin.elapsed() > BETWEEN;
-            self.some = if slow { (self.some / 2).max(1) } else { (self.some * 2).min(MOST) };
-            if self.watch.poll(self.taken as f64 / self.count as f64).is_break() {
+            let slow = begin.elapsed() > POLL_INTERVAL;
+            self.steps_between_polls = if slow {
+                (self.steps_between_polls / 2).max(1)
+            } else {
+                (self.steps_between_polls * 2).min(MAX_STEPS_BETWEEN_POLLS)
+            };
+            if self.monitor.poll(self.taken as f64 / self.count as f64).is_break() {
                 return Err(Ended::Stopped);
             }
         }
@@ -225,14 +263,14 @@ impl RunInfo<'_, '_> {
     }
 
     /// Stores the current state.
-    fn look(&mut self) -> Result<(), Ended> {
-        self.last = Place { t: self.time(self.taken), ..self.stepper.place()? };
+    fn update_state(&mut self) -> Result<(), Ended> {
+        self.last = OwnedState { t: self.time(self.taken), ..self.stepper.state()? };
         Ok(())
     }
 
     /// A row of the current state.
     fn row(&mut self) -> Result<(), Ended> {
-        self.look()?;
+        self.update_state()?;
         self.write(self.log_factor)
     }
 
@@ -244,24 +282,24 @@ impl RunInfo<'_, '_> {
         let near = (steps - nearest).abs() <= rounding;
         let whole = if near { nearest } else { steps.floor() };
         self.advance((whole.max(0.0) as usize).min(self.count))?;
-        self.look()?;
+        self.update_state()?;
         let mut log_factor = self.log_factor;
         if near || time == self.last.t {
             self.last.t = time;
         } else {
             let mut part = Stepper::new(self.of, self.motion.by, time - self.last.t, &self.last)?;
-            part.advance(1).map_err(|halt| halt.cause)?;
+            part.advance(1).map_err(|failure| failure.cause)?;
             if self.motion.conformal_factor {
                 log_factor += part.sigma().ln();
             }
-            self.last = Place { t: time, ..part.place()? };
+            self.last = OwnedState { t: time, ..part.state()? };
         }
         self.write(log_factor)
     }
 
     /// Passes on a row of the stored state.
     fn write(&mut self, log_factor: f64) -> Result<(), Ended> {
-        let Place { t, q, v, z } = &self.last;
+        let OwnedState { t, q, v, z } = &self.last;
         let energy = self.of.energy(&self.last)?;
         self.numbers.clear();
         self.numbers.push(*t);
@@ -270,7 +308,7 @@ impl RunInfo<'_, '_> {
         self.of.outward(&self.of.momenta(v), &mut self.numbers);
         self.numbers.extend([*z, energy]);
         self.numbers.extend(self.motion.conformal_factor.then_some(log_factor));
-        match self.watch.row(&self.numbers) {
+        match self.monitor.row(&self.numbers) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Ended::Stopped),
         }
@@ -279,8 +317,8 @@ impl RunInfo<'_, '_> {
     fn outcome(mut self, status: Status) -> Outcome {
         if matches!(status, Status::Stopped { .. }) {
             // The state from which the motion could continue; that of the last row if it is not finite.
-            if let Ok(place) = self.stepper.place() {
-                self.last = Place { t: self.time(self.taken), ..place };
+            if let Ok(state) = self.stepper.state() {
+                self.last = OwnedState { t: self.time(self.taken), ..state };
             }
         }
         let of = self.of;
@@ -289,7 +327,7 @@ impl RunInfo<'_, '_> {
             of.outward(x, &mut all);
             all
         };
-        let Place { t, q, v, z } = &self.last;
+        let OwnedState { t, q, v, z } = &self.last;
         Outcome {
             status,
             unresolved: self.stepper.unresolved(),

@@ -1,6 +1,6 @@
 //! The integrators of systems of many coordinates, behind one type.
 
-use super::{Assembled, argument};
+use super::system::Assembled;
 use crate::runtime::RuntimeError;
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, State};
 use discrete_herglotz::{AnyIntegrator, StepError, StepFailure, UnresolvedStep, rules::Method};
@@ -14,23 +14,23 @@ pub(super) enum Stepper<'a> {
 
 /// A state of a motion, in the order of the assembled system.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(super) struct OwnedState {
     pub t: f64,
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     pub z: f64,
 }
 
-impl Place {
-    fn state(&self) -> State<'_> {
+impl OwnedState {
+    fn borrowed(&self) -> State<'_> {
         State { t: self.t, q: &self.q, v: &self.v, z: Some(self.z) }
     }
 }
 
 impl<'a> Stepper<'a> {
     /// An integrator with steps h from a start.
-    pub fn new(of: &'a Assembled, by: AnyIntegrator, h: f64, start: &Place) -> Result<Self, RuntimeError> {
-        let (system, start) = (&of.system, start.state());
+    pub fn new(of: &'a Assembled, by: AnyIntegrator, h: f64, start: &OwnedState) -> Result<Self, RuntimeError> {
+        let (system, start) = (&of.system, start.borrowed());
         Ok(match by {
             AnyIntegrator::Splitting(scheme) => {
                 let splitting = AssembledSplitting::new(system, &scheme, h, start)?;
@@ -51,7 +51,7 @@ impl<'a> Stepper<'a> {
                      \"gauss_1\" or \"gauss_2\"",
                     other.to_string()
                 );
-                return Err(argument("integrator", why));
+                return Err(RuntimeError::argument("integrator", why));
             }
         })
     }
@@ -66,7 +66,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// The current state. The caller replaces its time by one that follows from the number of steps.
-    pub fn place(&mut self) -> Result<Place, StepError> {
+    pub fn state(&mut self) -> Result<OwnedState, StepError> {
         let State { t, q, v, z } = match self {
             Stepper::Splitting(stepper, _) => stepper.state(),
             Stepper::Midpoint(stepper) => stepper.state(),
@@ -75,7 +75,7 @@ impl<'a> Stepper<'a> {
         // The action is known, since the stepper was started with one.
         let z = z.unwrap_or(f64::NAN);
         if q.iter().chain(v).chain([&z]).all(|x| x.is_finite()) {
-            return Ok(Place { t, q: q.to_vec(), v: v.to_vec(), z });
+            return Ok(OwnedState { t, q: q.to_vec(), v: v.to_vec(), z });
         }
         Err(StepError::NonFinite)
     }
@@ -115,8 +115,8 @@ impl Assembled {
     }
 
     /// The energy of a state.
-    pub(super) fn energy(&self, at: &Place) -> Result<f64, StepError> {
+    pub(super) fn energy(&self, at: &OwnedState) -> Result<f64, StepError> {
         // Other errors of a state have been excluded before.
-        self.system.energy(at.state()).map_err(|_| StepError::NonFinite)
+        self.system.energy(at.borrowed()).map_err(|_| StepError::NonFinite)
     }
 }

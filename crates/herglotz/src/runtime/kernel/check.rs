@@ -1,8 +1,8 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
+use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
-use super::{Sized, coordinates};
-use crate::runtime::{Check, Interrupt, MomentumSample, Motion, Place, RuntimeError, StatementResidual, StepControl};
+use crate::runtime::{Check, Interrupt, MomentumSample, Motion, RuntimeError, Sample, StatementResidual, StepControl};
 use contact_geom::{
     ChartVector, OneParameterGroup, PhasePoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -11,21 +11,23 @@ use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, 
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
 
-/// The distance of the finite differences, relative to the size of a state.
-const DISTANCE: f64 = 1e-3;
+/// The distance of the finite differences, relative to the size of a state: it balances their truncation error, of sixth
+/// order, and round-off divided by the distance.
+const RELATIVE_DISTANCE: f64 = 1e-3;
 
-/// The number of places at which the theorems are evaluated.
-const PLACES: usize = 3;
+/// The number of samples at which the theorems are evaluated: few, since second derivatives of second derivatives are
+/// expensive.
+const THEOREM_SAMPLES: usize = 3;
 
-/// The number of steps between two polls of the interrupt.
-const POLL: usize = 256;
+/// The number of steps between two polls of the interrupt: a poll is then inexpensive compared with the steps.
+const STEPS_BETWEEN_POLLS: usize = 256;
 
 /// The number of stages of the discrete Lagrangian for the theorems, where the integrator of the motion is not a
-/// collocation method.
-const STAGES: usize = 4;
+/// collocation method: order 8.
+const DEFAULT_STAGES: usize = 4;
 
-/// The theorems are given up when the step has been divided by this.
-const SHORTEST: f64 = 64.0;
+/// The theorems are given up when the step has been halved six times without a discrete Lagrangian for its two points.
+const MAX_STEP_DIVISION: f64 = 64.0;
 
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
 fn step<const N: usize>(
@@ -37,27 +39,27 @@ fn step<const N: usize>(
     let problem = Problem::new(lagrangian, t, Start::from(*from))?;
     let plan = problem.by(by).steps(Steps::Count(count)).plan(Until::After(h))?;
     let mut stepper = plan.stepper()?;
-    stepper.advance(count).map_err(|halt| halt.cause)?;
+    stepper.advance(count).map_err(|failure| failure.cause)?;
     Ok((stepper.state(), stepper.sigma()))
 }
 
 /// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size.
 fn contact_defect<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
-    way: (AnyIntegrator, f64, usize),
+    map: (AnyIntegrator, f64, usize),
     t: f64,
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
     let from = ChartVector::from(*at);
-    let (end, sigma) = step(lagrangian, way, t, at)?;
+    let (end, sigma) = step(lagrangian, map, t, at)?;
     let size = |x: f64| if x > 0.0 { x } else { 1.0 };
     let sizes = [size(at.q.amax()), size(at.p.amax()), size(at.z.abs())];
     let mut differences = Vec::with_capacity(2 * N + 1);
     for k in 0..=2 * N {
-        let distance = DISTANCE * sizes[k / N.max(1)];
+        let distance = RELATIVE_DISTANCE * sizes[k / N.max(1)];
         let moved = |by: f64| -> Result<ChartVector<N>, RuntimeError> {
             let there = ChartVector::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
-            Ok(step(lagrangian, way, t, &there.into())?.0.into())
+            Ok(step(lagrangian, map, t, &there.into())?.0.into())
         };
         let [near, middle, far] = [1.0, 2.0, 3.0].map(|by| Ok::<_, RuntimeError>(moved(by)?.minus(moved(-by)?)));
         let derivative = near?.scale(45.0).minus(middle?.scale(9.0)).plus(far?).scale(1.0 / (60.0 * distance));
@@ -77,19 +79,19 @@ fn contact_defect<const N: usize>(
 /// The distance of a step from the exact motion, relative to the size of the state and per unit of time.
 fn herglotz_defect<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
-    way: (AnyIntegrator, f64, usize),
+    map: (AnyIntegrator, f64, usize),
     t: f64,
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
-    let exact = (AnyIntegrator::Gauss { stages: 16 }, way.1, 2);
+    let exact = (AnyIntegrator::Gauss { stages: 16 }, map.1, 2);
     let (a, b) =
-        (ChartVector::from(step(lagrangian, way, t, at)?.0), ChartVector::from(step(lagrangian, exact, t, at)?.0));
-    Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / way.1.abs())
+        (ChartVector::from(step(lagrangian, map, t, at)?.0), ChartVector::from(step(lagrangian, exact, t, at)?.0));
+    Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / map.1.abs())
 }
 
-pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
+pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let by = match motion.way {
+    let by = match motion.step_control {
         StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
         StepControl::Accuracy { by: None, .. } => {
             let unknown = |_| InputError::NoIntegrator;
@@ -100,22 +102,22 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     let problem = system.problem_of(motion)?;
     let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
     let steps = Steps::Count(plan.steps);
-    let stride = plan.steps.div_ceil(places.max(1));
+    let stride = plan.steps.div_ceil(samples.max(1));
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
     let mut states: Vec<(f64, PhasePoint<N>, f64)> = vec![(motion.start.t, *problem.state(), 0.0)];
-    let mut seen = |at: &discrete_herglotz::StepView<'_, N>| {
+    let mut record = |at: &discrete_herglotz::StepView<'_, N>| {
         if at.k.is_multiple_of(stride) && !at.last {
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
         }
-        if at.k.is_multiple_of(POLL) && interrupted() {
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && interrupted() {
             ControlFlow::Break(Stop::here("its check"))
         } else {
             ControlFlow::Continue(())
         }
     };
-    problem.by(by).steps(steps).with_conformal_factor().observe(&mut seen).run(Until::Time(motion.end))?;
-    let way = (by, h, 1);
+    problem.by(by).steps(steps).with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
+    let map = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {
         if interrupted() {
@@ -124,17 +126,17 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         let there = momenta(x).into_iter().zip(&first);
         let momenta =
             there.map(|(momentum, first)| MomentumSample { momentum, predicted: first * log_factor.exp() }).collect();
-        along.push(Place {
+        along.push(Sample {
             t: *t,
-            sigma: step(lagrangian, way, *t, x)?.1,
+            sigma: step(lagrangian, map, *t, x)?.1,
             log_factor: *log_factor,
-            contact_defect: contact_defect(lagrangian, way, *t, x)?,
-            herglotz_defect: herglotz_defect(lagrangian, way, *t, x)?,
+            contact_defect: contact_defect(lagrangian, map, *t, x)?,
+            herglotz_defect: herglotz_defect(lagrangian, map, *t, x)?,
             momenta,
         });
     }
-    let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
-    let stages = plan.integrator.collocation.unwrap_or(STAGES);
+    let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
+    let stages = plan.integrator.collocation.unwrap_or(DEFAULT_STAGES);
     let mut shorter = h;
     let stated = loop {
         if interrupted() {
@@ -142,23 +144,25 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         }
         match theorems_with(system, stages, (shorter, &of_theorems)) {
             // The discrete Lagrangian is defined for points that are close enough to each other.
-            Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < SHORTEST => shorter *= 0.5,
+            Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < MAX_STEP_DIVISION => {
+                shorter *= 0.5
+            }
             ended => break ended?,
         }
     };
-    Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
+    Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, samples: along, statements: stated })
 }
 
 /// The theorems for the discrete Lagrangian of contact Gauss collocation with step h: the largest residuals over the
-/// steps from some places.
+/// steps from some samples.
 fn theorems_with<const N: usize>(
     system: &Sized<N>,
     stages: usize,
-    (h, places): (f64, &[&(f64, PhasePoint<N>, f64)]),
+    (h, samples): (f64, &[&(f64, PhasePoint<N>, f64)]),
 ) -> Result<Vec<StatementResidual>, RuntimeError> {
     let n = system.0.formula().dimension();
-    let mut points = Vec::with_capacity(places.len());
-    for (t, x, _) in places {
+    let mut points = Vec::with_capacity(samples.len());
+    for (t, x, _) in samples {
         let q1 = step(&system.0, (AnyIntegrator::Gauss { stages }, h, 1), *t, x)?.0.q;
         let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
         points.push(Points { t: *t, q0, q1, z0: x.z });

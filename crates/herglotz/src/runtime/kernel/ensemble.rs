@@ -1,8 +1,8 @@
 //! Ensembles: many motions at once.
 
-use super::observed::{Observed, Seen};
+use super::observed::{MemberObserver, MemberRecord};
 use super::recorder::{Crossings, check_events, number};
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, StepControl, Varied};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
@@ -16,22 +16,24 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// The number of members that are computed together in SIMD lanes, and of members that are observed, each in a run of
-/// its own.
-const SHARD: usize = 384;
-const OBSERVED: usize = 16;
+/// The number of members that are computed together in SIMD lanes: a multiple of every number of lanes.
+const SHARD_MEMBERS: usize = 384;
 
-/// The maximal number of these shards between two polls.
-const SHARDS: usize = 24;
+/// The number of members in a shard whose members are observed, each in a run of its own: few, since their records are
+/// stored until the shard ends.
+const OBSERVED_SHARD_MEMBERS: usize = 16;
 
-/// The time between two polls above which blocks are made smaller.
-const LONG: Duration = Duration::from_millis(100);
+/// The maximal number of these shards between two polls, so that a block has no more than some thousand members.
+const MAX_SHARDS_BETWEEN_POLLS: usize = 24;
+
+/// The time between two polls above which blocks are made smaller: a user does not notice it.
+const MAX_TIME_BETWEEN_POLLS: Duration = Duration::from_millis(100);
 
 /// Runs an ensemble block by block, so that it can be interrupted and its memory does not grow.
 pub(super) fn run<const N: usize>(
     system: &Sized<N>,
     ensemble: &crate::runtime::Ensemble<'_>,
-    watch: &mut dyn EnsembleMonitor,
+    monitor: &mut dyn EnsembleMonitor,
 ) -> Result<Tally, RuntimeError> {
     if ensemble.count == 0 {
         return Err(EnsembleError::Empty.into());
@@ -44,26 +46,37 @@ pub(super) fn run<const N: usize>(
     let has_factor = ensemble.columns.iter().any(Column::has_conformal_factor);
     let observed = ensemble.rows.is_some() || !ensemble.events.is_empty() || has_factor;
     // In lanes, the step for an accuracy is chosen for a block, so the size of a block must not depend on run times.
-    let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {
-        _ if observed => (OBSERVED, 2, false),
-        (_, Some(_)) => (SHARD, 1, true),
-        (StepControl::Accuracy { .. }, None) => (SHARD, SHARDS, true),
-        (StepControl::Steps { .. }, None) => (SHARD, 2, false),
+    let (shard, mut shards, fixed) = match (&ensemble.step_control, &ensemble.varied) {
+        _ if observed => (OBSERVED_SHARD_MEMBERS, 2, false),
+        (_, Some(_)) => (SHARD_MEMBERS, 1, true),
+        (StepControl::Accuracy { .. }, None) => (SHARD_MEMBERS, MAX_SHARDS_BETWEEN_POLLS, true),
+        (StepControl::Steps { .. }, None) => (SHARD_MEMBERS, 2, false),
     };
-    let interrupt = watch.interrupt();
+    let interrupt = monitor.interrupt();
     let (mut tally, mut first) = (Tally::default(), 0);
     while first < ensemble.count {
         let (clock, size) = (Instant::now(), shards * shard);
         let members = first..ensemble.count.min(first + size);
         first = members.end;
-        let mut block =
-            Block { system, ensemble, members, tally: &mut tally, interrupt: interrupt.as_ref(), watch, ended: false };
+        let mut block = Block {
+            system,
+            ensemble,
+            members,
+            tally: &mut tally,
+            interrupt: interrupt.as_ref(),
+            monitor,
+            ended: false,
+        };
         block.run(observed)?;
-        if block.ended || watch.poll().is_break() {
+        if block.ended || monitor.poll().is_break() {
             break;
         }
         if !fixed {
-            shards = if clock.elapsed() > LONG { (shards / 2).max(2) } else { (2 * shards).min(SHARDS) };
+            shards = if clock.elapsed() > MAX_TIME_BETWEEN_POLLS {
+                (shards / 2).max(2)
+            } else {
+                (2 * shards).min(MAX_SHARDS_BETWEEN_POLLS)
+            };
         }
     }
     Ok(tally)
@@ -76,7 +89,7 @@ struct Block<'b, const N: usize> {
     members: Range<usize>,
     tally: &'b mut Tally,
     interrupt: Option<&'b Interrupt>,
-    watch: &'b mut dyn EnsembleMonitor,
+    monitor: &'b mut dyn EnsembleMonitor,
     ended: bool,
 }
 
@@ -98,7 +111,7 @@ impl<const N: usize> Block<'_, N> {
                     self.tally.failed += 1;
                     self.tally.first_failed = self.tally.first_failed.or(Some(index));
                     let member = MemberEnd { index, ending: Err(cause), rows: Vec::new(), crossings: Vec::new() };
-                    self.ended = self.watch.member(member).is_break();
+                    self.ended = self.monitor.member(member).is_break();
                 }
                 Err(error) => return Err(error.into()),
                 Ok(()) => {}
@@ -109,10 +122,10 @@ impl<const N: usize> Block<'_, N> {
 
     fn run_as_one(&mut self, members: Range<usize>, observed: bool) -> Result<(), EnsembleError> {
         let Block { system, ensemble, .. } = *self;
-        let crate::runtime::Ensemble { t0, end, way, columns, events, .. } = *ensemble;
+        let crate::runtime::Ensemble { t0, end, step_control, columns, events, .. } = *ensemble;
         let (first, n) = (members.start, system.0.formula().dimension());
         let start = |i: usize| system.start_of_member(&(ensemble.start)(first + i));
-        let own: Option<Vec<Option<Own<N>>>> = ensemble.varied.as_ref().map(|varied| {
+        let own: Option<Vec<Option<MemberSystem<N>>>> = ensemble.varied.as_ref().map(|varied| {
             let with = |i: usize| {
                 let mut lagrangian = system.0.clone();
                 let values = (varied.values)(i);
@@ -121,7 +134,7 @@ impl<const N: usize> Block<'_, N> {
                 let mut events = events.to_vec();
                 let expressions = events.iter_mut().flat_map(Event::expressions_mut);
                 expressions.for_each(|expression| set(expression, varied.names, &values));
-                Some(Own { lagrangian, events })
+                Some(MemberSystem { lagrangian, events })
             };
             members.clone().map(with).collect()
         });
@@ -132,12 +145,12 @@ impl<const N: usize> Block<'_, N> {
             // A member with invalid parameters gets an invalid start, so that it is refused.
             Some(_) => Ensemble::of(t0, members.len(), |i| match lagrangian(i) {
                 Some(lagrangian) => (lagrangian, start(i)),
-                None => (&system.0, no_start()),
+                None => (&system.0, invalid_start()),
             }),
         };
-        let many = match way {
-            StepControl::Accuracy { wanted, by: None } => many.accuracy(wanted),
-            StepControl::Accuracy { wanted, by: Some(by) } => many.by(by).accuracy(wanted),
+        let many = match step_control {
+            StepControl::Accuracy { error, by: None } => many.accuracy(error),
+            StepControl::Accuracy { error, by: Some(by) } => many.by(by).accuracy(error),
             StepControl::Steps { by, steps } => many.by(by).steps(steps),
         };
         let many = match ensemble.threads {
@@ -145,7 +158,7 @@ impl<const N: usize> Block<'_, N> {
             None => many,
         };
         let many = match self.interrupt {
-            Some(interrupt) => many.with_interrupt(interrupt.asked()),
+            Some(interrupt) => many.with_interrupt(interrupt.for_integrators()),
             None => many,
         };
         let own_columns = |i: usize| match &ensemble.varied {
@@ -154,8 +167,8 @@ impl<const N: usize> Block<'_, N> {
             }
             _ => Cow::Borrowed(columns),
         };
-        let (watch, ended) = (&mut *self.watch, &mut self.ended);
-        let mut hand_on = |member: &Member<N>, Seen { rows, last, crossings }: Seen<N>| {
+        let (monitor, ended) = (&mut *self.monitor, &mut self.ended);
+        let mut pass_on = |member: &Member<N>, MemberRecord { rows, last, crossings }: MemberRecord<N>| {
             if *ended {
                 return;
             }
@@ -178,19 +191,19 @@ impl<const N: usize> Block<'_, N> {
             let columns = own_columns(member.index);
             let rows = rows.iter().map(|row| columns.iter().map(|column| number(column, row)).collect());
             let member = MemberEnd { index: first + member.index, ending, rows: rows.collect(), crossings };
-            *ended = watch.member(member).is_break();
+            *ended = monitor.member(member).is_break();
         };
         let until = Until::Time(end);
         let of_block = if observed {
             let observer = |i: usize| {
                 let events = own_of(i).map_or(Some(events), |own| own.map(|own| own.events.as_slice()));
                 let crossings = lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l, events, None));
-                Observed::<N>::new(ensemble.rows.as_ref(), columns, crossings)
+                MemberObserver::<N>::new(ensemble.rows.as_ref(), columns, crossings)
             };
-            let many = many.observe(observer, Observed::seen);
-            many.run(until, |member, seen| hand_on(member, seen.unwrap_or_default()))?
+            let many = many.observe(observer, MemberObserver::into_record);
+            many.run(until, |member, record| pass_on(member, record.unwrap_or_default()))?
         } else {
-            many.run(until, |member| hand_on(member, Seen::default()))?
+            many.run(until, |member| pass_on(member, MemberRecord::default()))?
         };
         self.tally.members += of_block.members;
         self.tally.completed += of_block.completed;
@@ -205,7 +218,7 @@ impl<const N: usize> Block<'_, N> {
 }
 
 /// The Lagrangian and the events of a member with parameters of its own.
-struct Own<const N: usize> {
+struct MemberSystem<const N: usize> {
     lagrangian: FormulaLagrangian<N>,
     events: Vec<Event>,
 }
@@ -227,6 +240,7 @@ fn is_common(cause: &InputError) -> bool {
             | E::Count { .. }
             | E::Unclaimed { .. }
             | E::Hypothesis { .. }
+            | E::NoTimeTransformation
     )
 }
 
@@ -250,14 +264,14 @@ fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec
 }
 
 /// An invalid start, which every run refuses.
-fn no_start<const N: usize>() -> Start<N> {
+fn invalid_start<const N: usize>() -> Start<N> {
     let none = SVector::repeat(f64::NAN);
     VelocityPoint { q: none, v: none, z: f64::NAN }.into()
 }
 
 impl<const N: usize> Sized<N> {
     fn start_of_member(&self, start: &crate::runtime::Start) -> Start<N> {
-        self.start(start).unwrap_or_else(|_| no_start())
+        self.start(start).unwrap_or_else(|_| invalid_start())
     }
 }
 

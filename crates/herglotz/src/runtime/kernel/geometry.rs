@@ -1,6 +1,6 @@
 //! The geometry at a point.
 
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Geometry, RuntimeError, Start};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{

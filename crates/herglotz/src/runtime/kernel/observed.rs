@@ -6,7 +6,7 @@ use discrete_herglotz::{InputError, Observer, OutputRequest, Row, Rows, RunInfo,
 use std::ops::ControlFlow;
 
 /// The records of a member.
-pub(super) struct Seen<const N: usize> {
+pub(super) struct MemberRecord<const N: usize> {
     pub rows: Vec<Row<N>>,
     /// The row at the end of the last step, where the conformal factor is requested, which is known only at the ends of
     /// steps.
@@ -14,14 +14,14 @@ pub(super) struct Seen<const N: usize> {
     pub crossings: Vec<Crossing>,
 }
 
-impl<const N: usize> Default for Seen<N> {
+impl<const N: usize> Default for MemberRecord<N> {
     fn default() -> Self {
-        Seen { rows: Vec::new(), last: None, crossings: Vec::new() }
+        MemberRecord { rows: Vec::new(), last: None, crossings: Vec::new() }
     }
 }
 
 /// Observer that records a member.
-pub(super) struct Observed<'r, const N: usize> {
+pub(super) struct MemberObserver<'r, const N: usize> {
     rows: Option<Rows<'r, N>>,
     last: Option<Rows<'r, N>>,
     crossings: Option<Crossings<'r, N>>,
@@ -29,7 +29,7 @@ pub(super) struct Observed<'r, const N: usize> {
     forward: bool,
 }
 
-impl<'r, const N: usize> Observed<'r, N> {
+impl<'r, const N: usize> MemberObserver<'r, N> {
     pub fn new(
         when: Option<&OutputTimes>,
         columns: &[Column],
@@ -38,16 +38,16 @@ impl<'r, const N: usize> Observed<'r, N> {
         let of_rows = when.map(|when| rows(when, columns)).transpose()?;
         let has_factor = columns.iter().any(Column::has_conformal_factor);
         let last = has_factor.then(|| rows(&OutputTimes::Every(usize::MAX), columns)).transpose()?;
-        Ok(Observed { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
+        Ok(MemberObserver { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
     }
 
-    pub fn seen(self) -> Seen<N> {
+    pub fn into_record(self) -> MemberRecord<N> {
         let rows = self.rows.map(|rows| rows.rows).unwrap_or_default();
-        Seen { rows, last: self.last.and_then(|mut last| last.rows.pop()), crossings: self.found }
+        MemberRecord { rows, last: self.last.and_then(|mut last| last.rows.pop()), crossings: self.found }
     }
 }
 
-impl<const N: usize> Observer<N> for Observed<'_, N> {
+impl<const N: usize> Observer<N> for MemberObserver<'_, N> {
     fn terminal(&self) -> Option<Terminal<'_, N>> {
         self.crossings.as_ref().and_then(Crossings::terminal)
     }
@@ -58,12 +58,12 @@ impl<const N: usize> Observer<N> for Observed<'_, N> {
         of(&self.rows).and(of(&self.last)).and(of_events)
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.forward = course.t_end >= course.t0;
+    fn prepare(&mut self, run_info: &RunInfo) -> Result<(), InputError> {
+        self.forward = run_info.t_end >= run_info.t0;
         for rows in self.rows.iter_mut().chain(&mut self.last) {
-            rows.prepare(course)?;
+            rows.prepare(run_info)?;
         }
-        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(course))
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(run_info))
     }
 
     fn next(&self, taken: usize) -> usize {

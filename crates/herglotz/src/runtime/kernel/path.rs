@@ -20,15 +20,11 @@ pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<Fou
         3 => within::<3>(formula, problem),
         4 => within::<4>(formula, problem),
         5..=8 => within::<8>(formula, problem),
-        n => Err(argument(
+        n => Err(RuntimeError::argument(
             "coordinates",
             format!("are {n}, where paths between two ends are compiled for 1 to 8; write the system in Rust"),
         )),
     }
-}
-
-fn argument(argument: &'static str, why: String) -> RuntimeError {
-    RuntimeError::Argument { argument, why }
 }
 
 /// The coordinates as a vector of N; the additional components are 0.
@@ -59,7 +55,7 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
             let state = legendre(&lagrangian, t0, &start);
             by(&lagrangian, method.discretise::<N, _>(&lagrangian, h, t0, &state)?, problem)
         }
-        other => Err(argument(
+        other => Err(RuntimeError::argument(
             "integrator",
             format!(
                 "is \"{other}\", which has no discrete Lagrangian that is known from both ends of a step: take \"gauss_4\", another of \

@@ -1,6 +1,6 @@
 //! The observer of a motion: rows, events, nodes, and polling for interruption.
 
-use super::coordinates;
+use super::sized::coordinates;
 use crate::runtime::{
     Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };
@@ -15,8 +15,8 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 
-/// The number of steps between two polls.
-const POLL: usize = 256;
+/// The number of steps between two polls: a poll is then inexpensive compared with the steps.
+const STEPS_BETWEEN_POLLS: usize = 256;
 
 /// Observes a motion on behalf of a [`RunMonitor`].
 pub(super) struct Recorder<'r, const N: usize> {
@@ -27,16 +27,16 @@ pub(super) struct Recorder<'r, const N: usize> {
     crossings: Option<Crossings<'r, N>>,
     nodes: bool,
     needs: OutputRequest,
-    course: Option<RunInfo>,
+    run_info: Option<RunInfo>,
     dimension: usize,
-    watch: &'r mut dyn RunMonitor,
+    monitor: &'r mut dyn RunMonitor,
 }
 
 impl<'r, const N: usize> Recorder<'r, N> {
     pub fn new(
         lagrangian: &'r FormulaLagrangian<N>,
         motion: &'r Motion,
-        watch: &'r mut dyn RunMonitor,
+        monitor: &'r mut dyn RunMonitor,
     ) -> Result<Self, RuntimeError> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
@@ -52,47 +52,47 @@ impl<'r, const N: usize> Recorder<'r, N> {
             crossings,
             nodes: motion.nodes,
             needs: of_rows.and(of_all),
-            course: None,
+            run_info: None,
             dimension: lagrangian.formula().dimension(),
-            watch,
+            monitor,
         })
     }
 
     /// Passes on the rows, up to a time if one is given.
-    fn hand_on(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
+    fn pass_on_rows(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
         let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
-        let backward = self.course.is_some_and(|course| course.t_end < course.t0);
+        let backward = self.run_info.is_some_and(|run_info| run_info.t_end < run_info.t0);
         let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
         for row in rows.rows.drain(..).filter(|row| !beyond(row.t)) {
             self.numbers.clear();
             self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
-            if self.watch.row(&self.numbers).is_break() {
+            if self.monitor.row(&self.numbers).is_break() {
                 return ControlFlow::Break(Stop::here("its watch"));
             }
         }
         ControlFlow::Continue(())
     }
 
-    fn see(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn notify(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
             // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
             let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
-            self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
+            self.monitor.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
-        if at.k.is_multiple_of(POLL)
-            && let Some(RunInfo { t0, t_end, .. }) = self.course
-            && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+            && let Some(RunInfo { t0, t_end, .. }) = self.run_info
+            && self.monitor.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
             if let Some(interrupted) = at.resume_state() {
-                self.watch.interrupted(interrupted);
+                self.monitor.interrupted(interrupted);
             }
             return ControlFlow::Break(Stop::here("its watch"));
         }
-        if at.k.is_multiple_of(POLL)
-            && self.watch.wants_checkpoint()
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+            && self.monitor.wants_checkpoint()
             && let Some(saved) = at.resume_state()
-            && self.watch.checkpoint(at.k, saved).is_break()
+            && self.monitor.checkpoint(at.k, saved).is_break()
         {
             return ControlFlow::Break(Stop::here("its watch"));
         }
@@ -159,9 +159,9 @@ pub(super) fn check_events<const N: usize>(
 }
 
 /// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
-struct Beside<const N: usize> {
+struct EventContext<const N: usize> {
     /// The initial time.
-    began: Cell<f64>,
+    start_time: Cell<f64>,
     /// The last velocity that was found, the initial guess for the next.
     velocity: Cell<SVector<f64, N>>,
 }
@@ -170,19 +170,19 @@ struct Beside<const N: usize> {
 fn at_states<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     function: &'r Expression,
-    beside: Rc<Beside<N>>,
+    context: Rc<EventContext<N>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
     // `check_events` ensures that the rate is constant wherever it is needed.
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
-            match legendre_inverse(lagrangian, t, state, &beside.velocity.get()) {
-                Ok(x) => beside.velocity.set(x.v),
+            match legendre_inverse(lagrangian, t, state, &context.velocity.get()) {
+                Ok(x) => context.velocity.set(x.v),
                 Err(_) => return f64::NAN,
             }
         }
-        let v = beside.velocity.get();
-        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - beside.began.get()))
+        let v = context.velocity.get();
+        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - context.start_time.get()))
     }
 }
 
@@ -190,14 +190,14 @@ fn at_states<'r, const N: usize>(
 pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
     /// The events as they were requested.
-    asked: &'r [crate::runtime::Event],
+    requested: &'r [crate::runtime::Event],
     /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
     rate: f64,
     /// Whether an event or a column contains the action.
     action: bool,
     /// Whether an event contains the velocity.
     velocity: bool,
-    beside: Rc<Beside<N>>,
+    context: Rc<EventContext<N>>,
     backward: bool,
     dimension: usize,
 }
@@ -209,21 +209,21 @@ impl<'r, const N: usize> Crossings<'r, N> {
         events: &'r [crate::runtime::Event],
         start: Option<&Start>,
     ) -> Option<Self> {
-        let numbers = match start.map(|start| &start.rate) {
+        let numbers = match start.map(|start| &start.velocity) {
             Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
             _ => &[],
         };
         let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
-        let beside = Rc::new(Beside { began: Cell::new(0.0), velocity: Cell::new(v) });
+        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: Cell::new(v) });
         let action = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_action);
-        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, beside.clone())));
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, context.clone())));
         (!events.is_empty()).then(|| Crossings {
             events: all(),
-            asked: events,
+            requested: events,
             rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
             action,
             velocity: events.iter().any(|event| event.function.has_velocity()),
-            beside: beside.clone(),
+            context: context.clone(),
             backward: false,
             dimension: lagrangian.formula().dimension(),
         })
@@ -233,17 +233,17 @@ impl<'r, const N: usize> Crossings<'r, N> {
         OutputRequest { action: self.action, ..OutputRequest::default() }
     }
 
-    pub fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.beside.began.set(course.t0);
-        self.backward = course.t_end < course.t0;
-        self.events.prepare(course)
+    pub fn prepare(&mut self, run_info: &RunInfo) -> Result<(), InputError> {
+        self.context.start_time.set(run_info.t0);
+        self.backward = run_info.t_end < run_info.t0;
+        self.events.prepare(run_info)
     }
 
     pub fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.velocity
             && let Ok(v) = at.velocity()
         {
-            self.beside.velocity.set(v);
+            self.context.velocity.set(v);
         }
         self.events.start(at)
     }
@@ -257,23 +257,23 @@ impl<'r, const N: usize> Crossings<'r, N> {
     pub fn step(
         &mut self,
         at: &StepView<'_, N>,
-        mut hand_on: impl FnMut(Crossing) -> ControlFlow<()>,
+        mut pass_on_rows: impl FnMut(Crossing) -> ControlFlow<()>,
     ) -> ControlFlow<Stop<N>> {
         let ended = self.events.step(at);
         for crossing in self.events.crossings.drain(..) {
-            let asked = self.asked.get(crossing.event);
-            let (t, from) = (crossing.t, asked.and_then(|event| event.from));
+            let requested = self.requested.get(crossing.event);
+            let (t, from) = (crossing.t, requested.and_then(|event| event.from));
             if from.is_some_and(|from| if self.backward { t > from } else { t < from }) {
                 continue;
             }
             let PhasePoint { q, p, z } = crossing.state;
             // The velocity at the end of the step is close enough as an initial guess.
             let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
-            let log_factor = self.rate * (t - self.beside.began.get());
-            let columns = asked.map_or(&[][..], |event| &event.columns).iter();
+            let log_factor = self.rate * (t - self.context.start_time.get());
+            let columns = requested.map_or(&[][..], |event| &event.columns).iter();
             let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
             let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
-            if hand_on(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
+            if pass_on_rows(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
                 return ControlFlow::Break(Stop::here("its watch"));
             }
         }
@@ -284,9 +284,9 @@ impl<'r, const N: usize> Crossings<'r, N> {
 fn of<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     event: &'r crate::runtime::Event,
-    beside: Rc<Beside<N>>,
+    context: Rc<EventContext<N>>,
 ) -> Event<'r, N> {
-    let found = Event::new(at_states(lagrangian, &event.function, beside));
+    let found = Event::new(at_states(lagrangian, &event.function, context));
     let found = match event.direction {
         Direction::Rising => found.rising(),
         Direction::Falling => found.falling(),
@@ -304,19 +304,19 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.needs
     }
 
-    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
-        self.course = Some(*course);
+    fn prepare(&mut self, run_info: &RunInfo) -> Result<(), InputError> {
+        self.run_info = Some(*run_info);
         if let Some(rows) = &mut self.rows {
-            rows.prepare(course)?;
+            rows.prepare(run_info)?;
         }
-        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(course))
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(run_info))
     }
 
     fn next(&self, taken: usize) -> usize {
         if self.nodes || self.crossings.is_some() {
             return taken + 1;
         }
-        let poll = (taken / POLL + 1) * POLL;
+        let poll = (taken / STEPS_BETWEEN_POLLS + 1) * STEPS_BETWEEN_POLLS;
         self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
     }
 
@@ -327,8 +327,8 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         if let Some(crossings) = &mut self.crossings {
             crossings.start(at)?;
         }
-        self.hand_on(None)?;
-        self.see(at)
+        self.pass_on_rows(None)?;
+        self.notify(at)
     }
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
@@ -336,13 +336,13 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
             rows.step(at)?;
         }
         if let Some(crossings) = &mut self.crossings {
-            let ended = crossings.step(at, |crossing| self.watch.crossing(&crossing));
+            let ended = crossings.step(at, |crossing| self.monitor.crossing(&crossing));
             if let ControlFlow::Break(stop) = ended {
-                self.hand_on(stop.at.map(|(t, _)| t))?;
+                self.pass_on_rows(stop.at.map(|(t, _)| t))?;
                 return ControlFlow::Break(stop);
             }
         }
-        self.hand_on(None)?;
-        self.see(at)
+        self.pass_on_rows(None)?;
+        self.notify(at)
     }
 }

@@ -1,7 +1,7 @@
 //! Runs of one motion.
 
 use super::recorder::Recorder;
-use super::{Sized, coordinates};
+use super::sized::{Sized, coordinates};
 use crate::runtime::{Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl};
 use discrete_herglotz::{Problem, ResumeState, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
@@ -15,9 +15,9 @@ fn of<'p, 'o, const N: usize>(
     problem: &'p Problem<'p, FormulaLagrangian<N>, N>,
     motion: &Motion,
 ) -> Result<Run<'p, 'o, FormulaLagrangian<N>, N>, RuntimeError> {
-    let run = match motion.way {
-        StepControl::Accuracy { wanted, by: None } => problem.accuracy(wanted),
-        StepControl::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
+    let run = match motion.step_control {
+        StepControl::Accuracy { error, by: None } => problem.accuracy(error),
+        StepControl::Accuracy { error, by: Some(by) } => problem.by(by).accuracy(error),
         StepControl::Steps { by, steps } => problem.by(by).steps(steps),
     };
     let run = if motion.action { run } else { run.without_action() };
@@ -31,8 +31,8 @@ fn of<'p, 'o, const N: usize>(
 
 pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result<Plan, RuntimeError> {
     let problem = system.problem_of(motion)?;
-    let mut unwatched = ();
-    let mut recorder = Recorder::new(&system.0, motion, &mut unwatched)?;
+    let mut no_monitor = ();
+    let mut recorder = Recorder::new(&system.0, motion, &mut no_monitor)?;
     let run = of(system, &problem, motion)?.observe(&mut recorder);
     let plan = run.plan(Until::Time(motion.end))?;
     Ok(Plan {
@@ -48,11 +48,11 @@ pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result
 pub(super) fn run<const N: usize>(
     system: &Sized<N>,
     motion: &Motion,
-    watch: &mut dyn RunMonitor,
+    monitor: &mut dyn RunMonitor,
     from: Option<ResumeState>,
 ) -> Result<Outcome, RuntimeError> {
     let problem = system.problem_of(motion)?;
-    let mut recorder = Recorder::new(&system.0, motion, watch)?;
+    let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = of(system, &problem, motion)?.observe(&mut recorder);
     let run = match from {
         Some(from) => run.resume(from),

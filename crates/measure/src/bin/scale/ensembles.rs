@@ -99,12 +99,12 @@ fn candidates() -> Vec<AnyIntegrator> {
 /// `most`.
 fn steps_for(
     error: &dyn Fn(usize) -> Result<f64, Failure>,
-    wanted: f64,
+    accuracy: f64,
     most: usize,
 ) -> Result<Option<usize>, Failure> {
     let mut steps = 1;
     while steps <= most {
-        if error(steps)? <= wanted {
+        if error(steps)? <= accuracy {
             return Ok(Some(steps));
         }
         steps = (steps + 1).max(steps * 17 / 16);
@@ -141,8 +141,8 @@ fn heyoka(report: &mut Report) -> Result<Vec<Peer>, Failure> {
 
 /// The shortest measured time of heyoka per member for an error, or the tabulated one, and a name that says which of
 /// the two.
-fn their_time(peers: &[Peer], what: &str, wanted: f64, by_table: f64) -> (f64, &'static str) {
-    let found = peers.iter().filter(|peer| peer.what == what && peer.error <= wanted).map(|peer| peer.seconds);
+fn peer_time(peers: &[Peer], what: &str, accuracy: f64, by_table: f64) -> (f64, &'static str) {
+    let found = peers.iter().filter(|peer| peer.what == what && peer.error <= accuracy).map(|peer| peer.seconds);
     let shortest = found.fold(f64::INFINITY, f64::min);
     if shortest < f64::INFINITY { (shortest, "heyoka's time") } else { (by_table, "heyoka's tabulated time") }
 }
@@ -155,19 +155,19 @@ fn pendula(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
     let reference = AnyIntegrator::Gauss { stages: 16 };
     let (exact_part, _) = timed(count / thin, part, reference, (20, end), 1)?;
     let (exact, _) = timed(count, grid, reference, (20, end), 2)?;
-    for (wanted, by_table, share) in PENDULA {
+    for (accuracy, by_table, share) in PENDULA {
         let mut best: Option<(f64, AnyIntegrator, usize)> = None;
         for integrator in candidates() {
             let error = |steps: usize| -> Result<f64, Failure> {
                 let (ends, _) = timed(count / thin, part, integrator, (steps, end), 1)?;
                 Ok(distance(&ends, &exact_part, false))
             };
-            let most = if wanted < 1e-6 && integrator.order() < 6 { 0 } else { 400 };
-            let Some(mut steps) = steps_for(&error, wanted, most)? else { continue };
+            let most = if accuracy < 1e-6 && integrator.order() < 6 { 0 } else { 400 };
+            let Some(mut steps) = steps_for(&error, accuracy, most)? else { continue };
             loop {
                 let (ends, seconds) = shortest(3, || timed(count, grid, integrator, (steps, end), 1))?;
                 let error = distance(&ends, &exact, false);
-                if error <= wanted {
+                if error <= accuracy {
                     report.row(
                         CASE,
                         &format!("pendula, {integrator}, {steps} steps, error {error:.1e}"),
@@ -185,15 +185,15 @@ fn pendula(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
         }
         let Some((_, integrator, steps)) = best else { continue };
         let (_, seconds) = shortest(9, || timed(count, grid, integrator, (steps, end), 1))?;
-        let (theirs, whose) = their_time(peers, "pendula", wanted, by_table / count as f64);
-        let what = format!("pendula to {wanted:e} by {integrator} in {steps} steps, of {whose}");
-        report.verdict(CASE, &what, seconds / count as f64 / theirs, share);
+        let (peer_seconds, whose) = peer_time(peers, "pendula", accuracy, by_table / count as f64);
+        let what = format!("pendula to {accuracy:e} by {integrator} in {steps} steps, of {whose}");
+        report.verdict(CASE, &what, seconds / count as f64 / peer_seconds, share);
     }
     Ok(())
 }
 
 fn neighbours(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
-    let (count, end, wanted, by_table, share) = NEIGHBOURS;
+    let (count, end, accuracy, by_table, share) = NEIGHBOURS;
     // Enough members to fill the SIMD lanes.
     let few = 128;
     let part = |i: usize| neighbour(i * (count / few));
@@ -211,7 +211,7 @@ fn neighbours(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
         while steps < 20_000 {
             let (ends, seconds) = timed(few, part, integrator, (steps, end), 1)?;
             let error = distance(&ends, &exact, true);
-            if error <= wanted {
+            if error <= accuracy {
                 report.row(
                     CASE,
                     &format!("neighbours, {integrator}, {steps} steps, error {error:.1e}"),
@@ -229,9 +229,9 @@ fn neighbours(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
     }
     let Some((_, integrator, steps)) = best else { return Ok(()) };
     let (_, seconds) = timed(count, neighbour, integrator, (steps, end), 1)?;
-    let (theirs, whose) = their_time(peers, "neighbours", wanted, by_table);
-    let what = format!("neighbours to {wanted:e} by {integrator} in {steps} steps, each of {whose}");
-    report.verdict(CASE, &what, seconds / count as f64 / theirs, share);
+    let (peer_seconds, whose) = peer_time(peers, "neighbours", accuracy, by_table);
+    let what = format!("neighbours to {accuracy:e} by {integrator} in {steps} steps, each of {whose}");
+    report.verdict(CASE, &what, seconds / count as f64 / peer_seconds, share);
     Ok(())
 }
 

@@ -64,9 +64,10 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(name) = arguments.case.iter().find(unknown) {
         return Err(Failure::Unknown { what: "case", name: name.clone(), known: names.join(", ") });
     }
-    let mut report = Report::new(Directory::create(&arguments.out)?, arguments.quick);
+    let mut report = Report::new(Directory::create(&arguments.out)?);
+    report.quick = arguments.quick;
     for (name, size, case) in CASES {
-        if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
+        if arguments.case.iter().any(|requested| requested == "all" || requested == name) {
             report.begin(name, size);
             case(&mut report)?;
         }

@@ -1,10 +1,11 @@
-//! Peak memory, by an allocator that counts.
+//! Peak memory, by an allocator that counts. Unlike that of the tests (`tests/common/counting_allocator.rs`) it counts over
+//! all threads, since ensembles and assembled systems are run on several.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 static HELD: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
 
@@ -13,7 +14,7 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let held = HELD.fetch_add(layout.size(), Relaxed) + layout.size();
-        MOST.fetch_max(held, Relaxed);
+        PEAK.fetch_max(held, Relaxed);
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
@@ -28,7 +29,7 @@ static ALLOCATOR: Counting = Counting;
 /// The result of an action, and the peak memory in bytes that it held beyond what was held before.
 pub fn peak<R>(action: impl FnOnce() -> R) -> (R, usize) {
     let before = HELD.load(Relaxed);
-    MOST.store(before, Relaxed);
+    PEAK.store(before, Relaxed);
     let result = action();
-    (result, MOST.load(Relaxed).saturating_sub(before))
+    (result, PEAK.load(Relaxed).saturating_sub(before))
 }

@@ -38,8 +38,9 @@ pub struct Report {
 }
 
 impl Report {
-    pub fn new(out: Directory, quick: bool) -> Self {
-        Report { out, quick, rows: Vec::new(), verdicts: Vec::new(), cases: Vec::new() }
+    /// A report of full sizes.
+    pub fn new(out: Directory) -> Self {
+        Report { out, quick: false, rows: Vec::new(), verdicts: Vec::new(), cases: Vec::new() }
     }
 
     /// Begins a case; `size` is the meaning of its sizes.

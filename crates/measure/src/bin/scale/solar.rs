@@ -99,7 +99,7 @@ fn collocation(stages: usize, days: f64, steps: usize) -> Result<(Vec<f64>, f64)
     best_of_two(|| {
         let mut motion = gauss.stepper_without_action(0.0, start, v)?;
         let clock = Instant::now();
-        motion.advance(steps).map_err(|halt| Failure::Step(halt.cause))?;
+        motion.advance(steps).map_err(|failure| Failure::Step(failure.cause))?;
         Ok((motion.state().q.as_slice().to_vec(), clock.elapsed().as_secs_f64()))
     })
 }
@@ -126,7 +126,7 @@ fn motion(
         let clock = Instant::now();
         let done = motion.advance(steps);
         let seconds = clock.elapsed().as_secs_f64();
-        done.map_err(|halt| Failure::Step(halt.cause))?;
+        done.map_err(|failure| Failure::Step(failure.cause))?;
         Ok((motion.state().q.to_vec(), seconds))
     })
 }

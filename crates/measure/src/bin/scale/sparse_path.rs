@@ -29,7 +29,7 @@ pub fn newton<const N: usize>(
         let mut entries = Entries::default();
         equations(ld, &q, &z, &mut entries, &mut rhs).ok()?;
         if analysed.is_none() {
-            let (pattern, order) = SymbolicSparseColMat::try_new_from_indices(size, size, &entries.places).ok()?;
+            let (pattern, order) = SymbolicSparseColMat::try_new_from_indices(size, size, &entries.positions).ok()?;
             let symbolic = SymbolicLu::try_new(pattern.as_ref()).ok()?;
             analysed = Some((pattern, order, symbolic));
         }
@@ -61,13 +61,13 @@ pub fn newton<const N: usize>(
 /// The entries of a sparse matrix, in the same order in each iteration.
 #[derive(Default)]
 struct Entries {
-    places: Vec<Pair<usize, usize>>,
+    positions: Vec<Pair<usize, usize>>,
     values: Vec<f64>,
 }
 
 impl Entries {
     fn push(&mut self, row: usize, col: usize, value: f64) {
-        self.places.push(Pair { row, col });
+        self.positions.push(Pair { row, col });
         self.values.push(value);
     }
 }

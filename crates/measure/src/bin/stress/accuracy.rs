@@ -2,7 +2,7 @@
 //! tolerances.
 
 use crate::formula::{Feature, Force, Formula, Rate, Smooth};
-use crate::motion::{End, Problem, Worth, caught, distance, dop853, end_of_outcome};
+use crate::motion::{Problem, RunEnd, Verdict, caught, distance, dop853, end_of_outcome};
 use crate::parallel::parallel;
 use crate::random::Random;
 use crate::report::Report;
@@ -39,10 +39,10 @@ const NAMED: [(AnyIntegrator, f64); 8] = [
 ];
 
 /// The largest number of steps that is tried for a configuration.
-const MOST_STEPS: f64 = 1e5;
+const MAX_STEPS: f64 = 1e5;
 
 /// The bound on the time of a plan, in seconds: a longer plan would be taken for a hang.
-const PATIENCE: f64 = 10.0;
+const MAX_PLAN_SECONDS: f64 = 10.0;
 
 /// A random problem with one degree of freedom.
 fn one(random: &mut Random) -> Problem<1> {
@@ -104,7 +104,7 @@ struct Found {
     dimension: usize,
     named: Option<AnyIntegrator>,
     tolerance: f64,
-    worth: Worth,
+    verdict: Verdict,
     error: f64,
     steps: usize,
     /// Whether the error is above the tolerance and dop853 disagrees with the exact flow too, by more than half of that
@@ -145,10 +145,10 @@ fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, toleranc
     for integrator in CONFIGURATIONS.into_iter().filter(|i| i.check(&problem.system).is_ok()) {
         let keeps = |count: f64| problem.by(integrator, count as usize).error(truth, 0.0) <= tolerance;
         let mut count = (problem.span / 4.0).ceil().max(1.0);
-        while count < MOST_STEPS && !keeps(count) {
+        while count < MAX_STEPS && !keeps(count) {
             count = (count * 1.25).ceil();
         }
-        if count >= MOST_STEPS {
+        if count >= MAX_STEPS {
             continue;
         }
         let run = || -> Result<f64, InputError> {
@@ -190,32 +190,32 @@ fn solve<const N: usize, const D: usize>(
     });
     let plan_time = clock.elapsed().as_secs_f64();
     let (run, end, steps) = match &plan {
-        None => (f64::NAN, End::Panicked, 0),
-        Some(Err(refused)) => (f64::NAN, End::Refused(*refused), 0),
+        None => (f64::NAN, RunEnd::Panicked, 0),
+        Some(Err(refused)) => (f64::NAN, RunEnd::Refused(*refused), 0),
         Some(Ok(plan)) => {
             let (seconds, outcome) = fastest(|| caught(|| plan.run()));
             let end = match outcome {
-                None => End::Panicked,
-                Some(Err(refused)) => End::Refused(refused),
+                None => RunEnd::Panicked,
+                Some(Err(refused)) => RunEnd::Refused(refused),
                 Some(Ok(outcome)) => end_of_outcome(&outcome),
             };
             (seconds, end, plan.count())
         }
     };
-    let (worth, error) = (end.worth(&truth, 0.0, 10.0 * tolerance), end.error(&truth, 0.0));
+    let (verdict, error) = (end.verdict(&truth, 0.0, 10.0 * tolerance), end.error(&truth, 0.0));
     let doubt = error > tolerance && {
         let size = distance(&PhasePoint { q: truth.q * 0.0, p: truth.p * 0.0, z: 0.0 }, &truth, 0.0);
         let other = dop853::<N, D>(problem, 1e-13, 1e-13 * crate::motion::norm(&[size, 1e-300]));
         other.is_some_and(|other| distance(&other, &truth, 0.0) > 0.5 * error)
     };
-    let refused = matches!(worth, Worth::Refused | Worth::Halted | Worth::Marked);
+    let refused = matches!(verdict, Verdict::Refused | Verdict::Failed | Verdict::Unresolved);
     let solvable = refused && by_hand(problem, &truth, tolerance, true).is_some();
-    let best = if compared && named.is_none() && worth == Worth::Right {
+    let best = if compared && named.is_none() && verdict == Verdict::Right {
         by_hand(problem, &truth, tolerance, false)
     } else {
         None
     };
-    Some(Found { dimension: N, named, tolerance, worth, error, steps, doubt, solvable, plan: plan_time, run, best })
+    Some(Found { dimension: N, named, tolerance, verdict, error, steps, doubt, solvable, plan: plan_time, run, best })
 }
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
@@ -236,8 +236,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let all = known.len() as f64;
     let that = |what: &dyn Fn(&Found) -> bool| known.iter().filter(|(_, f)| what(f)).count() as f64;
     let above = that(&|f| f.error > f.tolerance);
-    let bad = that(&|f| f.worth.is_bad());
-    let refused = that(&|f| matches!(f.worth, Worth::Refused | Worth::Halted | Worth::Marked));
+    let bad = that(&|f| f.verdict.is_failure());
+    let refused = that(&|f| matches!(f.verdict, Verdict::Refused | Verdict::Failed | Verdict::Unresolved));
     let solvable = that(&|f| f.solvable);
     report.say(&format!(
         "  {all} random problems of {count} have a truth that is known to a twentieth of the tolerance\n"
@@ -261,15 +261,15 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         ratios.len()
     ))?;
     let longest = known.iter().fold(0.0, |most, (_, f)| max_or_nan(most, f.plan));
-    report.at_most_timed("longest plan, in seconds", longest, PATIENCE)?;
+    report.at_most_timed("longest plan, in seconds", longest, MAX_PLAN_SECONDS)?;
 
     let mut decades: BTreeMap<i32, [f64; 5]> = BTreeMap::new();
     for (_, f) in &known {
         let row = decades.entry(f.tolerance.log10().floor() as i32).or_default();
         row[0] += 1.0;
         row[1] += f64::from(u8::from(f.error > f.tolerance));
-        row[2] += f64::from(u8::from(f.worth.is_bad()));
-        row[3] += f64::from(u8::from(matches!(f.worth, Worth::Refused | Worth::Halted | Worth::Marked)));
+        row[2] += f64::from(u8::from(f.verdict.is_failure()));
+        row[3] += f64::from(u8::from(matches!(f.verdict, Verdict::Refused | Verdict::Failed | Verdict::Unresolved)));
         row[4] += f64::from(u8::from(f.solvable));
     }
     report.markdown(
@@ -283,7 +283,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.table(
         &["problem", "dimension", "integrator", "tolerance", "worth", "error", "steps"],
         known.iter().map(|(i, f)| {
-            let numbers = [number(f.tolerance), f.worth.name().into(), number(f.error), f.steps.to_string()];
+            let numbers = [number(f.tolerance), f.verdict.name().into(), number(f.error), f.steps.to_string()];
             let named = f.named.map_or("chosen".into(), |integrator| integrator.to_string());
             [i.to_string(), f.dimension.to_string(), named].into_iter().chain(numbers).collect()
         }),

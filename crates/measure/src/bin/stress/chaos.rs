@@ -24,8 +24,8 @@ const H: f64 = 1.0 / 32.0;
 
 /// The initial distance of neighbours by which the growth is measured, and the time after which it is restored: over
 /// the whole span the distance would become the width of the well, whatever the growth.
-const APART: f64 = 1e-9;
-const PIECE: i32 = 4;
+const INITIAL_DISTANCE: f64 = 1e-9;
+const PIECE_TIME: i32 = 4;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let mut rows = Vec::new();
@@ -69,7 +69,7 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let start = PhasePoint::new([number(), number()], [number() + 1.0, number() + 1.0], 0.1);
             let end = turned(&run(gamma, span, &start)?);
             let back = turned(&run(-gamma, span, &end)?);
-            let growth = growth(&end, span / PIECE, |x| run(-gamma, PIECE, x))?;
+            let growth = growth(&end, span / PIECE_TIME, |x| run(-gamma, PIECE_TIME, x))?;
             let defect = distance(&back, &start, 1.0);
             worst = max_or_nan(worst, defect / (growth * f64::EPSILON * (steps_of(span) as f64).sqrt()));
             largest_growth = max_or_nan(largest_growth, growth);
@@ -132,10 +132,10 @@ fn growth(
     for k in 0..4 {
         let (mut growth, mut direction) = (1.0, SVector::<f64, 4>::ith(k, 1.0));
         for ends in states.windows(2) {
-            let x = entries(&ends[0]) + direction * APART;
+            let x = entries(&ends[0]) + direction * INITIAL_DISTANCE;
             let beside = run(&PhasePoint::new([x[0], x[1]], [x[2], x[3]], ends[0].z))?;
             let apart = entries(&beside) - entries(&ends[1]);
-            growth *= apart.norm() / APART;
+            growth *= apart.norm() / INITIAL_DISTANCE;
             direction = apart.normalize();
         }
         largest = max_or_nan(largest, growth);

@@ -2,7 +2,7 @@
 //! the motion.
 
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
-use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
+use crate::motion::{FAMILIES, ORDER_ONE, Problem, RunEnd, Verdict, distance};
 use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
@@ -25,24 +25,24 @@ const MASSES: [f64; 7] = [1e-14, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e14];
 const STEPS: usize = 4;
 
 /// The number of runs of each outcome.
-pub type Tally = BTreeMap<Worth, usize>;
+pub type Tally = BTreeMap<Verdict, usize>;
 
 /// The number of outcomes that must never occur.
 pub fn bad<'a>(tallies: impl IntoIterator<Item = &'a Tally>) -> f64 {
-    tallies.into_iter().flatten().filter(|(worth, _)| worth.is_bad()).map(|(_, count)| *count as f64).sum()
+    tallies.into_iter().flatten().filter(|(verdict, _)| verdict.is_failure()).map(|(_, count)| *count as f64).sum()
 }
 
 /// A table row of a tally: the counts of right, coarse, flagged, stopped, refused and bad runs.
 pub fn row(name: String, tally: &Tally) -> Vec<String> {
-    let count = |worths: &[Worth]| worths.iter().filter_map(|w| tally.get(w)).sum::<usize>().to_string();
+    let count = |worths: &[Verdict]| worths.iter().filter_map(|w| tally.get(w)).sum::<usize>().to_string();
     vec![
         name,
-        count(&[Worth::Right]),
-        count(&[Worth::Coarse]),
-        count(&[Worth::Marked]),
-        count(&[Worth::Halted]),
-        count(&[Worth::Refused]),
-        count(&[Worth::Wrong, Worth::NotANumber, Worth::Panicked]),
+        count(&[Verdict::Right]),
+        count(&[Verdict::Coarse]),
+        count(&[Verdict::Unresolved]),
+        count(&[Verdict::Failed]),
+        count(&[Verdict::Refused]),
+        count(&[Verdict::Wrong, Verdict::NonFinite, Verdict::Panicked]),
     ]
 }
 
@@ -79,22 +79,22 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let problem = Problem { system, t0: 0.0, start, span: STEPS as f64 };
         let exact = in_velocities(&truth(gamma, k, STEPS as f64, &start), w);
         let end = match problem.by(integrator, STEPS) {
-            End::Whole(x) => End::Whole(in_velocities(&x, w)),
-            End::Marked(x) => End::Marked(in_velocities(&x, w)),
+            RunEnd::Completed(x) => RunEnd::Completed(in_velocities(&x, w)),
+            RunEnd::Unresolved(x) => RunEnd::Unresolved(in_velocities(&x, w)),
             other => other,
         };
         // The error of a decayed motion is relative to the initial state, since both solutions tend to zero.
         let scale = (start.q[0] * w).hypot(start.v[0]);
-        (end.worth(&exact, scale, ORDER_ONE), end.error(&exact, scale))
+        (end.verdict(&exact, scale, ORDER_ONE), end.error(&exact, scale))
     });
 
     let mut tallies: BTreeMap<(usize, bool), Tally> = BTreeMap::new();
     let mut rows = Vec::new();
-    for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
+    for ((integrator, claims, gamma, k), (verdict, error)) in cases.iter().zip(&found) {
         let place = FAMILIES.iter().position(|i| i == integrator).unwrap_or(0);
-        *tallies.entry((place, *claims)).or_default().entry(*worth).or_default() += 1;
+        *tallies.entry((place, *claims)).or_default().entry(*verdict).or_default() += 1;
         let names = [integrator.to_string(), claims.to_string(), "1".into()];
-        let numbers = [number(*gamma), number(*k), worth.name().into(), number(*error)];
+        let numbers = [number(*gamma), number(*k), verdict.name().into(), number(*error)];
         rows.push(names.into_iter().chain(numbers).collect());
     }
     let name = |(place, claims): &(usize, bool)| {
@@ -112,10 +112,10 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     )?;
     // The rate of the splitting is exact, so that a motion with drag and a very weak spring has a negligible error.
     let mut worst = 0.0;
-    for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
+    for ((integrator, claims, gamma, k), (verdict, error)) in cases.iter().zip(&found) {
         let exact = *integrator == AnyIntegrator::Splitting(SplittingScheme::STRANG);
         if exact && *claims && *k <= 1e-9 && *gamma <= 0.0 {
-            worst = max_or_nan(worst, if *worth == Worth::Right { *error } else { f64::NAN });
+            worst = max_or_nan(worst, if *verdict == Verdict::Right { *error } else { f64::NAN });
         }
     }
     report.at_most("strang at k h^2 <= 1e-9, any damping: error (its rate is exact)", worst, 1e-8)?;
@@ -139,22 +139,22 @@ fn masses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             let end = problem.by(integrator, 32);
             // Only positions are compared: momenta differ in size by the mass ratio.
             let positions = |x: &PhasePoint<2>| PhasePoint { p: x.p * 0.0, ..*x };
-            let worth = match &end {
-                End::Whole(x) if distance(&positions(x), &positions(&exact), 0.0) <= ORDER_ONE => Worth::Right,
-                End::Whole(x) if distance(&positions(x), &positions(&exact), 0.0).is_nan() => Worth::NotANumber,
-                other => other.worth(&exact, 0.0, ORDER_ONE),
+            let verdict = match &end {
+                RunEnd::Completed(x) if distance(&positions(x), &positions(&exact), 0.0) <= ORDER_ONE => Verdict::Right,
+                RunEnd::Completed(x) if distance(&positions(x), &positions(&exact), 0.0).is_nan() => Verdict::NonFinite,
+                other => other.verdict(&exact, 0.0, ORDER_ONE),
             };
             let error = match &end {
-                End::Whole(x) | End::Marked(x) => distance(&positions(x), &positions(&exact), 0.0),
+                RunEnd::Completed(x) | RunEnd::Unresolved(x) => distance(&positions(x), &positions(&exact), 0.0),
                 _ => f64::NAN,
             };
             if integrator.order() >= 16 {
                 worst = max_or_nan(worst, error);
             }
-            *tally.entry(worth).or_default() += 1;
+            *tally.entry(verdict).or_default() += 1;
             let names = [integrator.to_string(), "true".into(), number(ratio)];
             rows.push(
-                names.into_iter().chain(["-0.0125".into(), "-".into(), worth.name().into(), number(error)]).collect(),
+                names.into_iter().chain(["-0.0125".into(), "-".into(), verdict.name().into(), number(error)]).collect(),
             );
         }
     }

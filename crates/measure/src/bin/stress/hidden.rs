@@ -3,7 +3,7 @@
 
 use crate::damping::{COLUMNS, Tally, bad, row};
 use crate::formula::{Feature, Force, Formula, Rate, Smooth};
-use crate::motion::{End, FAMILIES, Problem, Worth, distance, dop853_in};
+use crate::motion::{FAMILIES, Problem, RunEnd, Verdict, distance, dop853_in};
 use crate::parallel::parallel;
 use crate::random::Random;
 use crate::report::Report;
@@ -17,11 +17,11 @@ const KINDS: [&str; 9] =
 
 /// The requested accuracy, and the error that the exact flow may have.
 const ACCURACY: f64 = 1e-6;
-const EXACT: f64 = 1e-9;
+const MAX_EXACT_ERROR: f64 = 1e-9;
 
 /// The fraction of the span above which, by the documentation, no feature is missed: a motion is sampled at about a
 /// thousand points.
-const SEEN: f64 = 1e-3;
+const DETECTED_WIDTH: f64 = 1e-3;
 
 /// A problem with its exact final state.
 struct Hidden {
@@ -96,7 +96,7 @@ impl Hidden {
     /// Whether the feature is narrower than the documentation promises to detect; only the first four kinds have this
     /// width.
     fn is_narrow(&self) -> bool {
-        self.kind < 4 && self.width < SEEN * self.problem.span
+        self.kind < 4 && self.width < DETECTED_WIDTH * self.problem.span
     }
 }
 
@@ -132,21 +132,21 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let truth = hidden.truth?;
         let to = hidden.problem.to(ACCURACY);
         let exact = hidden.problem.exact();
-        let exact = exact.map_or(End::Panicked, End::Whole);
+        let exact = exact.map_or(RunEnd::Panicked, RunEnd::Completed);
         let exact_worth = match &exact {
-            End::Panicked => Worth::Refused,
-            end => end.worth(&truth, 0.0, EXACT),
+            RunEnd::Panicked => Verdict::Refused,
+            end => end.verdict(&truth, 0.0, MAX_EXACT_ERROR),
         };
-        let of_run = (to.worth(&truth, 0.0, 10.0 * ACCURACY), to.error(&truth, 0.0));
+        let of_run = (to.verdict(&truth, 0.0, 10.0 * ACCURACY), to.error(&truth, 0.0));
         Some((hidden, of_run, (exact_worth, exact.error(&truth, 0.0))))
     });
     let mut rows = Vec::new();
     let mut tallies: BTreeMap<(&str, bool, usize), Tally> = BTreeMap::new();
     for (hidden, of_run, of_flow) in found.iter().flatten() {
         let Hidden { kind, width, .. } = hidden;
-        for (by, (worth, error)) in [("to 1e-6", of_run), ("exact flow", of_flow)] {
-            *tallies.entry((by, hidden.is_narrow(), *kind)).or_default().entry(*worth).or_default() += 1;
-            rows.push(vec![KINDS[*kind].into(), by.into(), number(*width), worth.name().into(), number(*error)]);
+        for (by, (verdict, error)) in [("to 1e-6", of_run), ("exact flow", of_flow)] {
+            *tallies.entry((by, hidden.is_narrow(), *kind)).or_default().entry(*verdict).or_default() += 1;
+            rows.push(vec![KINDS[*kind].into(), by.into(), number(*width), verdict.name().into(), number(*error)]);
         }
     }
     let unknown = found.iter().filter(|f| f.is_none()).count();
@@ -213,16 +213,16 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
             // An integrator that does not use the claim is as accurate as without it.
             let end = problem.by(integrator, 400);
             let bound = match honest.by(integrator, 400) {
-                End::Whole(x) => (2.0 * distance(&x, &truth, 0.0)).max(1e-3),
+                RunEnd::Completed(x) => (2.0 * distance(&x, &truth, 0.0)).max(1e-3),
                 _ => 1e-3,
             };
-            let worth = end.worth(&truth, 0.0, bound);
-            *tally.entry(worth).or_default() += 1;
+            let verdict = end.verdict(&truth, 0.0, bound);
+            *tally.entry(verdict).or_default() += 1;
             rows.push(vec![
                 name.into(),
                 integrator.to_string(),
                 "-".into(),
-                worth.name().into(),
+                verdict.name().into(),
                 number(end.error(&truth, 0.0)),
             ]);
         }
@@ -236,14 +236,14 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
         let system = Formula { feature: Feature::Domain, rate: Rate::Constant(-0.1), ..Formula::<1>::FREE };
         let problem = Problem { system, t0: 0.0, start: VelocityPoint::new([q], [0.0], 0.0), span: 1.0 };
         for integrator in FAMILIES {
-            let is_refused = matches!(problem.by(integrator, 1000), End::Refused(_));
+            let is_refused = matches!(problem.by(integrator, 1000), RunEnd::Refused(_));
             refused += u32::from(is_refused);
-            let worth = if is_refused { "refused" } else { "right" };
+            let verdict = if is_refused { "refused" } else { "right" };
             rows.push(vec![
                 "true claims".into(),
                 integrator.to_string(),
                 q.to_string(),
-                worth.into(),
+                verdict.into(),
                 number(f64::NAN),
             ]);
         }

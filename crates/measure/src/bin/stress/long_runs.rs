@@ -18,7 +18,7 @@ use std::time::Instant;
 const H: f64 = 0.125;
 
 /// The drag of the damped oscillator, and the frequency of the drive: powers of two, so that phases are exact.
-const WEAK: f64 = -1.0 / (1u64 << 26) as f64;
+const WEAK_DRAG: f64 = -1.0 / (1u64 << 26) as f64;
 const DRIVE: f64 = 0.5;
 
 /// The drag of the driven oscillator.
@@ -42,7 +42,7 @@ struct Long {
 /// The weakly damped oscillator from `(1, 0)`. The angle `sqrt(1 - g^2/4) t` is the difference of t and a small angle,
 /// each of which is exact.
 fn damped(t: f64) -> PhasePoint<1> {
-    let half = 0.5 * WEAK;
+    let half = 0.5 * WEAK_DRAG;
     let slow = 0.5 * half * half * t;
     let (sin, cos) = t.sin_cos();
     let (small_sin, small_cos) = slow.sin_cos();
@@ -66,7 +66,7 @@ fn long_runs() -> [Long; 3] {
     [
         Long {
             name: "damped",
-            system: Formula::oscillator(WEAK),
+            system: Formula::oscillator(WEAK_DRAG),
             integrator: AnyIntegrator::Gauss { stages: 8 },
             steps: 1_000_000_000,
             truth: damped,

@@ -91,13 +91,14 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A panic that a case provokes is part of its result; one line on stderr suffices.
     let above = bar.clone();
     std::panic::set_hook(Box::new(move |panic| above.suspend(|| eprintln!("note: {panic}"))));
-    let mut report = Report::new(out, arguments.quick, bar);
+    let mut report = Report::new(out, bar);
+    report.quick = arguments.quick;
     for (name, title, case) in CASES {
-        if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
-            let clock = Instant::now();
+        if arguments.case.iter().any(|requested| requested == "all" || requested == name) {
+            let start = Instant::now();
             report.begin(name, title)?;
             case(&mut report)?;
-            report.say(&format!("  {:.1} s\n", clock.elapsed().as_secs_f64()))?;
+            report.say(&format!("  {:.1} s\n", start.elapsed().as_secs_f64()))?;
         }
     }
     report.bar.finish_and_clear();

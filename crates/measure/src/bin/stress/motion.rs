@@ -28,13 +28,13 @@ pub type Motion<'a, const N: usize> = discrete_herglotz::Problem<'a, Formula<N>,
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum End<const N: usize> {
+pub enum RunEnd<const N: usize> {
     /// At the end of the span, without any report of a failure.
-    Whole(PhasePoint<N>),
+    Completed(PhasePoint<N>),
     /// At the end of the span, with a step that is flagged as unresolved.
-    Marked(PhasePoint<N>),
+    Unresolved(PhasePoint<N>),
     /// Before the end of the span, by a failed step.
-    Halted(StepError),
+    Failed(StepError),
     /// Not started: the input was refused.
     Refused(InputError),
     /// It panicked.
@@ -43,62 +43,64 @@ pub enum End<const N: usize> {
 
 /// The classification of an outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Worth {
+pub enum Verdict {
     /// Within the bound.
     Right,
     /// Above the bound although each step resolves the motion: the accumulated error of a method of low order, for
     /// which the choice of the step is responsible.
     Coarse,
     /// Flagged as unresolved. This outcome and the two below are reported failures, whatever the error.
-    Marked,
-    Halted,
+    Unresolved,
+    Failed,
     Refused,
     /// Above the bound without any report, which must not happen.
     Wrong,
     /// A result that contains a NaN or an infinity.
-    NotANumber,
+    NonFinite,
     Panicked,
 }
 
-impl Worth {
+impl Verdict {
     /// Whether the outcome must never occur.
-    pub fn is_bad(self) -> bool {
-        matches!(self, Worth::Wrong | Worth::NotANumber | Worth::Panicked)
+    pub fn is_failure(self) -> bool {
+        matches!(self, Verdict::Wrong | Verdict::NonFinite | Verdict::Panicked)
     }
 
     pub fn name(self) -> &'static str {
         match self {
-            Worth::Right => "right",
-            Worth::Coarse => "coarse",
-            Worth::Marked => "marked",
-            Worth::Halted => "halted",
-            Worth::Refused => "refused",
-            Worth::Wrong => "wrong",
-            Worth::NotANumber => "not_a_number",
-            Worth::Panicked => "panicked",
+            Verdict::Right => "right",
+            Verdict::Coarse => "coarse",
+            Verdict::Unresolved => "marked",
+            Verdict::Failed => "halted",
+            Verdict::Refused => "refused",
+            Verdict::Wrong => "wrong",
+            Verdict::NonFinite => "not_a_number",
+            Verdict::Panicked => "panicked",
         }
     }
 }
 
-impl<const N: usize> End<N> {
+impl<const N: usize> RunEnd<N> {
     /// The error of the final state against the reference, by [`distance`].
     pub fn error(&self, truth: &PhasePoint<N>, scale: f64) -> f64 {
         match self {
-            End::Whole(state) | End::Marked(state) => distance(state, truth, scale),
+            RunEnd::Completed(state) | RunEnd::Unresolved(state) => distance(state, truth, scale),
             _ => f64::NAN,
         }
     }
 
     /// The classification of the outcome for a bound on the error.
-    pub fn worth(&self, truth: &PhasePoint<N>, scale: f64, bound: f64) -> Worth {
+    pub fn verdict(&self, truth: &PhasePoint<N>, scale: f64, bound: f64) -> Verdict {
         match self {
-            End::Whole(state) | End::Marked(state) if !ChartVector::from(*state).is_finite() => Worth::NotANumber,
-            End::Whole(state) if distance(state, truth, scale) <= bound => Worth::Right,
-            End::Whole(_) => Worth::Wrong,
-            End::Marked(_) => Worth::Marked,
-            End::Halted(_) => Worth::Halted,
-            End::Refused(_) => Worth::Refused,
-            End::Panicked => Worth::Panicked,
+            RunEnd::Completed(state) | RunEnd::Unresolved(state) if !ChartVector::from(*state).is_finite() => {
+                Verdict::NonFinite
+            }
+            RunEnd::Completed(state) if distance(state, truth, scale) <= bound => Verdict::Right,
+            RunEnd::Completed(_) => Verdict::Wrong,
+            RunEnd::Unresolved(_) => Verdict::Unresolved,
+            RunEnd::Failed(_) => Verdict::Failed,
+            RunEnd::Refused(_) => Verdict::Refused,
+            RunEnd::Panicked => Verdict::Panicked,
         }
     }
 }
@@ -145,18 +147,24 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The outcome of a run with a number of steps of one integrator.
-    pub fn by(&self, integrator: AnyIntegrator, count: usize) -> End<N> {
+    pub fn by(&self, integrator: AnyIntegrator, count: usize) -> RunEnd<N> {
         self.run(|motion| motion.by(integrator).steps(Steps::Count(count)))
     }
 
     /// The classification of a run with fixed steps, and its error. An error of order one without a report is coarse if
     /// every step has a smaller local error, and wrong otherwise.
-    pub fn worth(&self, integrator: AnyIntegrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
+    pub fn verdict(
+        &self,
+        integrator: AnyIntegrator,
+        count: usize,
+        truth: &PhasePoint<N>,
+        scale: f64,
+    ) -> (Verdict, f64) {
         let end = self.by(integrator, count);
-        let (worth, error) = (end.worth(truth, scale, ORDER_ONE), end.error(truth, scale));
+        let (verdict, error) = (end.verdict(truth, scale, ORDER_ONE), end.error(truth, scale));
         let coarse =
-            worth == Worth::Wrong && self.local_error(integrator, count, scale).is_some_and(|e| e <= ORDER_ONE);
-        (if coarse { Worth::Coarse } else { worth }, error)
+            verdict == Verdict::Wrong && self.local_error(integrator, count, scale).is_some_and(|e| e <= ORDER_ONE);
+        (if coarse { Verdict::Coarse } else { verdict }, error)
     }
 
     /// The largest local error of a run, where each step is compared with the exact motion from its own start; `None`
@@ -180,15 +188,15 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The outcome of a run to an accuracy, with the integrator that a run takes by default.
-    pub fn to(&self, accuracy: f64) -> End<N> {
+    pub fn to(&self, accuracy: f64) -> RunEnd<N> {
         self.run(|motion| motion.accuracy(accuracy))
     }
 
     /// The outcome of a run.
-    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> End<N> {
+    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> RunEnd<N> {
         match caught(|| run_of(&self.motion()?).run(self.end())) {
-            None => End::Panicked,
-            Some(Err(refused)) => End::Refused(refused),
+            None => RunEnd::Panicked,
+            Some(Err(refused)) => RunEnd::Refused(refused),
             Some(Ok(outcome)) => end_of_outcome(&outcome),
         }
     }
@@ -212,13 +220,13 @@ impl<const N: usize> Problem<N> {
 }
 
 /// Converts an outcome of the library.
-pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
+pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> RunEnd<N> {
     let state = outcome.state();
     match outcome.status {
-        Status::Completed if outcome.unresolved.is_some() => End::Marked(state),
-        Status::Completed => End::Whole(state),
-        Status::Failed { cause, .. } => End::Halted(cause),
-        _ => End::Marked(state),
+        Status::Completed if outcome.unresolved.is_some() => RunEnd::Unresolved(state),
+        Status::Completed => RunEnd::Completed(state),
+        Status::Failed { cause, .. } => RunEnd::Failed(cause),
+        _ => RunEnd::Unresolved(state),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::damping::{Tally, bad};
 use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
-use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
+use crate::motion::{FAMILIES, ORDER_ONE, Problem, RunEnd, Verdict, distance};
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
@@ -47,9 +47,9 @@ struct Table {
 }
 
 impl Table {
-    fn add(&mut self, what: &str, by: impl ToString, parameter: f64, worth: Worth, error: f64) {
-        *self.tally.entry(worth).or_default() += 1;
-        self.rows.push(vec![what.into(), by.to_string(), number(parameter), worth.name().into(), number(error)]);
+    fn add(&mut self, what: &str, by: impl ToString, parameter: f64, verdict: Verdict, error: f64) {
+        *self.tally.entry(verdict).or_default() += 1;
+        self.rows.push(vec![what.into(), by.to_string(), number(parameter), verdict.name().into(), number(error)]);
     }
 }
 
@@ -82,19 +82,20 @@ fn mass_condition(report: &mut Report, table: &mut Table) -> Result<Points, Fail
         let only_q = |x: &PhasePoint<2>| PhasePoint { p: x.p * 0.0, ..*x };
         for integrator in FAMILIES {
             let end = match problem.by(integrator, 64) {
-                End::Whole(x) => End::Whole(only_q(&x)),
-                End::Marked(x) => End::Marked(only_q(&x)),
+                RunEnd::Completed(x) => RunEnd::Completed(only_q(&x)),
+                RunEnd::Unresolved(x) => RunEnd::Unresolved(only_q(&x)),
                 other => other,
             };
-            let (worth, error) = (end.worth(&exact, 0.0, ORDER_ONE), end.error(&exact, 0.0));
-            table.add("mass_condition", integrator, condition, worth, error);
+            let (verdict, error) = (end.verdict(&exact, 0.0, ORDER_ONE), end.error(&exact, 0.0));
+            table.add("mass_condition", integrator, condition, verdict, error);
             if condition <= 1e10 {
-                refused += u32::from(matches!(worth, Worth::Refused | Worth::Halted | Worth::Marked));
+                refused += u32::from(matches!(verdict, Verdict::Refused | Verdict::Failed | Verdict::Unresolved));
                 if integrator.order() >= 16 {
                     worst = max_or_nan(worst, error / condition);
                 }
             }
-            if integrator == (AnyIntegrator::Gauss { stages: 16 }) && matches!(worth, Worth::Right | Worth::Wrong) {
+            if integrator == (AnyIntegrator::Gauss { stages: 16 }) && matches!(verdict, Verdict::Right | Verdict::Wrong)
+            {
                 points.push((condition, error));
             }
         }
@@ -114,26 +115,26 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
         let problem = Problem { system, t0: 0.0, start, span: TAU };
         let exact = problem.state();
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [32, 1024].map(|n| (i, n))) {
-            let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
-            table.add("orbit", integrator, e, worth, error);
+            let (verdict, error) = problem.verdict(integrator, count, &exact, 0.0);
+            table.add("orbit", integrator, e, verdict, error);
         }
         let end = problem.to(1e-6);
-        let worth = end.worth(&exact, 0.0, 1e-5);
-        kept += u32::from(worth.is_bad());
+        let verdict = end.verdict(&exact, 0.0, 1e-5);
+        kept += u32::from(verdict.is_failure());
         table.rows.push(vec![
             "orbit".into(),
             "accuracy".into(),
             number(e),
-            worth.name().into(),
+            verdict.name().into(),
             number(end.error(&exact, 0.0)),
         ]);
 
         let gauss = Gauss::new(&system, 8, 0.1)?;
         let clock = Radial { exponent: 1.5 };
         let mut stepper = gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
-        let end = if stepper.advance_to(TAU).is_ok() { End::Whole(stepper.state()) } else { End::Panicked };
+        let end = if stepper.advance_to(TAU).is_ok() { RunEnd::Completed(stepper.state()) } else { RunEnd::Panicked };
         let error = end.error(&exact, 0.0);
-        table.add("orbit", "transformed_gauss_8", e, end.worth(&exact, 0.0, ORDER_ONE), error);
+        table.add("orbit", "transformed_gauss_8", e, end.verdict(&exact, 0.0, ORDER_ONE), error);
         points.push((1.0 / (1.0 - e), error));
         worst = max_or_nan(worst, error * (1.0 - e));
     }
@@ -156,9 +157,9 @@ fn fall(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let exact = PhasePoint::new([1e9, 1e9], [1e9, 1e9], 0.0);
     for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [3, 16, 100, 1000].map(|n| (i, n))) {
         let end = problem.by(integrator, count);
-        table.add("fall", integrator, count as f64, end.worth(&exact, 0.0, ORDER_ONE), f64::NAN);
+        table.add("fall", integrator, count as f64, end.verdict(&exact, 0.0, ORDER_ONE), f64::NAN);
     }
-    let through = u32::from(problem.exact().is_ok()) + u32::from(matches!(problem.to(1e-6), End::Whole(_)));
+    let through = u32::from(problem.exact().is_ok()) + u32::from(matches!(problem.to(1e-6), RunEnd::Completed(_)));
     report.at_most("a fall into the centre by the exact flow and to an accuracy: that go on", f64::from(through), 0.0)
 }
 
@@ -180,20 +181,20 @@ fn poles(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             let found = [sin * x.q[1].cos(), sin * x.q[1].sin(), cos];
             (0..3).map(|i| (found[i] - place[i]).powi(2)).sum::<f64>().sqrt()
         };
-        let worth = |end: &End<2>, bound: f64| match end {
-            End::Whole(x) if misses(x) <= bound => (Worth::Right, misses(x)),
-            End::Whole(x) if misses(x).is_nan() => (Worth::NotANumber, f64::NAN),
-            End::Whole(x) => (Worth::Wrong, misses(x)),
-            other => (other.worth(&problem.state(), 0.0, bound), f64::NAN),
+        let verdict = |end: &RunEnd<2>, bound: f64| match end {
+            RunEnd::Completed(x) if misses(x) <= bound => (Verdict::Right, misses(x)),
+            RunEnd::Completed(x) if misses(x).is_nan() => (Verdict::NonFinite, f64::NAN),
+            RunEnd::Completed(x) => (Verdict::Wrong, misses(x)),
+            other => (other.verdict(&problem.state(), 0.0, bound), f64::NAN),
         };
         let applies = |i: &AnyIntegrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [20, 400].map(|n| (i, n))) {
-            let (worth, error) = worth(&problem.by(integrator, count), ORDER_ONE);
-            table.add("pole", integrator, sideways, worth, error);
+            let (verdict, error) = verdict(&problem.by(integrator, count), ORDER_ONE);
+            table.add("pole", integrator, sideways, verdict, error);
         }
-        let (worth, error) = worth(&problem.to(1e-6), 1e-5);
-        kept += u32::from(worth.is_bad());
-        table.rows.push(vec!["pole".into(), "accuracy".into(), number(sideways), worth.name().into(), number(error)]);
+        let (verdict, error) = verdict(&problem.to(1e-6), 1e-5);
+        kept += u32::from(verdict.is_failure());
+        table.rows.push(vec!["pole".into(), "accuracy".into(), number(sideways), verdict.name().into(), number(error)]);
     }
     report.at_most("past a pole, to 1e-6: above 1e-5", f64::from(kept), 0.0)
 }
@@ -209,8 +210,8 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let exact = problem.exact_in(64)?;
         let applies = |i: &AnyIntegrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [8, 64, 512].map(|n| (i, n))) {
-            let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
-            table.add("light", integrator, size, worth, error);
+            let (verdict, error) = problem.verdict(integrator, count, &exact, 0.0);
+            table.add("light", integrator, size, verdict, error);
         }
         // The exact flow in one call.
         worst = max_or_nan(worst, problem.exact().map_or(f64::NAN, |x| distance(&x, &exact, 0.0)));
@@ -234,9 +235,9 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let problem = Problem { system, t0: 0.0, start, span: 3.0 };
         let exact = LaneEmden { n: 1 }.solution(3.0).map(|x| PhasePoint { q: x.q, p: x.v, z: x.z });
         let exact = exact.unwrap_or(problem.state());
-        let (worth, error) = problem.worth(integrator, 30, &exact, 0.0);
-        table.add("time_zero", integrator, 0.0, worth, error);
-        begun += u32::from(worth.is_bad());
+        let (verdict, error) = problem.verdict(integrator, 30, &exact, 0.0);
+        table.add("time_zero", integrator, 0.0, verdict, error);
+        begun += u32::from(verdict.is_failure());
         for t0 in [1e-6, 1e-3, 0.01, 0.1] {
             let Some((from, to)) = LaneEmden { n: 1 }.solution(t0).zip(LaneEmden { n: 1 }.solution(t0 + 3.0)) else {
                 continue;
@@ -244,8 +245,8 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             let problem = Problem { system, t0, start: from, span: 3.0 };
             let exact = PhasePoint { q: to.q, p: to.v, z: to.z };
             for count in [10, 300] {
-                let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
-                table.add("time_zero", integrator, t0, worth, error);
+                let (verdict, error) = problem.verdict(integrator, count, &exact, 0.0);
+                table.add("time_zero", integrator, t0, verdict, error);
             }
         }
     }
@@ -263,11 +264,12 @@ fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure
             let problem = Problem { system: Formula::oscillator(gamma), t0: 0.0, start, span: 4.0 };
             let exact = HarmonicOscillator { gamma }.solution(4.0, &start);
             let exact = PhasePoint { q: exact.q, p: exact.v, z: exact.z };
-            let (worth, error) = problem.worth(integrator, 4, &exact, 1.0);
+            let (verdict, error) = problem.verdict(integrator, 4, &exact, 1.0);
             let explicit = !method.implicit_in_z();
-            beyond +=
-                u32::from(explicit && left <= 0.0 && matches!(worth, Worth::Right | Worth::Coarse | Worth::Wrong));
-            table.add("sigma", integrator, left, worth, error);
+            beyond += u32::from(
+                explicit && left <= 0.0 && matches!(verdict, Verdict::Right | Verdict::Coarse | Verdict::Wrong),
+            );
+            table.add("sigma", integrator, left, verdict, error);
         }
     }
     report.at_most("rules explicit in z with sigma_d <= 0: that go on", f64::from(beyond), 0.0)
@@ -286,23 +288,23 @@ fn conjugate_points(report: &mut Report, table: &mut Table) -> Result<(), Failur
         let found = exponential.retract_near(0.0, &DiscretePoint { q0: x.q, q1: end.q, z0: 0.0 }, &x.v);
         // Rounding errors of two positions and of the angle, amplified by 1/sin h.
         let condition = (2.0 + 2.0 * h) / (h.sin().abs());
-        let (worth, error) = match found {
+        let (verdict, error) = match found {
             Ok(found) => {
                 let error = (found.start.v[0] - 1.7).abs();
                 let right = error <= 8.0 * f64::EPSILON * condition;
-                (if right { Worth::Right } else { Worth::Wrong }, error)
+                (if right { Verdict::Right } else { Verdict::Wrong }, error)
             }
-            Err(_) => (Worth::Refused, f64::NAN),
+            Err(_) => (Verdict::Refused, f64::NAN),
         };
-        silent += u32::from(worth == Worth::Wrong);
-        if worth == Worth::Right {
+        silent += u32::from(verdict == Verdict::Wrong);
+        if verdict == Verdict::Right {
             worst = max_or_nan(worst, error / condition / f64::EPSILON);
         }
         table.rows.push(vec![
             "conjugate".into(),
             "exact".into(),
             number(turns * off),
-            worth.name().into(),
+            verdict.name().into(),
             number(error),
         ]);
     }

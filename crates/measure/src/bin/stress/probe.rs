@@ -14,19 +14,19 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// Normally, with this output.
-    Said(String),
+    Answered(String),
     /// By a panic or a signal.
     Crashed,
     /// The call did not end within the time limit.
-    Never,
+    TimedOut,
 }
 
 impl Ended {
     pub fn text(&self) -> &str {
         match self {
-            Ended::Said(text) => text,
+            Ended::Answered(text) => text,
             Ended::Crashed => "crashed",
-            Ended::Never => "did not end",
+            Ended::TimedOut => "did not end",
         }
     }
 }
@@ -59,7 +59,7 @@ pub fn answer(name: &str) -> Option<String> {
 }
 
 /// Makes a call in a process of its own.
-pub fn ask(name: &str, patience: Duration) -> std::io::Result<Ended> {
+pub fn ask(name: &str, time_limit: Duration) -> std::io::Result<Ended> {
     let mut child = Command::new(std::env::current_exe()?)
         .args(["--probe", name])
         .stdin(Stdio::null())
@@ -73,12 +73,12 @@ pub fn ask(name: &str, patience: Duration) -> std::io::Result<Ended> {
             if let Some(mut out) = child.stdout.take() {
                 out.read_to_string(&mut text)?;
             }
-            return Ok(if status.success() { Ended::Said(text.trim().into()) } else { Ended::Crashed });
+            return Ok(if status.success() { Ended::Answered(text.trim().into()) } else { Ended::Crashed });
         }
-        if clock.elapsed() > patience {
+        if clock.elapsed() > time_limit {
             child.kill()?;
             child.wait()?;
-            return Ok(Ended::Never);
+            return Ok(Ended::TimedOut);
         }
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -110,7 +110,7 @@ fn run<const N: usize>(
     })
 }
 
-fn said(result: Result<String, InputError>) -> String {
+fn described(result: Result<String, InputError>) -> String {
     result.unwrap_or_else(|refused| format!("refused: {refused}"))
 }
 
@@ -120,7 +120,7 @@ fn oscillator() -> Problem<1> {
 }
 
 fn steps(steps: Steps, stride: Option<usize>) -> String {
-    said(run(&oscillator(), Some(steps), Some(AnyIntegrator::Discrete(Method::Midpoint)), stride))
+    described(run(&oscillator(), Some(steps), Some(AnyIntegrator::Discrete(Method::Midpoint)), stride))
 }
 
 fn nan_spring() -> Formula<1> {
@@ -128,7 +128,7 @@ fn nan_spring() -> Formula<1> {
 }
 
 fn to(system: Formula<1>, span: f64) -> String {
-    said(run(&Problem { system, span, ..oscillator() }, None, None, None))
+    described(run(&Problem { system, span, ..oscillator() }, None, None, None))
 }
 
 /// `L = v q - q^2/2 - 0.1 z`.
@@ -136,12 +136,12 @@ fn singular(integrator: AnyIntegrator) -> String {
     let smooth = Smooth { spring: 1.0, ..Smooth::default() };
     let system = Formula { kinetic: Kinetic::Singular, smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
     let start = VelocityPoint::new([1.0], [0.5], 0.0);
-    said(run(&Problem { system, start, span: 10.0, t0: 0.0 }, Some(Steps::Count(100)), Some(integrator), None))
+    described(run(&Problem { system, start, span: 10.0, t0: 0.0 }, Some(Steps::Count(100)), Some(integrator), None))
 }
 
 fn late() -> String {
     let problem = Problem { t0: f64::INFINITY, ..oscillator() };
-    said(run(&problem, Some(Steps::Count(10)), Some(AnyIntegrator::Gauss { stages: 8 }), None))
+    described(run(&problem, Some(Steps::Count(10)), Some(AnyIntegrator::Gauss { stages: 8 }), None))
 }
 
 fn relativistic() -> String {
@@ -151,8 +151,8 @@ fn relativistic() -> String {
     let problem = Problem { system, start, t0: 0.0, span: 40.0 };
     let Ok(truth) = problem.exact_in(64) else { return "no truth".into() };
     match problem.to(1e-9) {
-        crate::motion::End::Refused(cause) => format!("refused: {cause}"),
-        crate::motion::End::Halted(cause) => format!("halted: {cause}"),
+        crate::motion::RunEnd::Refused(cause) => format!("refused: {cause}"),
+        crate::motion::RunEnd::Failed(cause) => format!("halted: {cause}"),
         end if end.error(&truth, 0.0) <= 1e-8 => "right".into(),
         end => format!("wrong by {:e}", end.error(&truth, 0.0)),
     }
@@ -168,10 +168,10 @@ fn standing_clock() -> String {
         let mut run = gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
         Ok(match run.advance_to(1.0) {
             Ok(()) => format!("completed q = {:e}", Stepper::state(&run).q[0]),
-            Err(halt) => format!("halted: {}", halt.cause),
+            Err(failure) => format!("halted: {}", failure.cause),
         })
     };
-    said(ended())
+    described(ended())
 }
 
 /// Compares the end of the exact flow with a point, to a few rounding errors.
@@ -214,6 +214,6 @@ fn at_rest() -> String {
     let problem = Problem { start, span: 100.0, ..oscillator() };
     match run(&problem, None, None, None) {
         Ok(text) if text == "completed q = 0e0" => "right".into(),
-        other => said(other),
+        other => described(other),
     }
 }

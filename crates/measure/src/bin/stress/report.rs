@@ -49,8 +49,9 @@ pub fn short(x: f64) -> String {
 }
 
 impl Report {
-    pub fn new(out: Directory, quick: bool, bar: ProgressBar) -> Self {
-        Report { out, quick, bar, case: "", findings: Vec::new(), markdown: String::new() }
+    /// A report of full cases.
+    pub fn new(out: Directory, bar: ProgressBar) -> Self {
+        Report { out, quick: false, bar, case: "", findings: Vec::new(), markdown: String::new() }
     }
 
     /// Begins a case.

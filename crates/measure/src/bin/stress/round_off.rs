@@ -21,7 +21,7 @@ use contact_geom::{
 use discrete_herglotz::{AnyIntegrator, InputError, SplittingScheme, Stepper, Steps, gauss::Gauss, rules::Method};
 
 /// The number of members of an ensemble.
-const STARTS: usize = 64;
+const MEMBERS: usize = 64;
 
 /// The largest exponent that counts as that of a random walk.
 const EXPONENT: f64 = 0.6;
@@ -30,10 +30,10 @@ const EXPONENT: f64 = 0.6;
 const SIGMAS: f64 = 3.0;
 
 /// The weak drag.
-const WEAK: f64 = -1e-12;
+const WEAK_DRAG: f64 = -1e-12;
 
 /// The drag of mean zero. It is small, so that the energy varies little where it is not an invariant.
-const SWINGING: Rate = Rate::Swinging { size: 1e-6, frequency: 0.5 };
+const DRAG_OF_MEAN_ZERO: Rate = Rate::Swinging { size: 1e-6, frequency: 0.5 };
 
 #[derive(Clone, Copy, PartialEq)]
 enum Motion {
@@ -155,8 +155,8 @@ impl Ensemble {
     fn rate(&self) -> Rate {
         match self.drag {
             Drag::None => Rate::Constant(0.0),
-            Drag::Weak => Rate::Constant(WEAK),
-            Drag::Swinging => SWINGING,
+            Drag::Weak => Rate::Constant(WEAK_DRAG),
+            Drag::Swinging => DRAG_OF_MEAN_ZERO,
         }
     }
 
@@ -313,7 +313,7 @@ impl Ensemble {
 
     /// Measures the growth over an ensemble.
     fn measure(&self, first: usize, samples: &[usize]) -> Result<Growth, InputError> {
-        let mut errors = self.errors(first, STARTS, samples)?;
+        let mut errors = self.errors(first, MEMBERS, samples)?;
         if !self.has_bias {
             // The truncation error is the same for all members, and is subtracted.
             for k in 0..samples.len() {
@@ -333,7 +333,7 @@ impl Ensemble {
                 .collect();
             slope(&points)
         };
-        let parts: Vec<f64> = errors.chunks(STARTS / 8).map(fit).collect();
+        let parts: Vec<f64> = errors.chunks(MEMBERS / 8).map(fit).collect();
         let last = samples.len() - 1;
         let (drift, error) = mean(&column(&errors, last));
         Ok(Growth {

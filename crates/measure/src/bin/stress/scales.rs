@@ -2,7 +2,7 @@
 
 use crate::damping::{Tally, bad};
 use crate::formula::{Force, Formula};
-use crate::motion::{End, FAMILIES, Problem, Worth, distance, norm};
+use crate::motion::{FAMILIES, Problem, RunEnd, Verdict, distance, norm};
 use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
@@ -10,10 +10,10 @@ use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 
 /// Exponents of two, for scales from 3e-151 to 3e150; their squares, the scales of z, are still normal numbers.
-const POWERS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];
+const EXPONENTS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];
 
 /// A late initial time.
-const LATE: f64 = 1e9;
+const LATE_START: f64 = 1e9;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let mut rows = Vec::new();
@@ -25,8 +25,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.table(&["what", "integrator", "scale", "worth", "error"], rows)
 }
 
-fn row(what: &str, by: &str, scale: f64, worth: &str, error: f64) -> Vec<String> {
-    vec![what.into(), by.into(), number(scale), worth.into(), number(error)]
+fn row(what: &str, by: &str, scale: f64, verdict: &str, error: f64) -> Vec<String> {
+    vec![what.into(), by.into(), number(scale), verdict.into(), number(error)]
 }
 
 /// A linear motion from a state that is scaled by a power of two is the scaled motion, digit by digit except for the
@@ -40,14 +40,14 @@ fn states(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
     };
     let mut worst = 0.0;
     for integrator in FAMILIES {
-        let End::Whole(one) = of(1.0).by(integrator, 64) else {
+        let RunEnd::Completed(one) = of(1.0).by(integrator, 64) else {
             worst = f64::NAN;
             continue;
         };
-        for power in POWERS {
+        for power in EXPONENTS {
             let scale = 2f64.powi(power);
             let error = match of(scale).by(integrator, 64) {
-                End::Whole(x) => {
+                RunEnd::Completed(x) => {
                     let back = PhasePoint { q: x.q / scale, p: x.p / scale, z: x.z / scale / scale };
                     norm(&[back.q[0] - one.q[0], back.p[0] - one.p[0], back.z - one.z])
                 }
@@ -88,9 +88,9 @@ fn huge_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
             let problem = Problem { system, t0: 0.0, start, span: h * f64::from(steps) };
             let exact = problem.exact()?;
             for integrator in FAMILIES {
-                let (worth, error) = problem.worth(integrator, steps as usize, &exact, 1.0);
-                *tally.entry(worth).or_default() += 1;
-                rows.push(row(&format!("huge_step_{name}"), &integrator.to_string(), h, worth.name(), error));
+                let (verdict, error) = problem.verdict(integrator, steps as usize, &exact, 1.0);
+                *tally.entry(verdict).or_default() += 1;
+                rows.push(row(&format!("huge_step_{name}"), &integrator.to_string(), h, verdict.name(), error));
             }
         }
     }
@@ -104,25 +104,25 @@ fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
     let (mut moved, mut worst) = (0.0, 0.0);
     for integrator in FAMILIES {
         let early = Problem { system: Formula::pendulum(-0.1), t0: 0.0, start, span: 8.0 };
-        let error = match (early.by(integrator, 64), Problem { t0: LATE, ..early }.by(integrator, 64)) {
-            (End::Whole(a), End::Whole(b)) => distance(&b, &a, 0.0),
+        let error = match (early.by(integrator, 64), Problem { t0: LATE_START, ..early }.by(integrator, 64)) {
+            (RunEnd::Completed(a), RunEnd::Completed(b)) => distance(&b, &a, 0.0),
             _ => f64::NAN,
         };
-        rows.push(row("late_autonomous", &integrator.to_string(), LATE, "-", error));
+        rows.push(row("late_autonomous", &integrator.to_string(), LATE_START, "-", error));
         moved = max_or_nan(moved, error);
 
         let force = Force::Swinging { size: 1.0, frequency: 0.5 };
         let system = Formula { force, ..Formula::pendulum(-0.1) };
         // Integrators of low order take finer steps.
-        let problem = Problem { system, t0: LATE, start, span: 8.0 };
+        let problem = Problem { system, t0: LATE_START, start, span: 8.0 };
         let error =
             problem.by(integrator, if integrator.order() > 4 { 256 } else { 1 << 16 }).error(&problem.exact()?, 0.0);
-        rows.push(row("late_driven", &integrator.to_string(), LATE, "-", error));
+        rows.push(row("late_driven", &integrator.to_string(), LATE_START, "-", error));
         worst = max_or_nan(worst, error);
     }
     report.at_most("autonomous motions from t0 = 1e9: difference from t0 = 0", moved, 0.0)?;
     // Times, and with them the phase of the drive, are rounded to eps t0.
-    report.at_most("driven motions from t0 = 1e9: error", worst, 4.0 * f64::EPSILON * LATE)
+    report.at_most("driven motions from t0 = 1e9: error", worst, 4.0 * f64::EPSILON * LATE_START)
 }
 
 /// A requested accuracy is kept for any size of the state and any length of the span.
@@ -140,13 +140,13 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         let end = problem.to(1e-9);
         // A subnormal number has fewer digits than requested, so that a refusal is right.
         let normal = norm(&[exact.q[0], exact.p[0]]) >= f64::MIN_POSITIVE;
-        (end.worth(&exact, 0.0, 1e-8), end.error(&exact, 0.0), normal)
+        (end.verdict(&exact, 0.0, 1e-8), end.error(&exact, 0.0), normal)
     });
     let (mut tally, mut refused) = (Tally::new(), 0);
-    for ((size, span), (worth, error, normal)) in cases.iter().zip(&found) {
-        *tally.entry(*worth).or_default() += 1;
-        refused += u32::from(*normal && matches!(worth, Worth::Refused | Worth::Halted));
-        rows.push(row(&format!("accuracy_over_{span:e}"), "chosen", *size, worth.name(), *error));
+    for ((size, span), (verdict, error, normal)) in cases.iter().zip(&found) {
+        *tally.entry(*verdict).or_default() += 1;
+        refused += u32::from(*normal && matches!(verdict, Verdict::Refused | Verdict::Failed));
+        rows.push(row(&format!("accuracy_over_{span:e}"), "chosen", *size, verdict.name(), *error));
     }
     // For a state of 1e-160 the action and the energy underflow, since they are squares; (q, p) do not.
     report.at_most("an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: above 1e-8", bad([&tally]), 0.0)?;

@@ -1,7 +1,7 @@
 //! Solvers on difficult problems: the work must be bounded, and the status right.
 
 use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
-use crate::motion::{End, FAMILIES, Problem, Worth};
+use crate::motion::{FAMILIES, Problem, RunEnd, Verdict};
 use crate::parallel::parallel;
 use crate::probe::{Ended, PROBES, ask};
 use crate::random::Random;
@@ -18,7 +18,7 @@ use discrete_herglotz::{
 use std::time::{Duration, Instant};
 
 /// The bound on the time of a step whose iteration does not contract, relative to one whose iteration contracts.
-const PRICE: f64 = 30.0;
+const MAX_TIME_RATIO: f64 = 30.0;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let mut rows = Vec::new();
@@ -37,16 +37,16 @@ fn row(what: &str, by: &str, parameter: &str, ended: &str, error: f64) -> Vec<St
 /// Calls that may not return, or may crash the process.
 fn alone(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     // A call that takes ten seconds counts as one that does not end; the quick form waits for three seconds.
-    let patience = Duration::from_secs(if report.quick { 3 } else { 10 });
-    let found = parallel(&report.bar, PROBES.len(), |i| ask(PROBES[i].0, patience));
+    let time_limit = Duration::from_secs(if report.quick { 3 } else { 10 });
+    let found = parallel(&report.bar, PROBES.len(), |i| ask(PROBES[i].0, time_limit));
     let (mut crashed, mut endless, mut otherwise) = (0, 0, 0);
     let mut lines = Vec::new();
     for ((name, right, _), ended) in PROBES.iter().zip(found) {
         let ended = ended.map_err(Failure::Terminal)?;
         match &ended {
             Ended::Crashed => crashed += 1,
-            Ended::Never => endless += 1,
-            Ended::Said(text) => otherwise += u32::from(!right.iter().any(|word| text.starts_with(word))),
+            Ended::TimedOut => endless += 1,
+            Ended::Answered(text) => otherwise += u32::from(!right.iter().any(|word| text.starts_with(word))),
         }
         rows.push(row("alone", name, "-", ended.text(), f64::NAN));
         lines.push(vec![(*name).into(), right.join(" or "), ended.text().into()]);
@@ -78,12 +78,14 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
             let problem = Problem { system, t0: 0.0, start, span: 0.25 };
             let truth = problem.exact().map_err(Failure::from)?;
             for (by, found) in found {
-                let (worth, error) = match found {
-                    None => (Worth::Refused, f64::NAN),
-                    Some(x) => (End::Whole(x).worth(&truth, 0.0, 0.02), End::Whole(x).error(&truth, 0.0)),
+                let (verdict, error) = match found {
+                    None => (Verdict::Refused, f64::NAN),
+                    Some(x) => {
+                        (RunEnd::Completed(x).verdict(&truth, 0.0, 0.02), RunEnd::Completed(x).error(&truth, 0.0))
+                    }
                 };
-                wrong += u32::from(worth.is_bad());
-                rows.push(row(&format!("poor guess, {name}"), by, &format!("{guess:e}"), worth.name(), error));
+                wrong += u32::from(verdict.is_failure());
+                rows.push(row(&format!("poor guess, {name}"), by, &format!("{guess:e}"), verdict.name(), error));
             }
         }
     }
@@ -115,10 +117,10 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
         let truth = problem.exact().ok();
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [5, 50, 1000].map(|n| (i, n))) {
             let outside = PhasePoint::new([1e9], [1e9], 0.0);
-            let (worth, error) = problem.worth(integrator, count, truth.as_ref().unwrap_or(&outside), 0.0);
-            on += u32::from(worth == Worth::Wrong);
-            broken += u32::from(matches!(worth, Worth::NotANumber | Worth::Panicked));
-            rows.push(row("domain", &integrator.to_string(), &speed.to_string(), worth.name(), error));
+            let (verdict, error) = problem.verdict(integrator, count, truth.as_ref().unwrap_or(&outside), 0.0);
+            on += u32::from(verdict == Verdict::Wrong);
+            broken += u32::from(matches!(verdict, Verdict::NonFinite | Verdict::Panicked));
+            rows.push(row("domain", &integrator.to_string(), &speed.to_string(), verdict.name(), error));
         }
     }
     report.at_most("motions out of the domain of L: that go on in silence", f64::from(on), 0.0)?;
@@ -131,26 +133,26 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
         let first = energy(&problem.state());
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [10, 200].map(|n| (i, n))) {
             let end = problem.by(integrator, count);
-            let (worth, error) = match &end {
-                End::Whole(x) => {
+            let (verdict, error) = match &end {
+                RunEnd::Completed(x) => {
                     let error = (energy(x) - first).abs() / first;
                     let finite = ChartVector::from(*x).is_finite();
                     (
                         if !finite {
-                            Worth::NotANumber
+                            Verdict::NonFinite
                         } else if error <= 0.1 {
-                            Worth::Right
+                            Verdict::Right
                         } else {
-                            Worth::Wrong
+                            Verdict::Wrong
                         },
                         error,
                     )
                 }
-                other => (other.worth(&problem.state(), 0.0, 0.1), f64::NAN),
+                other => (other.verdict(&problem.state(), 0.0, 0.1), f64::NAN),
             };
-            silent += u32::from(worth == Worth::Wrong);
-            broken += u32::from(matches!(worth, Worth::NotANumber | Worth::Panicked));
-            rows.push(row("kink", &integrator.to_string(), &slope.to_string(), worth.name(), error));
+            silent += u32::from(verdict == Verdict::Wrong);
+            broken += u32::from(matches!(verdict, Verdict::NonFinite | Verdict::Panicked));
+            rows.push(row("kink", &integrator.to_string(), &slope.to_string(), verdict.name(), error));
         }
     }
     report.at_most("motions over kinks: energy wrong by a tenth in silence", f64::from(silent), 0.0)?;
@@ -250,7 +252,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
                 report.at_most_timed(
                     &format!("{integrator}, {name}: dearest {of} over the dearest that contracts"),
                     dearest(which) / contracting,
-                    PRICE,
+                    MAX_TIME_RATIO,
                 )?;
             }
             curves.push(Curve::new(

@@ -1,6 +1,7 @@
 //! Candidates: solvers of a problem with one parameter that trades run time for accuracy.
 
 use crate::problems::Problem;
+use crate::row::Action;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{AnyIntegrator, InputError, StepFailure, Steps, Until};
 use std::time::Instant;
@@ -66,7 +67,7 @@ struct OfLibrary<L: 'static, const N: usize> {
     integrator: AnyIntegrator,
     name: String,
     problem: Problem,
-    z: bool,
+    z: Action,
 }
 
 /// A candidate that runs an integrator of the library by a plan. The plan is made before the time measurement starts,
@@ -75,7 +76,7 @@ pub fn of_library<L: Lagrangian<N>, const N: usize>(
     lagrangian: &'static L,
     integrator: AnyIntegrator,
     problem: &Problem,
-    z: bool,
+    z: Action,
 ) -> Box<dyn Candidate> {
     Box::new(OfLibrary { lagrangian, integrator, name: integrator.to_string(), problem: *problem, z })
 }
@@ -99,7 +100,7 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
         let start = VelocityPoint { q: start.q, v: start.p, z: start.z };
         let motion = discrete_herglotz::Problem::new(self.lagrangian, 0.0, start)?;
         let run = motion.by(self.integrator).steps(Steps::Size(h));
-        let run = if self.z { run } else { run.without_action() };
+        let run = if self.z == Action::On { run } else { run.without_action() };
         let plan = run.plan(Until::Time(self.problem.duration))?;
         let mut stepper = plan.stepper()?;
         let clock = Instant::now();
@@ -107,7 +108,7 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
         let seconds = clock.elapsed().as_secs_f64();
         let end = stepper.state();
         let mut state: Vec<f64> = end.q.iter().chain(end.p.iter()).copied().collect();
-        if self.z {
+        if self.z == Action::On {
             state.push(end.z);
         }
         Ok(Run { state, steps: plan.count() as u64, evaluations: stepper.evaluations(), seconds })

@@ -1,7 +1,7 @@
 //! Work-precision diagrams: error against run time, one curve per method.
 
 use crate::problems::Problem;
-use crate::row::{Origin, Row, switch};
+use crate::row::{Action, Origin, Row};
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw};
 
 /// The exponents of ten between which errors are drawn. With larger errors the motion is lost; smaller ones are below
@@ -9,7 +9,7 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw};
 const ERRORS: (i32, i32) = (-16, 0);
 
 /// Writes the diagram of a problem, with or without the action, if it has any rows. The rows are sorted.
-pub fn write(out: &Directory, problem: &Problem, z: bool, rows: &[Row]) -> Result<(), Failure> {
+pub fn write(out: &Directory, problem: &Problem, z: Action, rows: &[Row]) -> Result<(), Failure> {
     let (least, most) = (10f64.powi(ERRORS.0), 10f64.powi(ERRORS.1));
     let drawn = |row: &&Row| row.problem == problem.name && row.z == z && (least..=most).contains(&row.error);
     let mut rows: Vec<&Row> = rows.iter().filter(drawn).collect();
@@ -31,7 +31,7 @@ pub fn write(out: &Directory, problem: &Problem, z: bool, rows: &[Row]) -> Resul
         Some(Curve::new(&row.method.replace('_', " "), line, points))
     };
     let panel = Panel {
-        x_label: format!("{}, z {}: run time (s)", problem.name, switch(z)),
+        x_label: format!("{}, z {}: run time (s)", problem.name, z.name()),
         y_label: "error of (q, v) (relative)".into(),
         x: Axis::Logarithmic(fastest.log10().floor() as i32, slowest.log10().ceil() as i32, 1),
         y: Axis::Logarithmic(ERRORS.0, ERRORS.1, 2),
@@ -39,5 +39,5 @@ pub fn write(out: &Directory, problem: &Problem, z: bool, rows: &[Row]) -> Resul
         curves: rows.chunk_by(|a, b| a.method == b.method).filter_map(curve).collect(),
         marks: Vec::new(),
     };
-    out.text(&format!("{}_z_{}.svg", problem.name, switch(z)), &draw(&panel))
+    out.text(&format!("{}_z_{}.svg", problem.name, z.name()), &draw(&panel))
 }

@@ -2,12 +2,13 @@
 
 use crate::candidate::{Candidate, of_library};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
+use crate::row::Action;
 use contact_geom::Lagrangian;
 use discrete_herglotz::AnyIntegrator;
 
 /// The integrators of the library that apply to a problem, with or without the action. The flow of a discrete
 /// Lagrangian always computes the action; without the action, it is ignored.
-pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
+pub fn candidates(problem: &Problem, z: Action) -> Vec<Box<dyn Candidate>> {
     match problem.system {
         System::Oscillator => of(&OSCILLATOR, problem, z),
         System::Pendulum => of(&PENDULUM, problem, z),
@@ -16,7 +17,11 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     }
 }
 
-fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
+fn of<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &'static L,
+    problem: &Problem,
+    z: Action,
+) -> Vec<Box<dyn Candidate>> {
     // Only integrators with a fixed step size: in transformed time, the number of steps is known only after the run.
     let fixed = |integrator: &AnyIntegrator| !matches!(integrator, AnyIntegrator::TransformedGauss { .. });
     let applicable = |integrator: &AnyIntegrator| fixed(integrator) && integrator.check(lagrangian).is_ok();

@@ -25,12 +25,13 @@ mod row;
 mod summary;
 
 use candidate::Candidate;
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use contact_examples::{Directory, Failure, finish, print};
 use indicatif::{ProgressBar, ProgressStyle};
 use measure::{Effort, sweep};
 use problems::{PROBLEMS, Problem};
-use row::{Origin, Row, switch};
+use recorded::Peers;
+use row::{Action, Origin, Row};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -46,7 +47,7 @@ struct Arguments {
     method: Vec<String>,
     /// With or without the action; both by default.
     #[arg(long)]
-    z: Option<Switch>,
+    z: Option<Action>,
     /// The directory for table and diagrams; created where it does not exist.
     #[arg(long, value_name = "DIR", default_value = "out/work_precision")]
     out: PathBuf,
@@ -61,17 +62,10 @@ struct Arguments {
     quick: bool,
 }
 
-/// On or off.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Switch {
-    On,
-    Off,
-}
-
 /// A candidate, with the problem that it solves and its origin.
 struct Entry {
     problem: &'static Problem,
-    z: bool,
+    z: Action,
     origin: Origin,
     candidate: Box<dyn Candidate>,
 }
@@ -88,30 +82,30 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_names("problem", &arguments.problem, &PROBLEMS.map(|problem| problem.name))?;
     check_names("method", &arguments.method, &methods)?;
     let named = |names: &[String], name: &str| names.iter().any(|n| n == "all" || n == name);
-    let wanted = |problem: &Problem, z: bool| {
-        let with = arguments.z.is_none_or(|switch| (switch == Switch::On) == z);
+    let is_requested = |problem: &Problem, z: Action| {
+        let with = arguments.z.is_none_or(|requested| requested == z);
         with && named(&arguments.problem, problem.name)
     };
 
     let mut rows = match &arguments.peers {
-        Some(path) => recorded::read(path, arguments.all_peers)?,
+        Some(path) => recorded::read(path, if arguments.all_peers { Peers::All } else { Peers::Heyoka })?,
         None => Vec::new(),
     };
-    rows.retain(|row| PROBLEMS.iter().any(|problem| problem.name == row.problem && wanted(problem, row.z)));
+    rows.retain(|row| PROBLEMS.iter().any(|problem| problem.name == row.problem && is_requested(problem, row.z)));
     let out = Directory::create(&arguments.out)?;
     let chosen: Vec<Entry> = all
         .into_iter()
         .filter(|entry| {
             let shown = matches!(entry.origin, Origin::Peer) || library::DIAGRAMS.contains(&entry.candidate.name());
             let chosen = shown && arguments.method.iter().any(|name| name == "chosen");
-            wanted(entry.problem, entry.z) && (chosen || named(&arguments.method, entry.candidate.name()))
+            is_requested(entry.problem, entry.z) && (chosen || named(&arguments.method, entry.candidate.name()))
         })
         .collect();
     rows.extend(measure(&chosen, Effort { quick: arguments.quick }));
     row::sort(&mut rows);
 
     out.table("work_precision.csv", &row::COLUMNS, rows.iter().map(Row::fields))?;
-    for (problem, z) in variants().filter(|(problem, z)| wanted(problem, *z)) {
+    for (problem, z) in variants().filter(|(problem, z)| is_requested(problem, *z)) {
         diagrams::write(&out, problem, z, &rows)?;
         print(&summary::of(problem, z, &rows))?;
     }
@@ -123,9 +117,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The problems without the action, where they can be solved without it, and with the action.
-fn variants() -> impl Iterator<Item = (&'static Problem, bool)> {
-    let both = PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z)));
-    both.filter(|(problem, z)| *z || !problem.needs_z())
+fn variants() -> impl Iterator<Item = (&'static Problem, Action)> {
+    let both = PROBLEMS.iter().flat_map(|problem| Action::ALL.map(|z| (problem, z)));
+    both.filter(|(problem, z)| *z == Action::On || !problem.needs_z())
 }
 
 /// All candidates.
@@ -152,7 +146,7 @@ fn measure(entries: &[Entry], effort: Effort) -> Vec<Row> {
     let bar = ProgressBar::new(entries.len() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let mut rows = Vec::new();
     for Entry { problem, z, origin, candidate } in entries {
-        let subject = format!("{}, z {}, {}", problem.name, switch(*z), candidate.name());
+        let subject = format!("{}, z {}, {}", problem.name, z.name(), candidate.name());
         bar.set_message(subject.clone());
         let found = sweep(candidate.as_ref(), *origin, problem, *z, effort);
         rows.extend(found.rows);

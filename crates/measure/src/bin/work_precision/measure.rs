@@ -2,22 +2,22 @@
 
 use crate::candidate::{Candidate, Control, Run, RunError};
 use crate::problems::Problem;
-use crate::row::{Origin, Row};
+use crate::row::{Action, Origin, Row};
 
 /// The minimum number of runs from which a median is taken.
-const RUNS: usize = 7;
+const MIN_RUNS: usize = 7;
 
 /// Short runs are repeated until they have taken this many seconds in total, or this many times.
 const REPEATS: (f64, usize) = (0.02, 200);
 
 /// The coarsest step tried, in time units: about a period of the problems.
-const COARSEST: f64 = 6.5;
+const MAX_STEP_SIZE: f64 = 6.5;
 
 /// The largest number of steps tried.
-const MOST_STEPS: f64 = 1e8;
+const MAX_STEPS: f64 = 1e8;
 
 /// Once the error is below this value, two steps that do not reduce it end a sweep: the rest of the error is round-off.
-const ACCURATE: f64 = 1e-9;
+const ROUND_OFF_BELOW: f64 = 1e-9;
 
 /// The tolerances tried are 10^-k for k in this range.
 const TOLERANCES: std::ops::RangeInclusive<i32> = 3..=15;
@@ -60,8 +60,8 @@ fn controls(control: Control, problem: &Problem, effort: Effort) -> Vec<f64> {
     match control {
         Control::Step => (0..)
             .flat_map(|k| effort.factors().iter().map(move |factor| 2f64.powi(k) * factor))
-            .skip_while(|steps| duration / steps > COARSEST)
-            .take_while(|steps| *steps <= MOST_STEPS)
+            .skip_while(|steps| duration / steps > MAX_STEP_SIZE)
+            .take_while(|steps| *steps <= MAX_STEPS)
             .map(|steps| duration / steps)
             .collect(),
         Control::Tolerance => {
@@ -75,7 +75,7 @@ fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
     let mut run = candidate.run(control)?;
     let mut seconds = vec![run.seconds];
     let mut total = run.seconds;
-    while seconds.len() < RUNS || (total < REPEATS.0 && seconds.len() < REPEATS.1) {
+    while seconds.len() < MIN_RUNS || (total < REPEATS.0 && seconds.len() < REPEATS.1) {
         let again = candidate.run(control)?.seconds;
         seconds.push(again);
         total += again;
@@ -86,7 +86,7 @@ fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
 }
 
 /// Measures a candidate from coarse to fine, until a run is slow or the error no longer decreases.
-pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: bool, effort: Effort) -> Sweep {
+pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: Action, effort: Effort) -> Sweep {
     let mut sweep = Sweep::default();
     let (mut last, mut strikes) = (f64::INFINITY, 0);
     let control = candidate.control();
@@ -116,7 +116,7 @@ pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: bo
         } else {
             sweep.failed.push((value, "the final state is not finite".into()));
         }
-        strikes += u32::from(error < ACCURATE && error >= last);
+        strikes += u32::from(error < ROUND_OFF_BELOW && error >= last);
         last = error;
         if seconds > effort.bound() || (control == Control::Step && strikes == 2) {
             break;
@@ -135,7 +135,7 @@ mod tests {
         for problem in &PROBLEMS {
             for quick in [true, false] {
                 let steps = controls(Control::Step, problem, Effort { quick });
-                assert!(steps[0] <= COARSEST && steps[0] > COARSEST / 2.0);
+                assert!(steps[0] <= MAX_STEP_SIZE && steps[0] > MAX_STEP_SIZE / 2.0);
                 assert!(steps.windows(2).all(|pair| pair[1] < pair[0] && pair[1] >= pair[0] / 2.0));
                 for h in steps {
                     let count = (problem.duration / h).round();

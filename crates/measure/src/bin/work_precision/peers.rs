@@ -3,42 +3,43 @@
 
 use crate::candidate::{Candidate, Control, Run, RunError};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
+use crate::row::Action;
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use ode_solvers::{Dop853, OutputType, SVector};
 use std::time::Instant;
 
 /// The largest number of steps of a run, of either peer.
-const MOST_STEPS: u32 = 100_000_000;
+const MAX_STEPS: u32 = 100_000_000;
 
 /// The peers as candidates for a problem, with or without the action.
-pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
+pub fn candidates(problem: &Problem, z: Action) -> Vec<Box<dyn Candidate>> {
     match (problem.system, z) {
-        (System::Oscillator, false) => both(problem, |[q, v]: [f64; 2]| [v, OSCILLATOR.gamma * v - q]),
-        (System::Oscillator, true) => both(problem, |[q, v, z]: [f64; 3]| {
+        (System::Oscillator, Action::Off) => both(problem, |[q, v]: [f64; 2]| [v, OSCILLATOR.gamma * v - q]),
+        (System::Oscillator, Action::On) => both(problem, |[q, v, z]: [f64; 3]| {
             let gamma = OSCILLATOR.gamma;
             [v, gamma * v - q, 0.5 * (v * v - q * q) + gamma * z]
         }),
-        (System::Pendulum, false) => both(problem, |[q, v]: [f64; 2]| [v, PENDULUM.gamma * v - q.sin()]),
-        (System::Pendulum, true) => both(problem, |[q, v, z]: [f64; 3]| {
+        (System::Pendulum, Action::Off) => both(problem, |[q, v]: [f64; 2]| [v, PENDULUM.gamma * v - q.sin()]),
+        (System::Pendulum, Action::On) => both(problem, |[q, v, z]: [f64; 3]| {
             let gamma = PENDULUM.gamma;
             [v, gamma * v - q.sin(), 0.5 * v * v - 1.0 + q.cos() + gamma * z]
         }),
-        (System::Kepler, false) => both(problem, |[x, y, vx, vy]: [f64; 4]| {
+        (System::Kepler, Action::Off) => both(problem, |[x, y, vx, vy]: [f64; 4]| {
             let (_, force) = attraction(x, y);
             [vx, vy, KEPLER.gamma * vx - x * force, KEPLER.gamma * vy - y * force]
         }),
-        (System::Kepler, true) => both(problem, |[x, y, vx, vy, z]: [f64; 5]| {
+        (System::Kepler, Action::On) => both(problem, |[x, y, vx, vy, z]: [f64; 5]| {
             let (inverse, force) = attraction(x, y);
             let gamma = KEPLER.gamma;
             let rate = 0.5 * (vx * vx + vy * vy) + inverse + gamma * z;
             [vx, vy, gamma * vx - x * force, gamma * vy - y * force, rate]
         }),
-        (System::Quadratic, true) => both(problem, |[q, v, z]: [f64; 3]| {
+        (System::Quadratic, Action::On) => both(problem, |[q, v, z]: [f64; 3]| {
             [v, -q - QUADRATIC.c * z * v, 0.5 * (v * v - q * q) - 0.5 * QUADRATIC.c * z * z]
         }),
         // The equation of motion depends on the action.
-        (System::Quadratic, false) => Vec::new(),
+        (System::Quadratic, Action::Off) => Vec::new(),
     }
 }
 
@@ -118,7 +119,7 @@ impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEqua
         let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(self.0.absolute(tolerance));
         let ivp = IVP::ode(rhs, 0.0, problem.duration, self.0.start())
             .t_eval([problem.duration])
-            .method(method.max_steps(MOST_STEPS as usize));
+            .method(method.max_steps(MAX_STEPS as usize));
         let clock = Instant::now();
         let solution = ivp.solve().map_err(|error| RunError::Peer(format!("{error:?}")))?;
         let seconds = clock.elapsed().as_secs_f64();
@@ -167,7 +168,7 @@ impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolver
             6.0,
             end,
             0.0,
-            MOST_STEPS,
+            MAX_STEPS,
             u32::MAX,
             OutputType::Sparse,
         );
@@ -191,14 +192,14 @@ mod tests {
 
     #[test]
     fn right_hand_sides_are_those_of_the_problems() -> Result<(), RunError> {
-        for (problem, z) in PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z))) {
+        for (problem, z) in PROBLEMS.iter().flat_map(|problem| Action::ALL.map(|z| (problem, z))) {
             let peers = candidates(problem, z);
-            assert_eq!(peers.len(), if problem.needs_z() && !z { 0 } else { 2 });
+            assert_eq!(peers.len(), if problem.needs_z() && z == Action::Off { 0 } else { 2 });
             for peer in peers {
                 let run = peer.run(1e-12)?;
                 // The orbit of P3 amplifies the tolerance by 1e6; a wrong term would change the first digit.
                 assert!(problem.error(&run.state) < 1e-5, "{} {}: {run:?}", problem.name, peer.name());
-                assert_eq!(problem.error_z(&run.state).is_some(), z);
+                assert_eq!(problem.error_z(&run.state).is_some(), z == Action::On);
                 assert!(problem.error_z(&run.state).is_none_or(|e| e < 1e-7), "{} {}", problem.name, peer.name());
                 assert!(run.steps > 0 && run.evaluations >= 11 * run.steps);
             }

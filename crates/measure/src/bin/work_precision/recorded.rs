@@ -1,7 +1,7 @@
 //! Reads the results of peers that were measured by another program on the same machine, from its CSV file.
 
 use crate::problems::PROBLEMS;
-use crate::row::{Origin, Row};
+use crate::row::{Action, Origin, Row};
 use contact_examples::Failure;
 use std::path::Path;
 
@@ -24,6 +24,15 @@ const COLUMNS: [&str; 15] = [
     "status",
 ];
 
+/// Which peers of a file are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Peers {
+    /// [`PEER`] alone.
+    Heyoka,
+    /// All peers.
+    All,
+}
+
 /// The peer whose rows are used unless all are requested.
 pub const PEER: &str = "heyoka";
 
@@ -37,8 +46,8 @@ struct Configuration {
 
 /// Reads the rows of a peer, or of all peers; the time of a configuration is the median over the rounds. Rows of other
 /// problems, and of runs that failed, are skipped.
-pub fn read(path: &Path, all_peers: bool) -> Result<Vec<Row>, Failure> {
-    std::fs::read_to_string(path).map_err(|cause| cause.to_string()).and_then(|text| parse(&text, all_peers)).map_err(
+pub fn read(path: &Path, peers: Peers) -> Result<Vec<Row>, Failure> {
+    std::fs::read_to_string(path).map_err(|cause| cause.to_string()).and_then(|text| parse(&text, peers)).map_err(
         |cause| Failure::Table {
             path: path.into(),
             cause,
@@ -52,7 +61,7 @@ pub fn read(path: &Path, all_peers: bool) -> Result<Vec<Row>, Failure> {
 }
 
 /// Parses the text of such a file; the error names the first invalid part.
-fn parse(text: &str, all_peers: bool) -> Result<Vec<Row>, String> {
+fn parse(text: &str, peers: Peers) -> Result<Vec<Row>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let found = reader.headers().map_err(|error| error.to_string())?;
     if found != COLUMNS.as_slice() {
@@ -62,7 +71,7 @@ fn parse(text: &str, all_peers: bool) -> Result<Vec<Row>, String> {
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;
         let line = record.position().map_or(0, csv::Position::line);
-        let Some(new) = configuration(&record, all_peers).map_err(|cause| format!("line {line}: {cause}"))? else {
+        let Some(new) = configuration(&record, peers).map_err(|cause| format!("line {line}: {cause}"))? else {
             continue;
         };
         let same = |old: &&mut Configuration| {
@@ -82,7 +91,7 @@ fn parse(text: &str, all_peers: bool) -> Result<Vec<Row>, String> {
 }
 
 /// The configuration of a record; `None` if the record is skipped.
-fn configuration(record: &csv::StringRecord, all_peers: bool) -> Result<Option<Configuration>, String> {
+fn configuration(record: &csv::StringRecord, peers: Peers) -> Result<Option<Configuration>, String> {
     let field = |name: &str| {
         let place = COLUMNS.iter().position(|column| *column == name);
         place.and_then(|i| record.get(i)).ok_or_else(|| format!("no {name}"))
@@ -92,14 +101,14 @@ fn configuration(record: &csv::StringRecord, all_peers: bool) -> Result<Option<C
         text.parse::<f64>().map_err(|_| format!("{name} is {text:?}, not a number"))
     };
     let z = match field("variant")? {
-        "z" => true,
-        "noz" => false,
+        "z" => Action::On,
+        "noz" => Action::Off,
         other => return Err(format!("variant is {other:?}, not z or noz")),
     };
     let (peer, error) = (field("peer")?, number("err_qv")?);
     let problem = field("problem")?;
-    let wanted = field("status")? == "ok" && error.is_finite() && (all_peers || peer == PEER);
-    let Some(problem) = PROBLEMS.iter().find(|p| wanted && p.name == problem) else {
+    let is_used = field("status")? == "ok" && error.is_finite() && (peers == Peers::All || peer == PEER);
+    let Some(problem) = PROBLEMS.iter().find(|p| is_used && p.name == problem) else {
         return Ok(None);
     };
     let seconds = number("wall_med_s")?;
@@ -136,11 +145,11 @@ mod tests {
             "2,P1,z,heyoka,taylor,1e-07,2.5e+01,5.6e+05,9e-05,1e-05,200,0.018,0,762,ok",
             "3,P1,z,heyoka,taylor,1e-07,2.5e+01,5.6e+05,4e-05,1e-05,200,0.018,0,762,ok",
         ]);
-        let rows = parse(&text, false)?;
+        let rows = parse(&text, Peers::Heyoka)?;
         assert_eq!(rows.len(), 2);
-        assert_eq!((rows[0].problem, rows[0].method.as_str(), rows[0].z), ("P1", "heyoka_taylor", true));
+        assert_eq!((rows[0].problem, rows[0].method.as_str(), rows[0].z), ("P1", "heyoka_taylor", Action::On));
         assert_eq!((rows[0].seconds, rows[0].steps, rows[0].error_z), (4e-5, 762, Some(5.6e5)));
-        assert_eq!((rows[1].z, rows[1].error_z), (false, None));
+        assert_eq!((rows[1].z, rows[1].error_z), (Action::Off, None));
         Ok(())
     }
 
@@ -151,14 +160,14 @@ mod tests {
             "1,P1,z,heyoka,taylor,1e-07,nan,nan,nan,nan,0,0,0,0,fail",
             "1,P1,z,gsl,rk8pd,1e-07,1e-9,1e-9,3e-05,1e-05,200,0,0,762,ok",
         ]);
-        assert_eq!(parse(&text, false)?, []);
-        assert_eq!(parse(&text, true)?[0].method, "gsl_rk8pd");
+        assert_eq!(parse(&text, Peers::Heyoka)?, []);
+        assert_eq!(parse(&text, Peers::All)?[0].method, "gsl_rk8pd");
         Ok(())
     }
 
     #[test]
     fn what_is_wrong_is_named() {
-        let wrong = |text: &str| parse(text, false).err().unwrap_or_default();
+        let wrong = |text: &str| parse(text, Peers::Heyoka).err().unwrap_or_default();
         assert_eq!(wrong("problem,variant\nP1,z\n"), "its columns are problem,variant");
         let line = |line: &str| wrong(&file(&[line]));
         let error = line("1,P1,z,heyoka,taylor,1e-07,much,0,3e-05,1e-05,200,0,0,762,ok");
@@ -170,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_not_there_says_what_is_expected() {
-        let error = read(Path::new("no/such/file.csv"), false).err().map_or(String::new(), |e| e.to_string());
+        let error = read(Path::new("no/such/file.csv"), Peers::Heyoka).err().map_or(String::new(), |e| e.to_string());
         assert!(error.contains("no/such/file.csv") && error.contains("wall_med_s"), "{error}");
     }
 }

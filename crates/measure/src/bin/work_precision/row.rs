@@ -1,5 +1,6 @@
 //! Rows of the table, and the fastest row for an error.
 
+use clap::ValueEnum;
 use contact_examples::number;
 
 /// Where a row comes from.
@@ -25,7 +26,7 @@ pub struct Row {
     /// The order of the method, where it is known.
     pub order: Option<u32>,
     /// Whether the action was solved for.
-    pub z: bool,
+    pub z: Action,
     /// The time step of a method with a fixed one.
     pub h: Option<f64>,
     /// The steps taken.
@@ -44,9 +45,26 @@ pub struct Row {
 pub const COLUMNS: [&str; 10] =
     ["problem", "method", "order", "z", "h", "steps", "evaluations", "error", "error_z", "seconds"];
 
-/// "on" or "off".
-pub fn switch(z: bool) -> &'static str {
-    if z { "on" } else { "off" }
+/// Whether the action z is solved for; without it comes first in the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Action {
+    /// Only positions and velocities are solved for.
+    Off,
+    /// The action is solved for too.
+    On,
+}
+
+impl Action {
+    /// Both.
+    pub const ALL: [Self; 2] = [Action::Off, Action::On];
+
+    /// "on" or "off".
+    pub fn name(self) -> &'static str {
+        match self {
+            Action::Off => "off",
+            Action::On => "on",
+        }
+    }
 }
 
 impl Row {
@@ -57,7 +75,7 @@ impl Row {
             self.problem.into(),
             self.method.clone(),
             self.order.map_or(String::new(), |order| order.to_string()),
-            switch(self.z).into(),
+            self.z.name().into(),
             or_empty(self.h),
             self.steps.to_string(),
             self.evaluations.to_string(),
@@ -95,7 +113,7 @@ pub mod tests {
             method: method.into(),
             origin: Origin::Library,
             order: None,
-            z: true,
+            z: Action::On,
             h: None,
             steps: 1,
             evaluations: 0,

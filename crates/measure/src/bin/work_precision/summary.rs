@@ -2,7 +2,7 @@
 
 use crate::problems::Problem;
 use crate::recorded::PEER;
-use crate::row::{Origin, Row, best, fastest, switch};
+use crate::row::{Action, Origin, Row, best, fastest};
 
 /// The errors at which times are compared.
 const LEVELS: [f64; 3] = [1e-6, 1e-9, 1e-12];
@@ -20,7 +20,7 @@ fn time(seconds: f64) -> String {
 }
 
 /// The summary of a problem, with or without the action, from all its rows.
-pub fn of(problem: &Problem, z: bool, rows: &[Row]) -> String {
+pub fn of(problem: &Problem, z: Action, rows: &[Row]) -> String {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.problem == problem.name && row.z == z).collect();
     let library = || rows.iter().copied().filter(|row| row.origin == Origin::Library);
     // Of the implementations of dop853, only those measured in the same run.
@@ -34,7 +34,7 @@ pub fn of(problem: &Problem, z: bool, rows: &[Row]) -> String {
     let floor = best(peer(PEER)).map(|row| row.error).filter(|error| LEVELS.iter().any(|level| error > level));
     levels.extend(floor.map(|error| (error, format!("{error:.1e} *"))));
 
-    let mut text = format!("\n{}, {}, z {}: time to an error of (q, v)\n\n", problem.name, problem.title, switch(z));
+    let mut text = format!("\n{}, {}, z {}: time to an error of (q, v)\n\n", problem.name, problem.title, z.name());
     text += &format!("  {:<10}{:<32}{:>10}{:>9}", "error", "fastest of the library", "time", "error z");
     for name in PEERS {
         text += &format!("  {name:>10}{:>9}{:>8}", "error z", "ratio");
@@ -101,7 +101,7 @@ mod tests {
             of_peer("ode_solvers_dop853", Origin::Peer, 1e-6, 5e-3),
             of_peer("boost_dop853", Origin::Recorded, 1e-6, 1e-6),
         ];
-        let text = of(&PROBLEMS[0], true, &rows);
+        let text = of(&PROBLEMS[0], Action::On, &rows);
         let words = |start: &str| -> Vec<&str> {
             text.lines()
                 .find(|line| line.trim_start().starts_with(start))

@@ -1,0 +1,36 @@
+//! The scene file of a command.
+
+use crate::failure::Failure;
+use clap::Args;
+use herglotz::{Scene, SceneError};
+use std::path::PathBuf;
+
+/// A scene file, with overrides.
+#[derive(Args)]
+pub(crate) struct SceneArguments {
+    /// The scene file.
+    pub(crate) file: PathBuf,
+    /// Override a value of the scene: a parameter, start.NAME, run.time, run.accuracy, run.step, run.steps or
+    /// run.integrator.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub(crate) changes: Vec<String>,
+}
+
+impl SceneArguments {
+    /// Reads the scene.
+    pub fn read(&self) -> Result<Scene, Failure> {
+        Scene::read_with(&self.text()?, &self.changes).map_err(|error| self.explain(error))
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> Result<String, Failure> {
+        let text = std::fs::read(&self.file).map_err(Failure::of_file(&self.file))?;
+        String::from_utf8(text)
+            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))
+    }
+
+    /// An error with the name of the file.
+    pub fn explain(&self, error: SceneError) -> Failure {
+        error.in_file(self.file.display().to_string()).into()
+    }
+}

@@ -1,0 +1,87 @@
+//! The system of a scene.
+
+use super::SceneError;
+use super::checked::finite;
+use super::file::SystemTable;
+use super::location::Location;
+use crate::runtime::{CatalogueEntry, Formula, FormulaError, RuntimeError, check_parameters};
+
+/// The entry of the catalogue that a scene names.
+pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
+    let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
+    match (&system.catalogue, &system.coordinates, &system.lagrangian) {
+        (Some(name), None, None) => match CatalogueEntry::find(name) {
+            Ok(entry) => Ok(Some(entry)),
+            Err(error) => Err(SceneError::at(text, name.span(), error.to_string())),
+        },
+        (Some(name), ..) => refuse(name.span(), "give a `catalogue` or a `lagrangian` with `coordinates`, not both"),
+        (None, Some(_), Some(_)) => Ok(None),
+        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a text in quotes"),
+        (None, None, Some(_)) => {
+            refuse(system.span(), "the system has no `coordinates`; add their names, as in coordinates = [\"x\"]")
+        }
+        (None, None, None) => {
+            refuse(system.span(), "the system has no `lagrangian` with `coordinates`, and no `catalogue`; add either")
+        }
+    }
+}
+
+/// The formula of a scene.
+pub(super) fn formula(
+    text: &str,
+    system: &Location<SystemTable>,
+    entry: Option<&'static CatalogueEntry>,
+) -> Result<Formula, SceneError> {
+    for (name, value) in &system.parameters.0 {
+        finite(text, value, name)?;
+    }
+    let at_system = |error: FormulaError| SceneError::at(text, system.span(), error.to_string());
+    let Some(entry) = entry else {
+        let (Some(coordinates), Some(lagrangian)) = (&system.coordinates, &system.lagrangian) else {
+            return Err(SceneError::at(text, system.span(), "the system has no formula"));
+        };
+        let names: Vec<&str> = coordinates.iter().map(|name| name.as_str()).collect();
+        let values: Vec<(&str, f64)> =
+            system.parameters.0.iter().map(|(name, value)| (name.as_str(), **value)).collect();
+        return Formula::parse(lagrangian, &names, &values).map_err(|error| match error {
+            FormulaError::Parse(mut error) => {
+                if error.message.starts_with("unknown name") && error.nearest.is_none() {
+                    error.message += "; a parameter needs a value in `parameters` of [system]";
+                }
+                SceneError::in_string(text, lagrangian.span(), &error)
+            }
+            FormulaError::Name { ref name, .. } => {
+                let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
+                let at = coordinates.iter().chain(of_parameters).rfind(|known| ***known == *name).map(Location::span);
+                SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
+            }
+            FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),
+            error => at_system(error),
+        });
+    };
+    let mut formula = entry.formula().map_err(|error| SceneError::at(text, system.span(), error.to_string()))?;
+    for (name, value) in &system.parameters.0 {
+        let known = || entry.parameters.iter().map(|(parameter, _)| *parameter);
+        if let Err(error) = formula.set(name, **value) {
+            return Err(SceneError::unknown(text, name.span(), name, known(), error.to_string()));
+        }
+    }
+    Ok(formula)
+}
+
+/// Rejects parameters that occur neither in the formula nor in the texts of columns and events.
+pub(super) fn check_used(
+    text: &str,
+    formula: &Formula,
+    system: &Location<SystemTable>,
+    texts: &[&str],
+) -> Result<(), SceneError> {
+    check_parameters(formula, texts).map_err(|error| {
+        let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
+        let span = match &error {
+            RuntimeError::UnusedParameter { name, .. } => named(name).map(|(name, _)| name.span()),
+            _ => None,
+        };
+        SceneError::at(text, span.unwrap_or(system.span()), error.to_string())
+    })
+}

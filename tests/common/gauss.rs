@@ -1,0 +1,58 @@
+//! Steppers of contact Gauss collocation from a momentum and a guess of its velocity.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, TimeTransformation};
+use discrete_herglotz::gauss::{Gauss, GaussStepper, TransformedStepper};
+use discrete_herglotz::{DiscreteLagrangian, InputError, Problem, Start, StepperOptions};
+
+/// The steppers of a discrete Lagrangian's method, with its stages and its step.
+pub trait GaussSteppers<L, const N: usize> {
+    /// A stepper that computes the action.
+    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_, L, N>, InputError>;
+
+    /// A stepper that computes the action only where it acts on the motion.
+    fn stepper_without_action(
+        &self,
+        t: f64,
+        state: PhasePoint<N>,
+        v: SVector<f64, N>,
+    ) -> Result<GaussStepper<'_, L, N>, InputError>;
+
+    /// A stepper with equal steps in transformed time.
+    fn transformed_stepper<C: TimeTransformation<N>>(
+        &self,
+        transformation: C,
+        t: f64,
+        state: PhasePoint<N>,
+        v: SVector<f64, N>,
+    ) -> Result<TransformedStepper<'_, L, C, N>, InputError>;
+}
+
+impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
+    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_, L, N>, InputError> {
+        let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
+        let options = StepperOptions { action: true, ..StepperOptions::default() };
+        GaussStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), options)
+    }
+
+    fn stepper_without_action(
+        &self,
+        t: f64,
+        state: PhasePoint<N>,
+        v: SVector<f64, N>,
+    ) -> Result<GaussStepper<'_, L, N>, InputError> {
+        let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
+        GaussStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), StepperOptions::default())
+    }
+
+    fn transformed_stepper<C: TimeTransformation<N>>(
+        &self,
+        transformation: C,
+        t: f64,
+        state: PhasePoint<N>,
+        v: SVector<f64, N>,
+    ) -> Result<TransformedStepper<'_, L, C, N>, InputError> {
+        let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
+        TransformedStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), transformation)
+    }
+}
