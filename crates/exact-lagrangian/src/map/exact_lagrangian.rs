@@ -85,9 +85,9 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
     }
 
     /// The velocity at which `L_v` is a given momentum, by Newton's method with the Jacobian W. It differs from
-    /// [`legendre_inverse`](discrete_herglotz::theory::legendre_inverse) in its Jacobian, which is differentiated with the
-    /// momentum by the same dual numbers as the motion, and in its criterion of convergence, so that the results differ in
-    /// the last digit.
+    /// [`legendre_inverse`](discrete_herglotz::theory::legendre_inverse) in its Jacobian, which is differentiated with
+    /// the momentum by the same dual numbers as the motion, and in its criterion of convergence, so that the results
+    /// differ in the last digit.
     fn velocity(&self, t: f64, x: &PhasePoint<N>, guess: &SVector<f64, N>) -> Result<SVector<f64, N>, StepError> {
         let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
         let (mut before, mut residual) = (f64::INFINITY, f64::INFINITY);

@@ -12,8 +12,8 @@ use discrete_herglotz::{InputError, solve::ITERATION_LIMIT};
 /// iteration with both positions given has the contraction factor 1, and the next mode 1/4; this is well below both.
 const MAX_CONTRACTION_WITHOUT_CONJUGATE_POINT: f64 = 0.1;
 
-/// The contraction factor of an iteration with the derivative `dq1/dv0 = h` of a free motion above which it pays to compute
-/// the derivative: at this factor round-off is reached after 30 iterations.
+/// The contraction factor of an iteration with the derivative `dq1/dv0 = h` of a free motion above which it pays to
+/// compute the derivative: at this factor round-off is reached after 30 iterations.
 const MAX_CONTRACTION_OF_FREE_MOTION: f64 = 0.3;
 
 /// The largest contraction factor that is accepted of an iteration with this derivative. A larger factor shows that the

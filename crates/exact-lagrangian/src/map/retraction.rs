@@ -29,8 +29,8 @@ pub struct Retraction<const N: usize> {
     pub b: f64,
     /// The time from the start, in multiples of h/32, by which the motion has met a conjugate point. In this case other
     /// motions join the points as well. `None` if the sign of `det dq(t)/dv0` shows no conjugate point; on the route by
-    /// collocation it is checked at the end only. [`conjugate_points`](crate::ContactExponential::conjugate_points) searches
-    /// more thoroughly, also for points of even multiplicity.
+    /// collocation it is checked at the end only. [`conjugate_points`](crate::ContactExponential::conjugate_points)
+    /// searches more thoroughly, also for points of even multiplicity.
     pub conjugate: Option<f64>,
     /// How it was found.
     pub route: RetractionRoute,

@@ -20,8 +20,8 @@ const FIRST_ACCURACY: f64 = 1e-6;
 /// round-off, to which the derivative is known.
 const MIN_REGULARITY: f64 = 64.0 * f64::EPSILON;
 
-/// The same where the derivative is known to [`FIRST_ACCURACY`] only: a hundred times that accuracy, so that at least two
-/// digits of the inverse are correct.
+/// The same where the derivative is known to [`FIRST_ACCURACY`] only: a hundred times that accuracy, so that at least
+/// two digits of the inverse are correct.
 const MIN_REGULARITY_AT_FIRST: f64 = 1e-4;
 
 /// Whether a matrix reverses orientation.
@@ -140,8 +140,8 @@ impl<L> ContactExponential<L> {
         integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy, work)
     }
 
-    /// The inverse of `dq1/dv0` along the motion from a start, to [`FIRST_ACCURACY`] accuracy; `None` where the derivative is
-    /// nearly singular or the motion is not defined.
+    /// The inverse of `dq1/dv0` along the motion from a start, to [`FIRST_ACCURACY`] accuracy; `None` where the
+    /// derivative is nearly singular or the motion is not defined.
     pub(super) fn slope_inverse<const N: usize>(
         &self,
         t: f64,

@@ -121,9 +121,9 @@ pub fn herglotz_flow<T: Scalar, const N: usize>(
     integrate(&Herglotz(lagrangian), t0, &from, duration, ACCURACY, &mut Work::default())
 }
 
-/// A compensated sum, after Kahan. It differs from the compensated sum of `discrete-herglotz` in scalar and algorithm: it
-/// adds terms over any scalar, so that derivatives are compensated too, where that one adds pairs of `f64` by Knuth's
-/// TwoSum; their results differ in the last digit.
+/// A compensated sum, after Kahan. It differs from the compensated sum of `discrete-herglotz` in scalar and algorithm:
+/// it adds terms over any scalar, so that derivatives are compensated too, where that one adds pairs of `f64` by
+/// Knuth's TwoSum; their results differ in the last digit.
 #[derive(Clone, Copy)]
 struct Sum<T> {
     value: T,

@@ -61,8 +61,8 @@ pub(crate) struct Probe {
 /// about a hundredth of the motion.
 pub(crate) const PROBES: usize = 128;
 
-/// The number of points at which a panel without any force is checked. Such a panel may be as long as the whole motion, so
-/// that it is checked more closely.
+/// The number of points at which a panel without any force is checked. Such a panel may be as long as the whole motion,
+/// so that it is checked more closely.
 pub(crate) const PROBES_WITHOUT_FORCE: usize = 1024;
 
 /// The number of Legendre polynomials that is sufficient for any number of nodes.

@@ -102,8 +102,8 @@ pub(crate) enum Refused {
 /// The smallest positive number, which is the spacing of the numbers below [`f64::MIN_POSITIVE`].
 pub(crate) const SMALLEST: f64 = f64::MIN_POSITIVE * f64::EPSILON;
 
-/// The largest number of iterations of a panel; an iteration that needs more counts as not contracting. Twice as many as
-/// those above which shorter panels are less expensive (see [`integrate`](crate::numerics::flow::integrate)).
+/// The largest number of iterations of a panel; an iteration that needs more counts as not contracting. Twice as many
+/// as those above which shorter panels are less expensive (see [`integrate`](crate::numerics::flow::integrate)).
 const MAX_ITERATIONS: u32 = 40;
 
 /// The largest absolute value, of the values alone and of the values with their differentials. On duals both must

@@ -12,7 +12,8 @@ pub(crate) struct Check {
     #[command(flatten)]
     scene: SceneArguments,
     /// The number of places along the motion.
-    #[arg(long = "places", value_name = "PLACES", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    #[arg(long = "places", value_name = "PLACES")]
+    #[arg(default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     samples: u16,
     /// Print the result as JSON.
     #[arg(long)]

@@ -70,8 +70,8 @@ impl Check {
         contact_geom::numbers::max_abs_or_nan(self.samples.iter().map(|sample| sample.contact_defect))
     }
 
-    /// Whether every step that was checked is contact to within [`MAX_CONTACT_DEFECT`], with a conformal factor that is finite and
-    /// not 0: with the factor 0 the pullback is not a contact form.
+    /// Whether every step that was checked is contact to within [`MAX_CONTACT_DEFECT`], with a conformal factor that is
+    /// finite and not 0: with the factor 0 the pullback is not a contact form.
     pub fn is_contact(&self) -> bool {
         self.contact_defect() <= MAX_CONTACT_DEFECT && !self.loses_the_form()
     }

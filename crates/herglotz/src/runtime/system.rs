@@ -16,7 +16,8 @@ use std::sync::Arc;
 /// ```
 /// use herglotz::runtime::{Motion, Start, System, StepControl};
 /// let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
-/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, StepControl::Accuracy { error: 1e-10, by: None });
+/// let start = Start::new(0.0, [1.0], [0.0], 0.0);
+/// let motion = Motion::new(start, 100.0, StepControl::Accuracy { error: 1e-10, by: None });
 /// println!("{}", pendulum.plan(&motion)?.text);
 /// println!("theta = {}", pendulum.run(&motion, &mut ())?.q[0]);
 /// # Ok::<(), herglotz::runtime::RuntimeError>(())

@@ -121,8 +121,8 @@ fn equivalent_conditions<R: Rule, const N: usize, S: System<N>>(
 }
 
 /// Statement 41, its first half: a rule on Q x Q x R^2 gives `p0 = -S_1/(1 + S_z0)`, `p1 = S_2/(1 - S_z1)` and the
-/// factor `(1 + S_z0)/(1 - S_z1)`, and these are the momenta and sigma_d of the L_d on Q x Q x R that solves it for `z1`,
-/// its derivatives taken from its value alone.
+/// factor `(1 + S_z0)/(1 - S_z1)`, and these are the momenta and sigma_d of the L_d on Q x Q x R that solves it for
+/// `z1`, its derivatives taken from its value alone.
 fn momenta_from_both_spaces<R: Rule, const N: usize, S: System<N>>(
     ld: &Quadrature<&S, R>,
     t: f64,

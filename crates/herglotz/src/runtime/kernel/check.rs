@@ -11,8 +11,8 @@ use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, 
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
 
-/// The distance of the finite differences, relative to the size of a state: it balances their truncation error, of sixth
-/// order, and round-off divided by the distance.
+/// The distance of the finite differences, relative to the size of a state: it balances their truncation error, of
+/// sixth order, and round-off divided by the distance.
 const RELATIVE_DISTANCE: f64 = 1e-3;
 
 /// The number of samples at which the theorems are evaluated: few, since second derivatives of second derivatives are
