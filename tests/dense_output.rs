@@ -1,5 +1,6 @@
 //! Dense output of contact Gauss collocation, and events along it.
 
+use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::gauss::cut;
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::common::{relative_distance, slope};
 use contact_geom::nalgebra::SVector;

@@ -1,6 +1,7 @@
 //! Contact Gauss collocation on every system of the catalogue: its fast steps are those of Newton's method, its flow is
 //! conformally contact, and its curves meet the states.
 
+use crate::common::gauss::GaussSteppers;
 use crate::common::{TOLERANCE, around, bounded, on_some, relative_distance, step_from, visit_kinds};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};

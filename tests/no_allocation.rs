@@ -9,6 +9,10 @@
 #[allow(dead_code)]
 #[path = "common/counting_allocator.rs"]
 mod counting_allocator;
+// Other binaries use the rest of it.
+#[allow(dead_code)]
+#[path = "common/gauss.rs"]
+mod gauss_steppers;
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
@@ -21,6 +25,7 @@ use discrete_herglotz::{
     rules::{Flow, LeftMidpoint, Method},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
+use gauss_steppers::GaussSteppers;
 
 /// The counter counts.
 #[test]

@@ -19,6 +19,10 @@ mod fixed;
 mod flows;
 #[path = "random_systems/gauss.rs"]
 mod gauss;
+// Other binaries use the rest of it.
+#[allow(dead_code)]
+#[path = "common/gauss.rs"]
+mod gauss_steppers;
 #[path = "random_systems/problem.rs"]
 mod problem;
 #[path = "random_systems/random_numbers.rs"]

@@ -1,5 +1,6 @@
 //! Growth of round-off in long runs of Gauss collocation: Brouwer's law for every route.
 
+use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};

@@ -1,5 +1,6 @@
 //! The limits that `KNOWN_ISSUES.md` lists, each asserted; a limit that no longer holds is removed from both.
 
+use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};

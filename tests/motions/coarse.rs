@@ -1,6 +1,7 @@
 //! Steps that are far too long are flagged as unresolved or refused, by every integrator; and properties that must not
 //! affect this.
 
+use crate::common::gauss::GaussSteppers;
 use crate::run_of;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};

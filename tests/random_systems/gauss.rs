@@ -4,6 +4,7 @@ use super::flows::{is_conformal, step_solves_its_equations};
 use super::problem::Problem;
 use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
+use crate::gauss_steppers::GaussSteppers;
 use contact_geom::{
     ChartVector, PhasePoint, legendre,
     numbers::{max_abs_or_nan, max_or_nan},

@@ -11,8 +11,8 @@ use assembled_herglotz::{
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
-    SplittingScheme, StepError, Stepper,
-    gauss::Gauss,
+    Problem, SplittingScheme, Start, StepError, Stepper, StepperOptions,
+    gauss::GaussStepper,
     rules::{Flow, Midpoint},
     splitting::Splitting,
 };
@@ -88,8 +88,10 @@ fn small_systems() {
         same("midpoint", a.state(), Stepper::state(&b), tolerance(1) / h.abs());
         for stages in [1, 2] {
             let mut a = AssembledGauss::new(&large, stages, h, from, None).unwrap();
-            let gauss = Gauss::new(Whole, stages, h).unwrap();
-            let mut b = gauss.stepper(t, state, p).unwrap();
+            let problem = Problem::new(&Whole, t, Start::Momentum(state, p)).unwrap();
+            let mut b =
+                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, ..StepperOptions::default() })
+                    .unwrap();
             assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
             same("gauss", a.state().unwrap(), b.state(), tolerance(1) / h.abs());
         }

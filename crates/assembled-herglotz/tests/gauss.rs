@@ -11,7 +11,9 @@ use assembled_herglotz::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
-use discrete_herglotz::{InputError, SplittingScheme, StepError, Stepper, gauss::Gauss};
+use discrete_herglotz::{
+    InputError, Problem, SplittingScheme, Start, StepError, Stepper, StepperOptions, gauss::GaussStepper,
+};
 
 const N: usize = 5;
 const H: f64 = 0.1;
@@ -89,8 +91,11 @@ fn general_terms_are_those_of_the_whole() {
     let from = State { t: 0.7, q: x.q.as_slice(), v: x.v.as_slice(), z: Some(x.z) };
     for (stages, h) in [(1, H), (2, H), (1, -H), (2, -H)] {
         let mut a = AssembledGauss::new(&system, stages, h, from, None).unwrap();
-        let gauss = Gauss::new(Whole, stages, h).unwrap();
-        let mut b = gauss.stepper(from.t, PhasePoint { q: x.q, p, z: x.z }, x.v).unwrap();
+        let momentum = Start::Momentum(PhasePoint { q: x.q, p, z: x.z }, x.v);
+        let problem = Problem::new(&Whole, from.t, momentum).unwrap();
+        let mut b =
+            GaussStepper::new(&problem, stages, h, StepperOptions { action: true, ..StepperOptions::default() })
+                .unwrap();
         assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
         // Newton's methods stop within the round-off of q/h. Neighbouring motions diverge by at most a factor of ten
         // over the time of 2, and W has a condition number of about ten.

@@ -3,9 +3,9 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, QuadraticInZ, System};
-use contact_geom::{Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives, legendre};
+use contact_geom::{Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives};
 use criterion::{Criterion, criterion_group, criterion_main};
-use discrete_herglotz::{Stepper, gauss::Gauss};
+use discrete_herglotz::{Problem, Stepper, StepperOptions, gauss::GaussStepper};
 use std::hint::black_box;
 
 /// The number of steps in a sample: few, so that the motion stays near its start.
@@ -31,12 +31,12 @@ fn measure<L: Lagrangian<N>, const N: usize>(
     start: &VelocityPoint<N>,
     (stages, h): (usize, f64),
 ) {
-    let Ok(gauss) = Gauss::new(lagrangian, stages, h) else { return };
-    let state = legendre(lagrangian, 0.0, start);
+    let Ok(problem) = Problem::new(lagrangian, 0.0, *start) else { return };
+    let options = StepperOptions { action: true, ..StepperOptions::default() };
     let mut group = c.benchmark_group(format!("{group}_gauss_{stages}"));
     group.bench_function(name, |b| {
         b.iter_batched_ref(
-            || gauss.stepper(0.0, state, start.v).ok(),
+            || GaussStepper::new(&problem, stages, h, options).ok(),
             |stepper| black_box(stepper.as_mut().map(|s| s.advance(STEPS))),
             criterion::BatchSize::SmallInput,
         );

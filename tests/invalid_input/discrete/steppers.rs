@@ -2,6 +2,7 @@
 
 use super::{STEPS, starts};
 use crate::InputTest;
+use crate::common::gauss::GaussSteppers;
 use crate::numbers::{Claiming, EXTREME, Everything, Grade, Numbers, Report, fine, grade, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, QuadraticInZ};

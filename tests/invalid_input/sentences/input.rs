@@ -1,6 +1,7 @@
 //! Errors of the input, and the reasons for which an accuracy is not reached.
 
 use super::{pendulum_at, strong};
+use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint};

@@ -1,6 +1,7 @@
 //! Errors of steps, and the status of a run.
 
 use super::{pendulum_at, strong};
+use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::{Explosive, Massless};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler, Pendulum};

@@ -9,7 +9,7 @@ use contact_examples::{Failure, print};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, numbers::max_or_nan};
-use discrete_herglotz::{SplittingScheme, Stepper, gauss::Gauss};
+use discrete_herglotz::{Problem, SplittingScheme, Start, Stepper, StepperOptions, gauss::GaussStepper};
 use std::time::Instant;
 
 const CASE: &str = "solar";
@@ -95,9 +95,9 @@ fn collocation(stages: usize, days: f64, steps: usize) -> Result<(Vec<f64>, f64)
     let (q, v) = (OuterSolarSystem::positions(BODIES), OuterSolarSystem::velocities(BODIES));
     let p = SVector::<f64, N>::from_fn(|d, _| bodies.masses()[d] * v[d]);
     let (start, v) = (PhasePoint { q: SVector::from_column_slice(&q), p, z: 0.0 }, SVector::from_column_slice(&v));
-    let gauss = Gauss::new::<N>(bodies, stages, days / steps as f64)?;
+    let problem = Problem::new(&bodies, 0.0, Start::Momentum(start, v))?;
     best_of_two(|| {
-        let mut motion = gauss.stepper_without_action(0.0, start, v)?;
+        let mut motion = GaussStepper::new(&problem, stages, days / steps as f64, StepperOptions::default())?;
         let clock = Instant::now();
         motion.advance(steps).map_err(|failure| Failure::Step(failure.cause))?;
         Ok((motion.state().q.as_slice().to_vec(), clock.elapsed().as_secs_f64()))

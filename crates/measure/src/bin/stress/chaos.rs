@@ -11,7 +11,8 @@ use contact_geom::{
     ChartVector, PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
 };
-use discrete_herglotz::{AnyIntegrator, InputError, Rows, Run, Stepper, Steps, gauss::Gauss, rules::Flow};
+use discrete_herglotz::gauss::{Gauss, GaussStepper};
+use discrete_herglotz::{AnyIntegrator, InputError, Rows, Run, Stepper, StepperOptions, Steps, rules::Flow};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
 fn chaotic(gamma: f64) -> Formula<2> {
@@ -203,7 +204,9 @@ fn lanes(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
         let start = VelocityPoint::new([0.3, -0.2], [0.9, 1.1], 0.1);
         let problem = Problem { system, t0: 0.0, start, span: 1.0 };
         let gauss = Gauss::new(&system, stages, H)?;
-        let mut fast = gauss.stepper(0.0, problem.state(), start.v)?;
+        let motion = problem.motion()?;
+        let options = StepperOptions { action: true, ..StepperOptions::default() };
+        let mut fast = GaussStepper::new(&motion, stages, H, options)?;
         let mut plain = Flow::with_guess(&gauss, 0.0, problem.state(), start.v)?;
         let ended = fast.advance(8).is_err() || Stepper::advance(&mut plain, 8).is_err();
         let (a, b) = (ChartVector::from(Stepper::state(&fast)), ChartVector::from(Stepper::state(&plain)));

@@ -8,8 +8,8 @@ use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::systems::{HarmonicOscillator, LaneEmden, Radial};
-use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, legendre, numbers::max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Stepper, gauss::Gauss, rules::Method};
+use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, numbers::max_or_nan};
+use discrete_herglotz::{AnyIntegrator, Stepper, gauss::TransformedStepper, rules::Method};
 use exact_lagrangian::ContactExponential;
 use std::f64::consts::{PI, TAU};
 
@@ -129,9 +129,9 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
             number(end.error(&exact, 0.0)),
         ]);
 
-        let gauss = Gauss::new(&system, 8, 0.1)?;
+        let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
         let clock = Radial { exponent: 1.5 };
-        let mut stepper = gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
+        let mut stepper = TransformedStepper::new(&motion, 8, 0.1, clock)?;
         let end = if stepper.advance_to(TAU).is_ok() { RunEnd::Completed(stepper.state()) } else { RunEnd::Panicked };
         let error = end.error(&exact, 0.0);
         table.add("orbit", "transformed_gauss_8", e, end.verdict(&exact, 0.0, ORDER_ONE), error);

@@ -3,8 +3,10 @@
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
 use contact_geom::systems::Radial;
-use contact_geom::{VelocityPoint, legendre, numbers::max_abs_or_nan};
-use discrete_herglotz::{AnyIntegrator, InputError, Rows, Status, Stepper, Steps, gauss::Gauss, rules::Method};
+use contact_geom::{VelocityPoint, numbers::max_abs_or_nan};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Rows, Status, Stepper, Steps, gauss::TransformedStepper, rules::Method,
+};
 use exact_lagrangian::herglotz_flow;
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -163,9 +165,9 @@ fn standing_clock() -> String {
     let system = Formula::<2>::kepler(0.0);
     let start = VelocityPoint::new([1e-200, 0.0], [0.0, 1e100], 0.0);
     let ended = || -> Result<String, InputError> {
-        let gauss = Gauss::new(&system, 8, 0.1)?;
+        let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
         let clock = Radial { exponent: 1.5 };
-        let mut run = gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
+        let mut run = TransformedStepper::new(&motion, 8, 0.1, clock)?;
         Ok(match run.advance_to(1.0) {
             Ok(()) => format!("completed q = {:e}", Stepper::state(&run).q[0]),
             Err(failure) => format!("halted: {}", failure.cause),

@@ -15,10 +15,12 @@ use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Radial;
 use contact_geom::{
-    PhasePoint, Structure, VelocityPoint, legendre,
+    PhasePoint, Structure, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
 };
-use discrete_herglotz::{AnyIntegrator, InputError, SplittingScheme, Stepper, Steps, gauss::Gauss, rules::Method};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, SplittingScheme, Stepper, Steps, gauss::TransformedStepper, rules::Method,
+};
 
 /// The number of members of an ensemble.
 const MEMBERS: usize = 64;
@@ -290,10 +292,9 @@ impl Ensemble {
                 };
                 match self.way {
                     Way::TransformedGauss(stages) => {
-                        let gauss = Gauss::new(&system, stages, self.h)?;
+                        let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
                         let clock = Radial { exponent: 1.5 };
-                        let mut stepper =
-                            gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
+                        let mut stepper = TransformedStepper::new(&motion, stages, self.h, clock)?;
                         Ok(walk(&mut stepper))
                     }
                     Way::By(_) | Way::General(_) | Way::ActionDriven(_) => {

@@ -10,8 +10,8 @@ use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{ChartVector, PhasePoint, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Stepper, Steps,
-    gauss::Gauss,
+    AnyIntegrator, InputError, Start, Stepper, StepperOptions, Steps,
+    gauss::GaussStepper,
     rules::{Flow, Midpoint, Trapezoidal},
     solve::Solver,
 };
@@ -67,12 +67,13 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
         let state = PhasePoint::new([0.5], [0.4], 0.1);
         for guess in [0.0, 0.3, 0.999, 1.0, -5.0, 1e3, 1e10, 1e160, f64::MAX, f64::INFINITY, f64::NAN] {
             let (midpoint, trapezoidal) = (Midpoint::new(&system, 0.25)?, Trapezoidal::new(&system, 0.25)?);
-            let gauss = Gauss::new(&system, 8, 0.25)?;
             let v = SVector::from([guess]);
+            let gauss = discrete_herglotz::Problem::new(&system, 0.0, Start::Momentum(state, v))
+                .and_then(|motion| GaussStepper::new(&motion, 8, 0.25, StepperOptions::default()));
             let found = [
                 ("midpoint", first_step(Flow::with_guess(&midpoint, 0.0, state, v))),
                 ("trapezoidal", first_step(Flow::with_guess(&trapezoidal, 0.0, state, v))),
-                ("gauss_8", first_step(gauss.stepper(0.0, state, v))),
+                ("gauss_8", first_step(gauss)),
             ];
             let start = VelocityPoint { q: state.q, v: SVector::from([velocity(&system, state.p[0])]), z: state.z };
             let problem = Problem { system, t0: 0.0, start, span: 0.25 };
