@@ -1,11 +1,11 @@
 //! Every variant of every error, triggered through the public interface: its message has the value and the remedy.
 
-/// The variants of an error, each with an expression that triggers it and words of its message. A missing variant does
-/// not compile.
+/// The variants of an error, each with an expression that triggers it and words of its message. All variants in the
+/// source of the error must be there.
 macro_rules! every {
-    ($Error:ty { $($variant:pat => $trigger:expr, $words:expr;)* }) => {
-        // Without a wildcard the match is complete.
-        let _: fn(&$Error) = |error| match error { $($variant => (),)* };
+    ($Error:ty, $source:literal { $($variant:pat => $trigger:expr, $words:expr;)* }) => {
+        let found: BTreeSet<String> = [$(name_of_variant(stringify!($variant))),*].into();
+        assert_eq!(found, variants(stringify!($Error), $source));
         $(
             let error: $Error = $trigger;
             assert!(matches!(error, $variant), "not {}: {error:?}", stringify!($variant));
@@ -15,6 +15,22 @@ macro_rules! every {
             }
         )*
     };
+}
+
+/// The name of the variant in a pattern such as `StepError::Singular { .. }`.
+fn name_of_variant(pattern: &str) -> String {
+    let name = pattern.rsplit("::").next().unwrap();
+    name.chars().take_while(|c| c.is_alphanumeric()).collect()
+}
+
+/// The variants of an enum, read from its source, which is formatted by rustfmt.
+fn variants(of: &str, source: &str) -> BTreeSet<String> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(source)).unwrap();
+    let name = of.split('<').next().unwrap();
+    let body = text.split(&format!("\npub enum {name}")).nth(1).unwrap().split("\n}").next().unwrap();
+    let variant =
+        |line: &str| line.strip_prefix("    ")?.starts_with(char::is_uppercase).then(|| name_of_variant(line.trim()));
+    body.lines().filter_map(variant).collect()
 }
 
 #[path = "sentences/input.rs"]
@@ -30,6 +46,8 @@ use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, Symmetry
 use discrete_herglotz::rules::{LeftMidpoint, Method, Rectangle, UnknownMethod};
 use discrete_herglotz::{AnyIntegrator, UnknownIntegrator, UnresolvedStep};
 use exact_lagrangian::{ContactExponential, ExactError, herglotz_flow};
+use std::collections::BTreeSet;
+use std::path::Path;
 
 fn pendulum_at(p: f64) -> PhasePoint<1> {
     PhasePoint::new([0.3], [p], 0.1)
@@ -42,7 +60,7 @@ fn strong() -> LeftMidpoint<FreeParticle> {
 
 #[test]
 fn geometry_errors() {
-    every!(GeometryError {
+    every!(GeometryError, "contact-geom/src/error.rs" {
         GeometryError::WrongSize { .. } => PhasePoint::<2>::from_slices(&[1.0], &[1.0, 2.0], 0.0).unwrap_err(), ["q has 1", "pass 2"];
         GeometryError::NonFinite { .. } => {
             VelocityPoint::<2>::from_slices(&[1.0, 2.0], &[1.0, f64::INFINITY], 0.0).unwrap_err()
@@ -69,7 +87,7 @@ fn geometry_errors() {
 #[test]
 fn exact_errors() {
     let oscillator = HarmonicOscillator { gamma: 0.0 };
-    every!(ExactError<1> {
+    every!(ExactError<1>, "exact-lagrangian/src/error.rs" {
         ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite number", "positive"];
         ExactError::OutsideDomain { .. } => {
             herglotz_flow(&Explosive, 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()

@@ -137,7 +137,7 @@ fn with_events<const N: usize>(
             })
         }
         // The plan has taken all steps and checked the structure.
-        Status::FalseClaim { .. } => ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}")),
+        _ => ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}")),
     }
 }
 

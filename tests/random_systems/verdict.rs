@@ -108,5 +108,6 @@ pub fn exact<const N: usize>(error: &ExactError<N>) -> Verdict {
         ExactError::Unfinished { .. } => Verdict::Ended("unfinished"),
         ExactError::NotConverged { .. } => Verdict::Ended("not converged"),
         ExactError::ConjugatePoint { .. } => Verdict::Ended("conjugate point"),
+        _ => Verdict::Ended("another"),
     }
 }

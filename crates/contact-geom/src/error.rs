@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Invalid input to a geometric formula, reported instead of a result.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum GeometryError {
     /// A slice has the wrong number of entries.
     #[error("{what} has {found} entries where the configuration space has dimension {expected}; pass {expected}")]

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 /// Invalid input, detected before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum InputError {
     /// The step is 0 or not finite, or negative where the direction is given otherwise, as by the end of a run.
     #[error(
@@ -199,6 +200,7 @@ impl InputError {
 
 /// The cause of a step that failed with valid input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum StepError {
     /// Newton's method did not reach round-off.
     #[error("Newton's method left a residual of {residual:e} after {iterations} iterations; take a smaller step")]
@@ -295,6 +297,7 @@ impl From<StepError> for GeometryError {
 
 /// The reason why a requested accuracy is not reached.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum SelectionFailure {
     /// Round-off: shorter steps do not improve the result.
     #[error("round-off of the motion is larger; ask for less")]
@@ -409,6 +412,7 @@ impl std::fmt::Display for UnresolvedStep {
 
 /// How a run ended. The output recorded before the end is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Status {
     /// All steps were taken.
     Completed,

@@ -7,6 +7,7 @@ use thiserror::Error;
 /// The reason why a motion, or the motion between two points, could not be computed. Errors along a motion carry the
 /// state that was reached, so that the computation can be continued from there.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ExactError<const N: usize> {
     /// The input is not acceptable; nothing was computed.
     #[error(transparent)]

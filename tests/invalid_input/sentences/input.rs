@@ -1,5 +1,6 @@
 //! Errors of the input, and the reasons for which an accuracy is not reached.
 
+use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
@@ -14,6 +15,7 @@ use discrete_herglotz::{
     AnyIntegrator, Checkpoint, DiscreteLagrangian, InputError, Integrator, Interrupt, MethodInfo, Problem, ResumeState,
     Rows, SelectionFailure, SplittingScheme, StepError, StepFailure, Stepper, StepperOptions, Steps, Until,
 };
+use std::collections::BTreeSet;
 
 /// Switching functions that are not declared.
 struct Unstated;
@@ -115,7 +117,7 @@ fn input_errors() {
     let in_steps = |steps| problem.steps(steps).plan(Until::Time(5.5)).err().unwrap();
     let kepler = Kepler::<2>::default();
     let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
-    every!(InputError {
+    every!(InputError, "discrete-herglotz/src/error.rs" {
         InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite number and not 0", "positive where the end of the run tells"];
         InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(f64::INFINITY)).err().unwrap(), ["is inf;", "finite and not 0", "negative to go back"];
         InputError::Accuracy { .. } => {
@@ -244,7 +246,7 @@ fn selection_failures() {
             other => panic!("{other:?}"),
         }
     };
-    every!(SelectionFailure {
+    every!(SelectionFailure, "discrete-herglotz/src/error.rs" {
         SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
         SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
         SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];

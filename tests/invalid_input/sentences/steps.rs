@@ -1,5 +1,6 @@
 //! Errors of steps, and the status of a run.
 
+use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::{Explosive, Massless};
@@ -14,6 +15,7 @@ use discrete_herglotz::{
     Stepper, Steps, Stop, Until,
 };
 use exact_lagrangian::ExactLagrangian;
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 /// A Lagrangian that jumps where its velocity passes 1/2, and one whose switching function changes its sign at every
@@ -76,7 +78,7 @@ impl Lagrangian<1> for QuadraticAtFirst {
 fn step_errors() {
     let forward = |ld: &dyn Fn(&mut Solver<1>) -> Option<StepError>| ld(&mut Solver::default()).unwrap();
     let guess = SVector::from([0.5]);
-    every!(StepError {
+    every!(StepError, "discrete-herglotz/src/error.rs" {
         StepError::NotConverged { .. } => {
             let gauss = Gauss::new(Pendulum { gamma: 0.0 }, 2, 50.0).unwrap();
             let mut stepper = gauss.stepper(0.0, pendulum_at(0.5), guess).unwrap().without_newton();
@@ -147,7 +149,7 @@ fn statuses() {
     let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
     let run = || problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let blows_up = Problem::new(&explosive, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
-    every!(Status {
+    every!(Status, "discrete-herglotz/src/error.rs" {
         Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
         Status::Stopped { .. } => {
             let mut fourth = |at: &StepView<'_, 1>| match at.k {

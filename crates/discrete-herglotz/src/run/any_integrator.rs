@@ -14,6 +14,7 @@ use thiserror::Error;
 
 /// Any integrator of this crate, selected by name at run time. A program that uses this type compiles all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum AnyIntegrator {
     /// The flow of a discrete Lagrangian, each step by Newton's method; for [`Method::Strang`] by the splitting of this
     /// name, which has the same flow.

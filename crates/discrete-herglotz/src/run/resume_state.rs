@@ -13,6 +13,7 @@ const VERSION: u64 = 3;
 
 /// The reason why a file cannot be used as a checkpoint.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CheckpointError {
     /// The file cannot be read.
     #[error("the checkpoint cannot be read: {0}")]

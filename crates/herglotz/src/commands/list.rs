@@ -32,6 +32,7 @@ fn kind(integrator: AnyIntegrator) -> &'static str {
         AnyIntegrator::TransformedGauss { .. } => "contact Gauss collocation, in equal steps of a time transformation",
         AnyIntegrator::Splitting(_) => "a splitting with exact rate, for v.Mv/2 - V(t, q) + f(z)",
         AnyIntegrator::Composition(..) => "a composition of a symmetric discrete Lagrangian",
+        _ => "",
     }
 }
 

@@ -62,7 +62,7 @@ fn words(ending: &Ending) -> (&'static str, String) {
         Status::Completed => ("completed", why),
         status @ Status::Stopped { .. } => ("stopped", status.to_string()),
         status @ Status::FalseClaim { .. } => ("unreliable", status.to_string()),
-        status @ Status::Failed { .. } => ("failed", status.to_string()),
+        status => ("failed", status.to_string()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use assembled_herglotz::AssemblyError;
 use contact_geom::GeometryError;
-use discrete_herglotz::{CheckpointError, InputError, StepError, ensemble::EnsembleError};
+use discrete_herglotz::{CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError};
 use formula_lagrangian::FormulaError;
 use thiserror::Error;
 
@@ -13,6 +13,9 @@ pub enum RuntimeError {
     /// A formula, a column or the function of an event.
     #[error(transparent)]
     Formula(#[from] FormulaError),
+    /// A name that belongs to no integrator.
+    #[error(transparent)]
+    UnknownIntegrator(#[from] UnknownIntegrator),
     /// The start, the span, the integrator or the steps.
     #[error("{}", in_words(.0))]
     Input(#[from] InputError),

@@ -39,8 +39,11 @@ pub(crate) struct Converged<const N: usize> {
 /// The end of a search without two runs that agree.
 pub(crate) enum Ended {
     Refused(InputError),
-    /// Another integrator is less expensive; only searches that test this end here.
-    SwitchReason(SwitchReason),
+    /// Another integrator is less expensive; `otherwise` is the error if no other one is taken.
+    Switch {
+        reason: SwitchReason,
+        otherwise: InputError,
+    },
 }
 
 impl From<InputError> for Ended {
@@ -51,8 +54,9 @@ impl From<InputError> for Ended {
 
 impl From<Ended> for InputError {
     fn from(ended: Ended) -> Self {
-        // The other variant occurs only in searches that test for it.
-        if let Ended::Refused(refused) = ended { refused } else { InputError::NoIntegrator }
+        match ended {
+            Ended::Refused(refused) | Ended::Switch { otherwise: refused, .. } => refused,
+        }
     }
 }
 
@@ -98,8 +102,8 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
     goal: f64,
     compared: Compared,
 ) -> Result<Converged<N>, Ended> {
-    let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause }.into());
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
+    let failed = |reached, cause| InputError::Accuracy { wanted, reached, cause };
     let s = stages as f64;
     let grid_of = |k: usize| match compared {
         Compared::Steps => ComparisonGrid::of(k),
@@ -144,18 +148,17 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
                     tracks.push(track);
                     continue;
                 }
-                TrialEnd::SwitchReason(reason) => return Err(Ended::SwitchReason(reason)),
+                TrialEnd::SwitchReason(reason) => {
+                    return Err(Ended::Switch { reason, otherwise: failed(nearest, SelectionFailure::Budget) });
+                }
                 TrialEnd::Interrupted => return Err(InputError::Interrupted.into()),
                 TrialEnd::Exhausted => {
                     let is_specific = matches!(
                         cause,
                         SelectionFailure::DefectBetweenNodes { .. } | SelectionFailure::FeatureAtNodes { .. }
                     );
-                    return refuse(
-                        wanted,
-                        nearest,
-                        if nearest.is_finite() && !is_specific { SelectionFailure::Budget } else { cause },
-                    );
+                    let cause = if nearest.is_finite() && !is_specific { SelectionFailure::Budget } else { cause };
+                    return Err(failed(nearest, cause).into());
                 }
                 TrialEnd::Narrow { part } => {
                     narrow_features += 1;
@@ -170,7 +173,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
             let same = (part - failures.1).abs() <= MAX_DISTANCE_OF_ONE_TIME && k > LONG_SEARCH_STEPS;
             (failures, cause) = ((if same { failures.0 + 1 } else { 1 }, part), failure);
             if trials.tests_uneven_steps && k >= MIN_RATIO_FOR_DIVISION * first {
-                return Err(Ended::SwitchReason(SwitchReason::Divided));
+                return Err(Ended::Switch { reason: SwitchReason::Divided, otherwise: failed(nearest, failure) });
             }
             if failures.0 == MAX_FAILURES_AT_ONE_TIME {
                 break 'search;
@@ -243,7 +246,7 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
         known = Some(fine.clone());
         k *= 2;
     }
-    refuse(wanted, nearest, cause)
+    Err(failed(nearest, cause).into())
 }
 
 /// The distance between the end of a run with k + 1 steps and that of two runs that agree, if it is too large. The

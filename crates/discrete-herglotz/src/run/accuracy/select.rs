@@ -98,12 +98,12 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
     trials.tests_uneven_steps = divides;
     let mut found = by_equal_steps(trials, &gauss(stages), stages);
     trials.tests_newton_steps = false;
-    if let Err(Ended::SwitchReason(SwitchReason::FewerStages)) = found {
+    if let Err(Ended::Switch { reason: SwitchReason::FewerStages, .. }) = found {
         stages = DEFAULT_STAGES;
         found = by_equal_steps(trials, &gauss(stages), stages);
     }
     (trials.tests_transformation, trials.tests_uneven_steps) = (false, false);
-    if let Err(Ended::SwitchReason(SwitchReason::Divided)) = found {
+    if let Err(Ended::Switch { reason: SwitchReason::Divided, .. }) = found {
         match divided_steps(trials) {
             Ok(selection) => return Ok(selection),
             Err(interrupted @ InputError::Interrupted) => return Err(interrupted),
@@ -122,7 +122,7 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
             _ => *refused,
         });
     }
-    let Err(Ended::SwitchReason(SwitchReason::TimeTransformation)) = found else { return Ok(found?) };
+    let Err(Ended::Switch { reason: SwitchReason::TimeTransformation, .. }) = found else { return Ok(found?) };
     // If the search in transformed time fails, equal steps are tried.
     let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss::new(TRANSFORMED_STAGES));
     Ok(in_transformed_time(trials, &transformed, TRANSFORMED_STAGES).or_else(|ended| match ended {

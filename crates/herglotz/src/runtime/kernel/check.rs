@@ -93,10 +93,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
     let plan = super::run::plan(system, motion)?;
     let by = match motion.step_control {
         StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
-        StepControl::Accuracy { by: None, .. } => {
-            let unknown = |_| InputError::NoIntegrator;
-            plan.integrator.name.parse().map_err(unknown)?
-        }
+        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
     };
     let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
     let problem = system.problem_of(motion)?;

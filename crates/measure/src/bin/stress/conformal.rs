@@ -43,6 +43,7 @@ fn factor(integrator: AnyIntegrator) -> f64 {
         | AnyIntegrator::TransformedGauss { .. }
         | AnyIntegrator::Divided(_)
         | AnyIntegrator::Splitting(_) => 2.0 * half,
+        _ => f64::NAN,
     }
 }
 
