@@ -31,6 +31,9 @@ impl Hints {
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
 ///
+/// An implementation needs [`value`](Self::value); [`structure`](Self::structure) makes its motions faster to compute.
+/// All else is optional: closed derivatives (`closed_*`), switching functions, a time transformation.
+///
 /// The motion makes the final value of the action critical, where `zdot = L(t, q, qdot, z)`. With the usual sign
 /// convention a dissipative term is `gamma z` with `gamma < 0`. All derivatives are obtained by evaluating `value` on
 /// dual numbers. A Lagrangian with closed forms may override [`closed_gradient`](Self::closed_gradient), which saves
@@ -59,6 +62,11 @@ pub trait Lagrangian<const N: usize> {
 
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
+
+    /// The declared structure of this Lagrangian; see [`Structure`]. The default makes no claims.
+    fn structure(&self) -> Structure {
+        Structure::default()
+    }
 
     /// The partial derivatives `(L_q, L_v, L_z)` in closed form; `None`, the default, where a closed form is not
     /// provided.
@@ -104,11 +112,6 @@ pub trait Lagrangian<const N: usize> {
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
         self.closed_hessian(t, x).map(|hessian| hessian.vv)
-    }
-
-    /// The declared structure of this Lagrangian; see [`Structure`]. The default makes no claims.
-    fn structure(&self) -> Structure {
-        Structure::default()
     }
 
     /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a
