@@ -94,6 +94,7 @@ impl EnergyMonitor {
     /// Whether a check is due after `taken` steps.
     #[inline]
     pub fn is_due(&self, taken: usize) -> bool {
+        // Early checks report a step that is far too long before much is computed with it.
         let early = matches!(taken, 4 | 16 | 64 | 256);
         (early || taken.is_multiple_of(STEPS_BETWEEN_CHECKS)) && self.can_check(taken)
     }
