@@ -2,13 +2,13 @@
 
 use crate::Potential;
 use crate::blocks::{BLOCK_SIZE, ByBlock, block_count};
-use crate::elements::Elements;
+use crate::elements::{Elements, MAX_ELEMENT_UNKNOWNS};
 use crate::kick::KickFactor;
 use crate::lanes::{LANES, Lanes};
 use crate::potential::vector;
 
-/// Number of groups of [`LANES`] elements in a batch: few enough that their forces stay in the L1 cache, and enough that
-/// several forces on one unknown are summed before they are added to its velocity.
+/// Number of groups of [`LANES`] elements in a batch: few enough that their forces stay in the L1 cache, and enough
+/// that several forces on one unknown are summed before they are added to its velocity.
 const GROUPS_PER_BATCH: usize = 4;
 
 /// Elements with unknowns in one block. All elements are evaluated first; then the forces on each unknown are summed
@@ -45,7 +45,7 @@ impl<const K: usize, const P: usize> Batch<K, P> {
     fn new(elements: &Elements<K, P>, element_indices: &[u32], block: usize, unknowns: usize) -> Self {
         const {
             assert!(
-                (GROUPS_PER_BATCH + 1) * LANES * 32 <= 1 << 16,
+                (GROUPS_PER_BATCH + 1) * LANES * MAX_ELEMENT_UNKNOWNS <= 1 << 16,
                 "an entry has 16 bits, an element up to 32 unknowns"
             )
         };

@@ -4,8 +4,8 @@
 /// 32 KiB, the size of a common L1 data cache.
 pub(crate) const BLOCK_SIZE: usize = 1024;
 
-/// The number of unknowns from which on the blocks are distributed over threads: so many that a step takes long compared
-/// with the start of its tasks.
+/// The number of unknowns from which on the blocks are distributed over threads: so many that a step takes long
+/// compared with the start of its tasks.
 pub(crate) const MIN_PARALLEL_UNKNOWNS: usize = 1 << 17;
 
 /// The number of blocks for the given number of unknowns.

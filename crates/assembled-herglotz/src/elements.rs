@@ -27,6 +27,9 @@ impl<const K: usize, const P: usize> From<([usize; K], [f64; P])> for ElementDat
     }
 }
 
+/// The maximum number of unknowns of an element: the number of bits of [`RunSegment::slots`].
+pub(crate) const MAX_ELEMENT_UNKNOWNS: usize = u32::BITS as usize;
+
 /// The minimum number of elements of a run; fewer do not fill the eight lanes in which elements are evaluated.
 const MIN_RUN_LENGTH: usize = 8;
 
@@ -89,7 +92,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         unknowns: usize,
         elements: impl IntoIterator<Item = impl Into<ElementData<K, P>>>,
     ) -> Result<Self, AssemblyError> {
-        const { assert!(K >= 1 && K <= 32, "a local term has from 1 to 32 unknowns") };
+        const { assert!(K >= 1 && K <= MAX_ELEMENT_UNKNOWNS, "a local term has from 1 to 32 unknowns") };
         let mut found = Elements {
             runs: Vec::new(),
             run_parameters: std::array::from_fn(|_| Vec::new()),

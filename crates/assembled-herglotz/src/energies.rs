@@ -5,8 +5,8 @@
 pub(crate) enum EnergyKind {
     /// `E_L = v.L_v - L`. Divided by the conformal factor it is constant, if the system does not depend on time.
     Lagrangian,
-    /// `T + V`, whose rate of change is `2 gamma T`: it does not grow while the drag dissipates, if V does not depend on
-    /// time. It is used if the action is not computed, and if gamma depends on time.
+    /// `T + V`, whose rate of change is `2 gamma T`: it does not grow while the drag dissipates, if V does not depend
+    /// on time. It is used if the action is not computed, and if gamma depends on time.
     Mechanical,
 }
 

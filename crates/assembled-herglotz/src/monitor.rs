@@ -60,7 +60,7 @@ impl EnergyMonitor {
         StepInfo { h, log_sigma, order }: StepInfo,
         energies: impl FnOnce(EnergyKind) -> Energies,
     ) -> Self {
-        let general = !system.locals.is_empty();
+        let general = !system.general_terms.is_empty();
         let (kind, defect) = match &system.drag {
             _ if general => (Some(EnergyKind::Lagrangian), 0.0),
             Drag::Constant(gamma) => {
@@ -128,8 +128,8 @@ impl EnergyMonitor {
         let rounding = |sigma: f64| f64::EPSILON * (kinetic + terms + start_terms * sigma);
         self.checked_at = taken;
         let Some(defect) = drift.defect(&sample, rounding) else { return };
-        // The test for dependence on time uses the times of the steps, or `MAX_TEST_TIMES` equidistant times if there are more
-        // steps.
+        // The test for dependence on time uses the times of the steps, or `MAX_TEST_TIMES` equidistant times if there
+        // are more steps.
         let span = t - self.t0;
         let times = taken.min(MAX_TEST_TIMES);
         let steady = (0..times).all(|i| {

@@ -4,7 +4,7 @@ use crate::Potential;
 use crate::batch::{Batch, batches};
 use crate::blocks::{BLOCK_SIZE, ByBlock};
 use crate::drag::{NO_DRIFT, apply_drift};
-use crate::elements::{Elements, Run, RunSegment};
+use crate::elements::{Elements, MAX_ELEMENT_UNKNOWNS, Run, RunSegment};
 use crate::gather;
 use crate::hessian::{add_hessian, add_hessian_product};
 use crate::implicit::LowerPattern;
@@ -75,7 +75,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Poten
         v: &mut [f64],
         following: Option<FollowingDrift>,
     ) -> bool {
-        let all = if K == 32 { u32::MAX } else { (1 << K) - 1 };
+        let all = if K == MAX_ELEMENT_UNKNOWNS { u32::MAX } else { (1 << K) - 1 };
         let (segments, batches) = (self.elements.segments.in_block(block), self.batches.in_block(block));
         let run_of = |segment: &RunSegment| self.elements.runs.get(segment.run as usize);
         if let ([segment], [], KickFactor::Uniform(w), Some(following)) = (segments, batches, factor, following)

@@ -23,10 +23,10 @@ const STEPS_BETWEEN_FINITE_CHECKS: usize = 256;
 /// which is computed by a Gauss formula of order 12 along each drift. The map is that of
 /// [`Splitting`](discrete_herglotz::splitting::Splitting) on a small system.
 ///
-/// A kick and the drift after it are applied in one pass over memory, block by block: the forces of a block are evaluated, and its
-/// velocities and positions are updated, while it is in the L1 cache. The new positions go to a second vector, so that
-/// blocks are independent. Large systems are distributed over threads, and the results are bitwise equal for any number
-/// of them.
+/// A kick and the drift after it are applied in one pass over memory, block by block: the forces of a block are
+/// evaluated, and its velocities and positions are updated, while it is in the L1 cache. The new positions go to a
+/// second vector, so that blocks are independent. Large systems are distributed over threads, and the results are
+/// bitwise equal for any number of them.
 ///
 /// The last kick of a step and the first of the next are merged. A requested state is completed on a copy, so that the
 /// results do not depend on how many steps are taken at once.
@@ -116,12 +116,12 @@ impl<'a> AssembledSplitting<'a> {
         let mut force = vec![0.0; BLOCK_SIZE.min(n)];
         for block in 0..block_count(n) {
             let from = block * BLOCK_SIZE;
-            let here = BLOCK_SIZE.min(n - from);
+            let len = BLOCK_SIZE.min(n - from);
             force.fill(0.0);
             for list in &system.potentials {
-                list.kick(block, start.t, &splitting.q, KickFactor::Uniform(1.0), &mut force[..here], None);
+                list.kick(block, start.t, &splitting.q, KickFactor::Uniform(1.0), &mut force[..len], None);
             }
-            if let Some(i) = force[..here].iter().position(|f| !f.is_finite()) {
+            if let Some(i) = force[..len].iter().position(|f| !f.is_finite()) {
                 return Err(AssemblyError::Undefined { unknown: from + i });
             }
         }
@@ -147,8 +147,8 @@ impl<'a> AssembledSplitting<'a> {
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let mut taken = 0;
         while taken < steps {
-            let some = STEPS_BETWEEN_FINITE_CHECKS.min(steps - taken);
-            for _ in 0..some {
+            let to_check = STEPS_BETWEEN_FINITE_CHECKS.min(steps - taken);
+            for _ in 0..to_check {
                 self.step();
                 if self.monitor.is_due(self.taken) {
                     self.check_energy();
@@ -158,7 +158,7 @@ impl<'a> AssembledSplitting<'a> {
             if !(self.v.iter().sum::<f64>() + self.z).is_finite() {
                 return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
-            taken += some;
+            taken += to_check;
         }
         Ok(())
     }

@@ -45,7 +45,7 @@ pub struct AssembledSystem {
     pub(crate) masses: Masses,
     pub(crate) drag: Drag,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
-    pub(crate) locals: Vec<Box<dyn LocalTermList>>,
+    pub(crate) general_terms: Vec<Box<dyn LocalTermList>>,
 }
 
 /// Where the masses of a system come from.
@@ -89,7 +89,7 @@ impl AssembledSystem {
             masses: Masses::Same(0.0),
             drag: Drag::Constant(0.0),
             potentials: Vec::new(),
-            locals: Vec::new(),
+            general_terms: Vec::new(),
         })
     }
 
@@ -159,13 +159,13 @@ impl AssembledSystem {
         V: LocalLagrangian<K, P>,
     {
         let elements = Elements::new(self.lists(), self.unknowns, elements)?;
-        self.locals.push(Box::new(LocalTermElements::new(term, elements)));
+        self.general_terms.push(Box::new(LocalTermElements::new(term, elements)));
         Ok(self)
     }
 
     /// The number of lists of elements so far.
     fn lists(&self) -> usize {
-        self.potentials.len() + self.locals.len()
+        self.potentials.len() + self.general_terms.len()
     }
 
     /// The number of unknowns.
@@ -210,12 +210,12 @@ impl AssembledSystem {
         for (i, (p, v)) in v.iter_mut().zip(velocities).enumerate() {
             *p = self.mass(i) * v;
         }
-        if value == LagrangianValue::Needed || !self.locals.is_empty() {
+        if value == LagrangianValue::Needed || !self.general_terms.is_empty() {
             let velocities = at.v.iter().skip(1);
             let twice_kinetic: f64 = v.iter().zip(velocities).map(|(p, v)| p * v).sum();
             *l = 0.5 * twice_kinetic - self.potential(at.t, at.q) + *z * at.z;
         }
-        for list in &self.locals {
+        for list in &self.general_terms {
             list.add_first(at, sums);
         }
     }
@@ -231,8 +231,8 @@ impl AssembledSystem {
         self.potentials.iter().map(|list| list.energy(block, blocks, t, q)).sum()
     }
 
-    /// The energies of a system without general terms at padded positions. For large systems the sum is distributed over
-    /// threads as steps are, so that its last bits depend on their number.
+    /// The energies of a system without general terms at padded positions. For large systems the sum is distributed
+    /// over threads as steps are, so that its last bits depend on their number.
     pub(crate) fn energies(&self, (t, q, v, z): (f64, &[f64], &[f64], f64), kind: EnergyKind) -> Energies {
         let kinetic = 0.5
             * match &self.masses {
@@ -262,13 +262,13 @@ impl AssembledSystem {
 
     /// The action of a state; 0 if the state has none and L does not depend on it.
     pub(crate) fn action(&self, state: State) -> Result<f64, AssemblyError> {
-        let independent = self.locals.is_empty() && self.rate(state.t) == 0.0;
+        let independent = self.general_terms.is_empty() && self.rate(state.t) == 0.0;
         state.z.or(independent.then_some(0.0)).ok_or(AssemblyError::NoAction)
     }
 
     /// Checks that there are no general terms.
     pub(crate) fn check_separable(&self) -> Result<(), AssemblyError> {
-        if self.locals.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
+        if self.general_terms.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
     }
 
     /// Checks that each unknown has a mass; 0 is accepted if general terms may contribute the mass.

@@ -3,8 +3,8 @@
 use std::fmt::{Display, Formatter};
 use thiserror::Error;
 
-/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian). Their number is a constant of
-/// the type, and programs that read formulas compile an integrator for each.
+/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian). Their number is a constant
+/// of the type, and programs that read formulas compile an integrator for each.
 pub const MOST_COORDINATES: usize = 16;
 
 /// Invalid input to a formula.

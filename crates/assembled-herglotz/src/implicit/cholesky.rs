@@ -29,7 +29,8 @@ impl CholeskyFactors {
     /// anything of that size is allocated.
     pub fn new(pattern: LowerPattern, limit: usize) -> Result<Self, AssemblyError> {
         let n = pattern.unknowns();
-        // faer fails here only for lack of memory; then the size of the pattern is reported, of 4 bytes for each row index.
+        // faer fails here only for lack of memory; then the size of the pattern is reported, of 4 bytes for each row
+        // index.
         let pattern_bytes = 4 * pattern.rows.len();
         let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
         let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);

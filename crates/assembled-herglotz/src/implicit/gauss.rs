@@ -88,7 +88,7 @@ impl<'a> AssembledGauss<'a> {
             return Err(InputError::Step { h }.into());
         }
         start.check(system)?;
-        let general = !system.locals.is_empty();
+        let general = !system.general_terms.is_empty();
         if general && start.z.is_none() {
             return Err(AssemblyError::NoAction);
         }
@@ -309,8 +309,9 @@ impl<'a> AssembledGauss<'a> {
         if self.has_action && border.is_none() {
             // L is affine in z: its stages were evaluated at the action of the start, and are corrected here by the
             // actions of the stages.
-            let of = |f: fn(&FirstDerivatives) -> f64| std::array::from_fn(|j| derivatives.get(j).map_or(0.0, f));
-            let actions = table.actions(of(|l| l.z), of(|l| l.l));
+            let stage_values =
+                |f: fn(&FirstDerivatives) -> f64| std::array::from_fn(|j| derivatives.get(j).map_or(0.0, f));
+            let actions = table.actions(stage_values(|l| l.z), stage_values(|l| l.l));
             derivatives.iter_mut().zip(actions).for_each(|(stage, action)| stage.l += stage.z * action);
         }
         let stages = || derivatives.iter().zip(*b).zip(stage_rho);

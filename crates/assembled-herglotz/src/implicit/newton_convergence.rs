@@ -53,8 +53,8 @@ impl NewtonConvergence {
                 return NewtonDecision::Converged;
             }
             // The number of further iterations at this rate.
-            let left = (round_off / correction).ln() / rate.min(1.0).ln();
-            if left.is_nan() || left > MAX_EXPECTED_ITERATIONS {
+            let remaining = (round_off / correction).ln() / rate.min(1.0).ln();
+            if remaining.is_nan() || remaining > MAX_EXPECTED_ITERATIONS {
                 decision = NewtonDecision::Refactorise;
             }
         }

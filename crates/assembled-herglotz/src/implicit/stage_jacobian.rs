@@ -13,7 +13,7 @@ pub(crate) struct StageJacobian {
     /// The indices of the second derivatives of the potentials in `lower`, and of those of the general terms in
     /// `second`.
     potentials: Vec<Vec<u32>>,
-    locals: Vec<Vec<u32>>,
+    general_terms: Vec<Vec<u32>>,
     lower: Vec<f64>,
     second: SecondDerivatives,
 }
@@ -27,17 +27,18 @@ impl StageJacobian {
         let n = system.unknowns();
         let triangle = LowerPattern::new(n, |f| {
             system.potentials.iter().for_each(|list| list.visit(f));
-            system.locals.iter().for_each(|list| list.visit(f));
+            system.general_terms.iter().for_each(|list| list.visit(f));
         })?;
         let pattern = FullPattern::new(&triangle)?;
         let potentials = system.potentials.iter().map(|list| list.entry_indices(&triangle)).collect();
-        let locals: Vec<Vec<u32>> = system.locals.iter().map(|list| list.entry_indices(&pattern)).collect();
-        let second = if locals.is_empty() {
+        let general_terms: Vec<Vec<u32>> =
+            system.general_terms.iter().map(|list| list.entry_indices(&pattern)).collect();
+        let second = if general_terms.is_empty() {
             SecondDerivatives::default()
         } else {
             SecondDerivatives::zeros(n, pattern.rows.len())
         };
-        Ok(StageJacobian { potentials, locals, lower: vec![0.0; triangle.rows.len()], second, pattern })
+        Ok(StageJacobian { potentials, general_terms, lower: vec![0.0; triangle.rows.len()], second, pattern })
     }
 
     /// Evaluates the second derivatives at a point.
@@ -47,7 +48,7 @@ impl StageJacobian {
             list.add_hessian(at.t, at.q, -1.0, indices, &mut self.lower);
         }
         self.second.clear();
-        for (list, indices) in system.locals.iter().zip(&self.locals) {
+        for (list, indices) in system.general_terms.iter().zip(&self.general_terms) {
             list.add_second(at, indices, &mut self.second);
         }
     }
@@ -81,9 +82,9 @@ impl StageJacobian {
         border: Option<&mut Border>,
     ) {
         self.evaluate(system, at);
-        let StageJacobian { pattern, lower, second, locals, .. } = self;
+        let StageJacobian { pattern, lower, second, general_terms, .. } = self;
         let (s, a) = (table.s, &table.a);
-        let general = !locals.is_empty();
+        let general = !general_terms.is_empty();
         for (column, range) in pattern.columns() {
             let (begin, width) = (range.start * s * s, range.len() * s);
             for (offset, e) in range.enumerate() {
