@@ -2,27 +2,28 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// The number of doubles in a cache line, and in the widest vector register.
-const LINE: usize = 8;
+/// The number of doubles in a cache line of 64 bytes, which is also the number in the widest vector register (AVX-512).
+const DOUBLES_PER_CACHE_LINE: usize = 8;
 
 /// A vector in which a given component lies at the beginning of a cache line. Vector registers that are loaded or
 /// stored one after the other from there on do not straddle two cache lines.
 #[derive(Debug)]
-pub(crate) struct Aligned {
-    all: Vec<f64>,
+pub(crate) struct AlignedVector {
+    storage: Vec<f64>,
     begin: usize,
     len: usize,
 }
 
-impl Aligned {
+impl AlignedVector {
     /// Zeros, with the component `first` at the beginning of a cache line.
     pub fn zeros(len: usize, first: usize) -> Self {
-        let all = vec![0.0; len + 2 * LINE];
+        const LINE: usize = DOUBLES_PER_CACHE_LINE;
+        let storage = vec![0.0; len + 2 * LINE];
         // The component `first` is placed at the next cache line, whose distance `align_offset` gives. Where
         // `align_offset` cannot compute it, the vector is not aligned, which costs only time.
-        let offset = all.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
+        let offset = storage.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
         let begin = (offset + LINE - first % LINE) % LINE;
-        Aligned { all, begin, len }
+        AlignedVector { storage, begin, len }
     }
 
     /// A copy of a slice with its first component at the beginning of a cache line.
@@ -34,7 +35,7 @@ impl Aligned {
 
     /// The unknowns, padded with one fixed component at each end; the first unknown is at the beginning of a cache
     /// line.
-    pub fn between_fixed(x: &[f64]) -> Self {
+    pub fn padded(x: &[f64]) -> Self {
         let mut aligned = Self::zeros(x.len() + 2, 1);
         if let Some(inner) = aligned.get_mut(1..=x.len()) {
             inner.copy_from_slice(x);
@@ -43,17 +44,17 @@ impl Aligned {
     }
 }
 
-impl Deref for Aligned {
+impl Deref for AlignedVector {
     type Target = [f64];
     #[inline]
     fn deref(&self) -> &[f64] {
-        &self.all[self.begin..self.begin + self.len]
+        &self.storage[self.begin..self.begin + self.len]
     }
 }
 
-impl DerefMut for Aligned {
+impl DerefMut for AlignedVector {
     #[inline]
     fn deref_mut(&mut self) -> &mut [f64] {
-        &mut self.all[self.begin..self.begin + self.len]
+        &mut self.storage[self.begin..self.begin + self.len]
     }
 }

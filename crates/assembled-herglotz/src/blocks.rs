@@ -1,11 +1,16 @@
 //! Blocks of unknowns of a fixed size: the unit for the cache and for the distribution over threads.
 
-/// The number of unknowns in a block. Positions, velocities and forces of a block fit into the L1 cache together.
-pub(crate) const BLOCK: usize = 1024;
+/// The number of unknowns in a block. Positions before and after a drift, velocities and forces of a block together are
+/// 32 KiB, the size of a common L1 data cache.
+pub(crate) const BLOCK_SIZE: usize = 1024;
+
+/// The number of unknowns from which on the blocks are distributed over threads: so many that a step takes long
+/// compared with the start of its tasks.
+pub(crate) const MIN_PARALLEL_UNKNOWNS: usize = 1 << 17;
 
 /// The number of blocks for the given number of unknowns.
-pub(crate) fn count(unknowns: usize) -> usize {
-    unknowns.div_ceil(BLOCK)
+pub(crate) fn block_count(unknowns: usize) -> usize {
+    unknowns.div_ceil(BLOCK_SIZE)
 }
 
 /// Items grouped by block, stored in one vector.
@@ -17,7 +22,7 @@ pub(crate) struct ByBlock<T> {
 }
 
 impl<T> ByBlock<T> {
-    /// Groups items, given in any order with the number of their block. The order within a block is kept.
+    /// Groups items, given in any order with the index of their block. The order within a block is kept.
     pub fn new(blocks: usize, mut items: Vec<(u32, T)>) -> Self {
         items.sort_by_key(|(block, _)| *block);
         let mut ends = vec![0; blocks];
@@ -36,7 +41,7 @@ impl<T> ByBlock<T> {
 
     /// The items of a block.
     #[inline]
-    pub fn of(&self, block: usize) -> &[T] {
+    pub fn in_block(&self, block: usize) -> &[T] {
         let end = self.ends.get(block).copied().unwrap_or(0);
         let from = if block == 0 { 0 } else { self.ends.get(block - 1).copied().unwrap_or(end) };
         self.items.get(from..end).unwrap_or(&[])

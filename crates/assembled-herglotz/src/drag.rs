@@ -1,5 +1,7 @@
 //! The linear drag `gamma(t) z`, and the flow of the kinetic energy with this drag.
 
+use discrete_herglotz::support::Drift;
+
 /// The rate of the drag.
 pub(crate) enum Drag {
     /// A constant rate.
@@ -11,7 +13,7 @@ pub(crate) enum Drag {
 /// The nodes and weights of the Gauss quadrature of order 12 on `[0, 1]`. Its error along a drift is far below that of
 /// any splitting scheme of this library. Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964),
 /// table 25.4.
-const NODES: [[f64; 2]; 6] = {
+const QUADRATURE: [[f64; 2]; 6] = {
     let half = [
         [0.238_619_186_083_196_9, 0.467_913_934_572_691],
         [0.661_209_386_466_264_5, 0.360_761_573_048_138_6],
@@ -37,47 +39,29 @@ impl Drag {
         }
     }
 
-    /// The integral of the rate from t to t + s.
-    fn growth(&self, t: f64, s: f64) -> f64 {
-        match self {
-            Drag::Constant(gamma) => gamma * s,
-            Drag::Timed(rate) => s * NODES.iter().map(|[c, b]| b * rate(t + c * s)).sum::<f64>(),
-        }
-    }
-
     /// The drift from the time t over a time s, which may be negative.
     pub fn drift(&self, t: f64, s: f64) -> Drift {
-        let damping = self.growth(t, s).exp_m1();
-        let length = match self {
-            Drag::Constant(0.0) => s,
-            Drag::Constant(gamma) => damping / gamma,
-            Drag::Timed(_) => s * NODES.iter().map(|[c, b]| b * self.growth(t, c * s).exp()).sum::<f64>(),
+        let rate = match self {
+            Drag::Constant(gamma) => return Drift::constant(*gamma, s),
+            Drag::Timed(rate) => rate,
         };
-        Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
+        // The integral of the rate from t on.
+        let growth = |s: f64| s * QUADRATURE.iter().map(|[c, b]| b * rate(t + c * s)).sum::<f64>();
+        let damping = growth(s).exp_m1();
+        Drift::new(s * QUADRATURE.iter().map(|[c, b]| b * growth(c * s).exp()).sum::<f64>(), damping)
     }
 }
 
-/// The flow of the kinetic energy with drag over a time interval. With g(t) the integral of gamma from the start of the
-/// interval, it is `q += length v` with `length` the integral of `e^g`, `v += damping v` with `damping = e^g - 1` at
-/// the end, and `z += damping z + lift v.Mv`. It is a conformal contact map with the factor `1 + damping`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Drift {
-    pub length: f64,
-    pub damping: f64,
-    pub lift: f64,
-}
+/// The drift over zero time, which is the identity.
+pub(crate) const NO_DRIFT: Drift = Drift { length: 0.0, damping: 0.0, lift: 0.0 };
 
-impl Drift {
-    /// The drift over zero time, which is the identity.
-    pub const NONE: Drift = Drift { length: 0.0, damping: 0.0, lift: 0.0 };
-
-    /// Updates the velocities in place, and writes the positions after the drift to `next`.
-    #[inline(always)]
-    pub fn go(&self, q: &[f64], v: &mut [f64], next: &mut [f64]) {
-        for ((next, q), v) in next.iter_mut().zip(q).zip(v) {
-            *next = fused(self.length, *v, *q);
-            *v = fused(self.damping, *v, *v);
-        }
+/// Applies a drift to the unknowns of a slice: `next = q + length v`, then `v += damping v` in
+/// place.
+#[inline(always)]
+pub(crate) fn apply_drift(drift: &Drift, q: &[f64], v: &mut [f64], next: &mut [f64]) {
+    for ((next, q), v) in next.iter_mut().zip(q).zip(v) {
+        *next = fused(drift.length, *v, *q);
+        *v = fused(drift.damping, *v, *v);
     }
 }
 

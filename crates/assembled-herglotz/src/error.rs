@@ -5,6 +5,7 @@ use thiserror::Error;
 
 /// Invalid input to an assembled system or to one of its integrators, detected before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum AssemblyError {
     /// The number of unknowns is 0 or exceeds the range of the indices.
     #[error("a system of {found} unknowns; it must have from 1 to {most}")]

@@ -4,8 +4,12 @@ use contact_geom::{Scalar, scalar_operators};
 use std::ops::Neg;
 use wide::f64x8;
 
-/// The number of lanes.
+/// The number of lanes: that of the widest vector registers (AVX-512). Narrower ones are used several at a time.
 pub(crate) const LANES: usize = 8;
+
+/// The bound of the arguments that `wide` reduces with its three parts of pi/2 without loss. The first two parts have
+/// 27 and 23 binary digits fewer than a double, so that their products with up to 2^19 quarter turns are exact.
+const MAX_REDUCIBLE_ARGUMENT: f64 = 5e5;
 
 /// Eight numbers that are processed at once, for the same local term of eight elements. The instruction set is that of
 /// the build (`target-cpu`).
@@ -62,14 +66,10 @@ impl Lanes {
 
     /// Whether all lanes are in the range in which the argument reduction of sine and cosine is exact.
     #[inline(always)]
-    fn reducible(self) -> bool {
-        self.0.abs().simd_lt(f64x8::splat(REDUCIBLE)).all()
+    fn are_reducible(self) -> bool {
+        self.0.abs().simd_lt(f64x8::splat(MAX_REDUCIBLE_ARGUMENT)).all()
     }
 }
-
-/// The bound of the arguments that `wide` reduces with its three parts of pi/2 without loss. The first two parts have
-/// 27 and 23 binary digits fewer than a double, so that their products with up to 2^19 quarter turns are exact.
-const REDUCIBLE: f64 = 5e5;
 
 impl From<f64> for Lanes {
     #[inline(always)]
@@ -153,7 +153,7 @@ impl Scalar for Lanes {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        if !self.reducible() {
+        if !self.are_reducible() {
             return (self.each(f64::sin), self.each(f64::cos));
         }
         let (s, c) = self.0.sin_cos();

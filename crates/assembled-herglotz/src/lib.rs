@@ -22,28 +22,35 @@
 mod aligned;
 mod batch;
 mod blocks;
+mod derivatives;
 mod drag;
 mod elements;
+mod energies;
 mod error;
+mod gather;
+mod hessian;
 mod implicit;
-mod kernels;
+mod kick;
+mod kick_drift;
 mod lanes;
-mod local;
+mod local_lagrangian;
+mod local_term_list;
 mod memory;
 mod monitor;
-mod pass;
+mod potential;
+mod potential_list;
 mod splitting;
+mod stages;
 mod system;
 pub mod systems;
-mod term;
 
 pub use elements::{ElementData, FIXED};
 pub use error::AssemblyError;
 pub use implicit::{AssembledGauss, AssembledMidpoint};
-pub use local::LocalLagrangian;
+pub use local_lagrangian::LocalLagrangian;
+pub use potential::{Difference, Potential};
 pub use splitting::AssembledSplitting;
 pub use system::{AssembledSystem, State};
-pub use term::{Difference, Potential};
 
 /// Runs the program of the README as a doctest.
 #[cfg(doctest)]

@@ -1,17 +1,19 @@
 //! Explicit integrators: kicks and drifts.
 
 use crate::AssemblyError;
-use crate::aligned::Aligned;
-use crate::blocks::{self, BLOCK};
-use crate::drag::{Drag, Drift};
-use crate::kernels::Weight;
-use crate::monitor::{EnergyMonitor, Reached, StepFacts};
-use crate::pass::{InverseMasses, Pass, Passed};
-use crate::system::{AssembledSystem, Masses, State};
+use crate::aligned::AlignedVector;
+use crate::blocks::{BLOCK_SIZE, block_count};
+use crate::drag::Drag;
+use crate::kick::KickFactor;
+use crate::kick_drift::{InverseMasses, KickDrift, KickDriftOutput};
+use crate::monitor::{EnergyMonitor, RunProgress, StepInfo};
+use crate::stages::StageTable;
+use crate::system::{AssembledSystem, MassSource, Masses, State};
 use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, UnresolvedStep};
 
-/// The number of steps between two checks that all numbers are finite.
-const LOOK: usize = 256;
+/// The number of steps between two checks that all numbers are finite. Such a check reads all velocities once more; at
+/// this distance it costs less than one per cent of the steps.
+const STEPS_BETWEEN_FINITE_CHECKS: usize = 256;
 
 /// A splitting method for `L = sum m_i v_i^2/2 - V(t, q) + gamma z`.
 ///
@@ -21,32 +23,32 @@ const LOOK: usize = 256;
 /// which is computed by a Gauss formula of order 12 along each drift. The map is that of
 /// [`Splitting`](discrete_herglotz::splitting::Splitting) on a small system.
 ///
-/// A kick and the drift after it are one pass over memory, block by block: the forces of a block are evaluated, and its
-/// velocities and positions are updated, while it is in the L1 cache. The new positions go to a second vector, so that
-/// blocks are independent. Large systems are distributed over threads, and the results are bitwise equal for any number
-/// of them.
+/// A kick and the drift after it are applied in one pass over memory, block by block: the forces of a block are
+/// evaluated, and its velocities and positions are updated, while it is in the L1 cache. The new positions go to a
+/// second vector, so that blocks are independent. Large systems are distributed over threads, and the results are
+/// bitwise equal for any number of them.
 ///
 /// The last kick of a step and the first of the next are merged. A requested state is completed on a copy, so that the
 /// results do not depend on how many steps are taken at once.
 pub struct AssembledSplitting<'a> {
     system: &'a AssembledSystem,
-    table: SubstepTable,
+    table: StageTable,
     h: f64,
     t0: f64,
     taken: usize,
-    /// The padded positions before (`q`) and after (`next`) a pass.
-    q: Aligned,
-    next: Aligned,
-    v: Aligned,
+    /// The padded positions before (`q`) and after (`next`) a stage.
+    q: AlignedVector,
+    next: AlignedVector,
+    v: AlignedVector,
     /// The velocities of a requested state.
-    end: Aligned,
-    /// The rounding errors of compensated sums (`rests`), and those of a requested state (`end_rests`); otherwise
-    /// empty.
-    rests: Rests,
-    end_rests: Rests,
+    end_v: AlignedVector,
+    /// The compensation terms of the positions and velocities, and those of a requested state; empty without
+    /// compensated summation.
+    compensation: CompensationTerms,
+    end_compensation: CompensationTerms,
     inverse_masses: InverseMasses,
     z: f64,
-    action: bool,
+    has_action: bool,
     /// The contribution of each block to the action: its potential energy, and twice its kinetic energy. Empty without
     /// the action.
     energies: Vec<[f64; 2]>,
@@ -55,67 +57,9 @@ pub struct AssembledSplitting<'a> {
 
 /// The accumulated rounding errors of positions and velocities.
 #[derive(Debug, Default)]
-struct Rests {
+struct CompensationTerms {
     q: Vec<f64>,
     v: Vec<f64>,
-}
-
-/// A kick and the drift that follows.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stage {
-    pub kick: f64,
-    pub drift: Drift,
-    /// The length of the drift in time.
-    span: f64,
-    /// The time of the kick, relative to the start of the step.
-    time: f64,
-}
-
-impl Stage {
-    /// The stage in a step that starts at the time t. With a time-dependent drag the drift differs from step to step.
-    fn at(&self, drag: &Drag, t: f64) -> Self {
-        match drag {
-            Drag::Constant(_) => *self,
-            Drag::Timed(_) => Stage { drift: drag.drift(t + self.time, self.span), ..*self },
-        }
-    }
-}
-
-/// The stages of a step.
-struct SubstepTable {
-    first: Vec<Stage>,
-    /// The stages of a later step, whose first kick or drift is merged with the last of the step before.
-    joined: Vec<Stage>,
-    closing: Stage,
-}
-
-impl SubstepTable {
-    fn new(scheme: &SplittingScheme, drag: &Drag, h: f64, t0: f64) -> Self {
-        let (drifts, kicks) = scheme.coefficients();
-        let stages = scheme.stages();
-        let stage = |kick: f64, span: f64, time: f64| {
-            let span = span * h;
-            Stage { kick: kick * h, drift: drag.drift(t0 + time, span), span, time }
-        };
-        let mut time = 0.0;
-        let first: Vec<Stage> = (0..stages)
-            .map(|i| {
-                let stage = stage(kicks[i], drifts[i], time * h);
-                time += drifts[i];
-                stage
-            })
-            .collect();
-        // Only a scheme that begins with a drift ends with one.
-        let (last_kick, last_drift) = (kicks[stages], drifts.get(stages).copied().unwrap_or(0.0));
-        let mut joined = first.clone();
-        // The merged kick precedes the last drift of the step before.
-        joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], -last_drift * h);
-        SubstepTable {
-            first,
-            joined,
-            closing: stage(last_kick, last_drift, if last_drift == 0.0 { h } else { time * h }),
-        }
-    }
 }
 
 impl<'a> AssembledSplitting<'a> {
@@ -137,47 +81,47 @@ impl<'a> AssembledSplitting<'a> {
         }
         start.check(system)?;
         system.check_separable()?;
-        system.check_masses(false)?;
+        system.check_masses(MassSource::Diagonal)?;
         AssembledSystem::check_number("gamma", system.rate(start.t))?;
         let n = system.unknowns();
-        let q = Aligned::between_fixed(start.q);
+        let q = AlignedVector::padded(start.q);
         let inverse_masses = match &system.masses {
             Masses::Same(m) => InverseMasses::Same(1.0 / m),
             Masses::Each(masses) => InverseMasses::Each(masses.iter().map(|m| 1.0 / m).collect()),
         };
         // Splittings have the conformal factor of the flow.
         let log_sigma = system.rate(start.t) * h;
-        let info = StepFacts { h, log_sigma, order: scheme.order() };
-        let monitor = EnergyMonitor::new(system, start, info, |bounded| {
-            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), bounded)
+        let info = StepInfo { h, log_sigma, order: scheme.order() };
+        let monitor = EnergyMonitor::new(system, start, info, |kind| {
+            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), kind)
         });
         let splitting = AssembledSplitting {
             system,
-            table: SubstepTable::new(scheme, &system.drag, h, start.t),
+            table: StageTable::new(scheme, &system.drag, h, start.t),
             h,
             t0: start.t,
             taken: 0,
-            next: Aligned::between_fixed(start.q),
+            next: AlignedVector::padded(start.q),
             q,
-            v: Aligned::from_slice(start.v),
-            end: Aligned::zeros(n, 0),
-            rests: Rests::default(),
-            end_rests: Rests::default(),
+            v: AlignedVector::from_slice(start.v),
+            end_v: AlignedVector::zeros(n, 0),
+            compensation: CompensationTerms::default(),
+            end_compensation: CompensationTerms::default(),
             inverse_masses,
             z: start.z.unwrap_or(0.0),
-            action: start.z.is_some(),
-            energies: vec![[0.0; 2]; if start.z.is_some() { blocks::count(n) } else { 0 }],
+            has_action: start.z.is_some(),
+            energies: vec![[0.0; 2]; if start.z.is_some() { block_count(n) } else { 0 }],
             monitor,
         };
-        let mut force = vec![0.0; BLOCK.min(n)];
-        for block in 0..blocks::count(n) {
-            let from = block * BLOCK;
-            let here = BLOCK.min(n - from);
+        let mut force = vec![0.0; BLOCK_SIZE.min(n)];
+        for block in 0..block_count(n) {
+            let from = block * BLOCK_SIZE;
+            let len = BLOCK_SIZE.min(n - from);
             force.fill(0.0);
             for list in &system.potentials {
-                list.kick(block, start.t, &splitting.q, Weight::Same(1.0), &mut force[..here], None);
+                list.kick(block, start.t, &splitting.q, KickFactor::Uniform(1.0), &mut force[..len], None);
             }
-            if let Some(i) = force[..here].iter().position(|f| !f.is_finite()) {
+            if let Some(i) = force[..len].iter().position(|f| !f.is_finite()) {
                 return Err(AssemblyError::Undefined { unknown: from + i });
             }
         }
@@ -189,8 +133,8 @@ impl<'a> AssembledSplitting<'a> {
     /// There the kick is rounded, which is smaller than the velocity by about the number of stages in a revolution. It
     /// needs four more vectors, and a quarter more time for five bodies.
     pub fn compensated(mut self) -> Self {
-        let rests = || Rests { q: vec![0.0; self.v.len()], v: vec![0.0; self.v.len()] };
-        (self.rests, self.end_rests) = (rests(), rests());
+        let terms = || CompensationTerms { q: vec![0.0; self.v.len()], v: vec![0.0; self.v.len()] };
+        (self.compensation, self.end_compensation) = (terms(), terms());
         self
     }
 
@@ -203,18 +147,18 @@ impl<'a> AssembledSplitting<'a> {
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let mut taken = 0;
         while taken < steps {
-            let some = LOOK.min(steps - taken);
-            for _ in 0..some {
+            let to_check = STEPS_BETWEEN_FINITE_CHECKS.min(steps - taken);
+            for _ in 0..to_check {
                 self.step();
                 if self.monitor.is_due(self.taken) {
-                    self.look();
+                    self.check_energy();
                 }
             }
             // The sum is not finite if one of its terms is not.
             if !(self.v.iter().sum::<f64>() + self.z).is_finite() {
                 return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
-            taken += some;
+            taken += to_check;
         }
         Ok(())
     }
@@ -222,15 +166,15 @@ impl<'a> AssembledSplitting<'a> {
     fn step(&mut self) {
         let t = self.t0 + self.taken as f64 * self.h;
         for i in 0..self.table.first.len() {
-            let table = if self.taken == 0 { &self.table.first } else { &self.table.joined };
+            let table = if self.taken == 0 { &self.table.first } else { &self.table.merged };
             let stage = table[i].at(&self.system.drag, t);
-            let pass =
-                Pass { system: self.system, inverse: &self.inverse_masses, q: &self.q, t: t + stage.time, stage };
+            let (system, inverse_masses) = (self.system, &self.inverse_masses);
+            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: t + stage.time, stage };
             let next = self.next.get_mut(1..=self.v.len()).unwrap_or_default();
-            let Rests { q: q_rest, v: v_rest } = &mut self.rests;
-            pass.run(Passed { v: &mut self.v, next, energies: &mut self.energies, q_rest, v_rest });
-            if self.action {
-                self.z = act(self.z, &stage, &self.energies);
+            let CompensationTerms { q: q_rest, v: v_rest } = &mut self.compensation;
+            kick_drift.run(KickDriftOutput { v: &mut self.v, next, energies: &mut self.energies, q_rest, v_rest });
+            if self.has_action {
+                self.z = stage.action_after(self.z, &self.energies);
             }
             std::mem::swap(&mut self.q, &mut self.next);
         }
@@ -239,12 +183,12 @@ impl<'a> AssembledSplitting<'a> {
 
     /// Checks the energy.
     #[cold]
-    fn look(&mut self) {
+    fn check_energy(&mut self) {
         let (t, z) = self.complete();
         let log_factor = self.system.rate(t) * (t - self.t0);
-        let reached = Reached { t, log_factor, taken: self.taken };
-        let AssembledSplitting { system, next, end, monitor, .. } = self;
-        monitor.look(system, reached, |t, bounded| system.energies((t, next, end, z), bounded));
+        let progress = RunProgress { t, log_factor, taken: self.taken };
+        let AssembledSplitting { system, next, end_v, monitor, .. } = self;
+        monitor.check(system, progress, |t, kind| system.energies((t, next, end_v, z), kind));
     }
 
     /// The first step at which the energy showed that the steps do not resolve the motion, if there is one: results
@@ -255,8 +199,8 @@ impl<'a> AssembledSplitting<'a> {
     /// the check is that `T + V` does not grow while the drag dissipates. The check detects nothing if the potential
     /// depends on time, nor from `T + V` if `gamma h > 0`.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
-        if self.monitor.tells(self.taken) {
-            self.look();
+        if self.monitor.can_check(self.taken) {
+            self.check_energy();
         }
         self.monitor.unresolved()
     }
@@ -265,28 +209,29 @@ impl<'a> AssembledSplitting<'a> {
     pub fn state(&mut self) -> State<'_> {
         let (t, z) = self.complete();
         let n = self.system.unknowns();
-        State { t, q: &self.next[1..=n], v: &self.end, z: self.action.then_some(z) }
+        State { t, q: &self.next[1..=n], v: &self.end_v, z: self.has_action.then_some(z) }
     }
 
-    /// Completes the last step in `next` and `end`, and returns the time and the action.
+    /// Completes the last step in `next` and `end_v`, and returns the time and the action.
     fn complete(&mut self) -> (f64, f64) {
         let n = self.system.unknowns();
         let t = self.t0 + self.taken as f64 * self.h;
-        self.end.copy_from_slice(&self.v);
+        self.end_v.copy_from_slice(&self.v);
         let mut z = self.z;
         if self.taken == 0 {
             self.next.copy_from_slice(&self.q);
         } else {
             let stage = self.table.closing.at(&self.system.drag, t - self.h);
             let time = t - self.h + stage.time;
-            let pass = Pass { system: self.system, inverse: &self.inverse_masses, q: &self.q, t: time, stage };
-            self.end_rests.q.copy_from_slice(&self.rests.q);
-            self.end_rests.v.copy_from_slice(&self.rests.v);
+            let (system, inverse_masses) = (self.system, &self.inverse_masses);
+            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: time, stage };
+            self.end_compensation.q.copy_from_slice(&self.compensation.q);
+            self.end_compensation.v.copy_from_slice(&self.compensation.v);
             let next = self.next.get_mut(1..=n).unwrap_or_default();
-            let Rests { q: q_rest, v: v_rest } = &mut self.end_rests;
-            pass.run(Passed { v: &mut self.end, next, energies: &mut self.energies, q_rest, v_rest });
-            if self.action {
-                z = act(z, &stage, &self.energies);
+            let CompensationTerms { q: q_rest, v: v_rest } = &mut self.end_compensation;
+            kick_drift.run(KickDriftOutput { v: &mut self.end_v, next, energies: &mut self.energies, q_rest, v_rest });
+            if self.has_action {
+                z = stage.action_after(z, &self.energies);
             }
         }
         (t, z)
@@ -303,11 +248,4 @@ impl<'a> AssembledSplitting<'a> {
         let drifts = self.table.first.iter().chain([&self.table.closing]);
         drifts.map(|stage| 1.0 + stage.at(drag, t).drift.damping).product()
     }
-}
-
-/// The action after a stage.
-fn act(z: f64, stage: &Stage, energies: &[[f64; 2]]) -> f64 {
-    let (potential, twice_kinetic) = energies.iter().fold((0.0, 0.0), |(v, k), e| (v + e[0], k + e[1]));
-    let kicked = z - stage.kick * potential;
-    kicked + (stage.drift.damping * kicked + stage.drift.lift * twice_kinetic)
 }

@@ -1,17 +1,18 @@
 //! A system whose Lagrangian is a sum of local terms.
 
-use crate::blocks::{self, BLOCK};
+use crate::blocks::{BLOCK_SIZE, MIN_PARALLEL_UNKNOWNS, block_count};
+use crate::derivatives::{EvaluationPoint, FirstDerivatives};
 use crate::drag::Drag;
 use crate::elements::{ElementData, Elements};
-use crate::kernels::{Kind, PotentialList, Weight};
-use crate::local::{First, LocalKind, LocalList, Place};
-use crate::monitor::Energies;
-use crate::pass::{SHARED, sum_of_squares};
+use crate::energies::{Energies, EnergyKind, sum_of_squares};
+use crate::kick::KickFactor;
+use crate::local_term_list::{LocalTermElements, LocalTermList};
+use crate::potential_list::{PotentialElements, PotentialList};
 use crate::{AssemblyError, LocalLagrangian, Potential};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// The maximum number of unknowns: padded indices have 32 bits, and there is one fixed component at each end.
-const MOST: usize = u32::MAX as usize - 2;
+const MAX_UNKNOWNS: usize = u32::MAX as usize - 2;
 
 /// A system of any size,
 /// `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma(t) z + sum_e l_e(t, q_e, v_e, z; c_e)`.
@@ -44,7 +45,25 @@ pub struct AssembledSystem {
     pub(crate) masses: Masses,
     pub(crate) drag: Drag,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
-    pub(crate) locals: Vec<Box<dyn LocalList>>,
+    pub(crate) general_terms: Vec<Box<dyn LocalTermList>>,
+}
+
+/// Where the masses of a system come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MassSource {
+    /// From the diagonal mass matrix alone.
+    Diagonal,
+    /// General terms may contribute to the mass of an unknown, which may be 0 in the diagonal matrix.
+    WithGeneralTerms,
+}
+
+/// Whether the value of L is needed besides its first derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LagrangianValue {
+    /// It is needed.
+    Needed,
+    /// It is not needed; it is computed only if that costs nothing.
+    NotNeeded,
 }
 
 /// The diagonal of the mass matrix.
@@ -62,15 +81,15 @@ impl AssembledSystem {
     /// # Errors
     /// [`AssemblyError::Unknowns`] if `unknowns` is 0 or exceeds 2^32 - 3.
     pub fn new(unknowns: usize) -> Result<Self, AssemblyError> {
-        if unknowns == 0 || unknowns > MOST {
-            return Err(AssemblyError::Unknowns { found: unknowns, most: MOST });
+        if unknowns == 0 || unknowns > MAX_UNKNOWNS {
+            return Err(AssemblyError::Unknowns { found: unknowns, most: MAX_UNKNOWNS });
         }
         Ok(AssembledSystem {
             unknowns,
             masses: Masses::Same(0.0),
             drag: Drag::Constant(0.0),
             potentials: Vec::new(),
-            locals: Vec::new(),
+            general_terms: Vec::new(),
         })
     }
 
@@ -123,7 +142,7 @@ impl AssembledSystem {
         V: Potential<K, P>,
     {
         let elements = Elements::new(self.lists(), self.unknowns, elements)?;
-        self.potentials.push(Box::new(Kind { term, elements }));
+        self.potentials.push(Box::new(PotentialElements::new(term, elements, self.unknowns)));
         Ok(self)
     }
 
@@ -140,13 +159,13 @@ impl AssembledSystem {
         V: LocalLagrangian<K, P>,
     {
         let elements = Elements::new(self.lists(), self.unknowns, elements)?;
-        self.locals.push(Box::new(LocalKind { term, elements }));
+        self.general_terms.push(Box::new(LocalTermElements::new(term, elements)));
         Ok(self)
     }
 
     /// The number of lists of elements so far.
     fn lists(&self) -> usize {
-        self.potentials.len() + self.locals.len()
+        self.potentials.len() + self.general_terms.len()
     }
 
     /// The number of unknowns.
@@ -168,63 +187,67 @@ impl AssembledSystem {
     pub fn energy(&self, state: State) -> Result<f64, AssemblyError> {
         state.check(self)?;
         let z = self.action(state)?;
-        let between = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
-        let (q, v) = (between(state.q), between(state.v));
-        let mut first = First::zeros(self.unknowns);
-        self.first(Place { t: state.t, q: &q, v: &v, z }, true, &mut first);
+        let padded = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
+        let (q, v) = (padded(state.q), padded(state.v));
+        let mut first = FirstDerivatives::zeros(self.unknowns);
+        let at = EvaluationPoint { t: state.t, q: &q, v: &v, z };
+        self.first_derivatives(at, LagrangianValue::Needed, &mut first);
         let twice_kinetic: f64 = first.v.iter().zip(state.v).map(|(p, v)| p * v).sum();
         Ok(twice_kinetic - first.l)
     }
 
     /// Evaluates L and its first derivatives; without general terms the value of L only if it is requested.
-    pub(crate) fn first(&self, at: Place, value: bool, sums: &mut First) {
-        let First { l, q, v, z } = sums;
+    pub(crate) fn first_derivatives(&self, at: EvaluationPoint, value: LagrangianValue, sums: &mut FirstDerivatives) {
+        let FirstDerivatives { l, q, v, z } = sums;
         (*l, *z) = (0.0, self.rate(at.t));
-        for (block, force) in q.chunks_mut(BLOCK).enumerate() {
+        for (block, force) in q.chunks_mut(BLOCK_SIZE).enumerate() {
             force.fill(0.0);
             for list in &self.potentials {
-                list.kick(block, at.t, at.q, Weight::Same(1.0), force, None);
+                list.kick(block, at.t, at.q, KickFactor::Uniform(1.0), force, None);
             }
         }
         let velocities = at.v.iter().skip(1);
         for (i, (p, v)) in v.iter_mut().zip(velocities).enumerate() {
             *p = self.mass(i) * v;
         }
-        if value || !self.locals.is_empty() {
+        if value == LagrangianValue::Needed || !self.general_terms.is_empty() {
             let velocities = at.v.iter().skip(1);
             let twice_kinetic: f64 = v.iter().zip(velocities).map(|(p, v)| p * v).sum();
             *l = 0.5 * twice_kinetic - self.potential(at.t, at.q) + *z * at.z;
         }
-        for list in &self.locals {
-            list.first(at, sums);
+        for list in &self.general_terms {
+            list.add_first(at, sums);
         }
     }
 
     /// The potential energy at padded positions.
     pub(crate) fn potential(&self, t: f64, q: &[f64]) -> f64 {
-        (0..blocks::count(self.unknowns)).map(|block| self.potential_of(block, t, q)).sum()
+        (0..block_count(self.unknowns)).map(|block| self.block_potential(block, t, q)).sum()
     }
 
     /// The potential energy of the elements that are assigned to a block.
-    fn potential_of(&self, block: usize, t: f64, q: &[f64]) -> f64 {
-        let blocks = blocks::count(self.unknowns);
+    fn block_potential(&self, block: usize, t: f64, q: &[f64]) -> f64 {
+        let blocks = block_count(self.unknowns);
         self.potentials.iter().map(|list| list.energy(block, blocks, t, q)).sum()
     }
 
-    /// The energies of a system without general terms at padded positions: `E_L`, or `T + V` if that is requested. For
-    /// large systems the sum is distributed over threads as passes are, so that its last bits depend on their number.
-    pub(crate) fn energies(&self, (t, q, v, z): (f64, &[f64], &[f64], f64), bounded: bool) -> Energies {
+    /// The energies of a system without general terms at padded positions. For large systems the sum is distributed
+    /// over threads as steps are, so that its last bits depend on their number.
+    pub(crate) fn energies(&self, (t, q, v, z): (f64, &[f64], &[f64], f64), kind: EnergyKind) -> Energies {
         let kinetic = 0.5
             * match &self.masses {
                 Masses::Same(m) => m * sum_of_squares(v),
                 Masses::Each(masses) => masses.iter().zip(v).map(|(m, v)| m * v * v).sum(),
             };
-        let potential = if self.unknowns < SHARED || rayon::current_num_threads() == 1 {
+        let potential = if self.unknowns < MIN_PARALLEL_UNKNOWNS || rayon::current_num_threads() == 1 {
             self.potential(t, q)
         } else {
-            (0..blocks::count(self.unknowns)).into_par_iter().map(|block| self.potential_of(block, t, q)).sum()
+            (0..block_count(self.unknowns)).into_par_iter().map(|block| self.block_potential(block, t, q)).sum()
         };
-        let of_drag = if bounded { 0.0 } else { -self.rate(t) * z };
+        let of_drag = match kind {
+            EnergyKind::Lagrangian => -self.rate(t) * z,
+            EnergyKind::Mechanical => 0.0,
+        };
         let (total, terms) = (kinetic + potential + of_drag, potential.abs() + of_drag.abs());
         Energies { total, kinetic, terms }
     }
@@ -239,18 +262,18 @@ impl AssembledSystem {
 
     /// The action of a state; 0 if the state has none and L does not depend on it.
     pub(crate) fn action(&self, state: State) -> Result<f64, AssemblyError> {
-        let free = self.locals.is_empty() && self.rate(state.t) == 0.0;
-        state.z.or(free.then_some(0.0)).ok_or(AssemblyError::NoAction)
+        let independent = self.general_terms.is_empty() && self.rate(state.t) == 0.0;
+        state.z.or(independent.then_some(0.0)).ok_or(AssemblyError::NoAction)
     }
 
     /// Checks that there are no general terms.
     pub(crate) fn check_separable(&self) -> Result<(), AssemblyError> {
-        if self.locals.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
+        if self.general_terms.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
     }
 
-    /// Checks that each unknown has a mass; with general terms 0 is accepted, since these may contribute the mass.
-    pub(crate) fn check_masses(&self, general: bool) -> Result<(), AssemblyError> {
-        let accepted = |mass: f64| mass > 0.0 || general && mass == 0.0;
+    /// Checks that each unknown has a mass; 0 is accepted if general terms may contribute the mass.
+    pub(crate) fn check_masses(&self, source: MassSource) -> Result<(), AssemblyError> {
+        let accepted = |mass: f64| mass > 0.0 || source == MassSource::WithGeneralTerms && mass == 0.0;
         let check = |unknown: usize, mass: f64| {
             if accepted(mass) && mass.is_finite() { Ok(()) } else { Err(AssemblyError::Mass { unknown, mass }) }
         };

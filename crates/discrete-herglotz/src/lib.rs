@@ -49,6 +49,12 @@ pub mod checks {
     pub use crate::switching::jumps_between;
 }
 
+/// Tools for the other crates of this project: the flow of the kinetic part with a linear drag, compensated summation.
+pub mod support {
+    pub use crate::numbers::compensated::exact_sum;
+    pub use crate::splitting::drag::Drift;
+}
+
 pub use ensemble::builder::Ensemble;
 pub use error::{InputError, SelectionFailure, Status, StepError, UnresolvedStep};
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};

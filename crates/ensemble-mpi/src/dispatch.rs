@@ -1,8 +1,8 @@
 //! Distribution of shards to workers.
 
-/// The number of shards that a worker has at a time: one that it computes, and one to continue with while a result is
+/// The maximum number of open shards of a worker: one that it computes, and one to continue with while a result is
 /// sent.
-const AHEAD: usize = 2;
+const MAX_OPEN_SHARDS: usize = 2;
 
 /// The open shards of an ensemble and their workers: the bookkeeping of the rank that hands them out.
 ///
@@ -28,13 +28,13 @@ pub struct Dispatch {
 impl Dispatch {
     /// The distribution of `count` shards to `workers` workers.
     pub fn new(count: usize, workers: usize) -> Self {
-        Dispatch { next: 0, count, open: vec![Vec::with_capacity(AHEAD); workers] }
+        Dispatch { next: 0, count, open: vec![Vec::with_capacity(MAX_OPEN_SHARDS); workers] }
     }
 
     /// The next shard for a worker, below a bound; `None` where the worker has enough shards, or there is no shard.
     /// Shards that are done are skipped.
     pub fn next(&mut self, worker: usize, bound: usize, done: impl Fn(usize) -> bool) -> Option<usize> {
-        let open = self.open.get_mut(worker).filter(|open| open.len() < AHEAD)?;
+        let open = self.open.get_mut(worker).filter(|open| open.len() < MAX_OPEN_SHARDS)?;
         while self.next < self.count && done(self.next) {
             self.next += 1;
         }
@@ -48,8 +48,8 @@ impl Dispatch {
     }
 
     /// Whether a worker can be given another shard, and there are any left.
-    pub fn wants(&self, worker: usize) -> bool {
-        self.next < self.count && self.open(worker).len() < AHEAD
+    pub fn accepts_shard(&self, worker: usize) -> bool {
+        self.next < self.count && self.open(worker).len() < MAX_OPEN_SHARDS
     }
 
     /// Records that a worker has sent a shard; returns whether the shard was open with this worker.
@@ -88,7 +88,7 @@ mod tests {
                     let bound = front.saturating_add(window);
                     for worker in 0..workers {
                         while let Some(shard) = dispatch.next(worker, bound, |shard| merged[shard]) {
-                            assert!(shard < bound && shard % 7 != 0 && dispatch.open(worker).len() <= AHEAD);
+                            assert!(shard < bound && shard % 7 != 0 && dispatch.open(worker).len() <= MAX_OPEN_SHARDS);
                             handed.push(shard);
                         }
                         // Worker 0 is ten times slower than the others.

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 /// The reason why an ensemble on several ranks cannot start or continue.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum MpiError {
     /// This rank cannot construct or merge the ensemble.
     #[error(transparent)]

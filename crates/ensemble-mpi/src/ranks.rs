@@ -13,17 +13,17 @@ use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
 /// Tag of messages from rank 0: the number of a shard, or an empty message where there are no more.
-const HANDED_OUT: Tag = 1;
+const SHARD_TO_COMPUTE: Tag = 1;
 
 /// Tag of messages to rank 0: the words of a shard.
-const COMPUTED: Tag = 2;
+const COMPUTED_SHARD: Tag = 2;
 
 /// The number of ranks up to which rank 0 also computes, on a thread in addition to the one that hands out shards. With
 /// more ranks its core adds little, and from a few hundred ranks on it is busy with messages (docs/scaling.md).
-const RANKS_WITH_WORKING_ROOT: usize = 64;
+const MAX_RANKS_WITH_COMPUTING_ROOT: usize = 64;
 
-/// The sleep of an idle rank: short compared with a shard, long compared with a probe for messages.
-const NAP: Duration = Duration::from_micros(50);
+/// The time between two probes of an idle rank for messages: short compared with a shard, long compared with a probe.
+const PROBE_INTERVAL: Duration = Duration::from_micros(50);
 
 /// Options of a run on several ranks.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,6 +35,7 @@ pub struct Options {
 
 /// The result of an ensemble on several ranks, on rank 0.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Merged {
     /// How the members ended.
     pub tally: Tally,
@@ -46,6 +47,7 @@ pub struct Merged {
 
 /// The shards and bytes that rank 0 has received, and the time that it spent on them.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Traffic {
     /// The number of shards that each rank has computed.
     pub shards: Vec<usize>,
@@ -131,12 +133,12 @@ fn work<L: Lagrangian<N> + Sync, const N: usize>(world: &SimpleCommunicator, sha
     let root = world.process_at_rank(0);
     loop {
         // A blocking receive of Open MPI would keep a core busy.
-        while root.immediate_probe_with_tag(HANDED_OUT).is_none() {
-            std::thread::sleep(NAP);
+        while root.immediate_probe_with_tag(SHARD_TO_COMPUTE).is_none() {
+            std::thread::sleep(PROBE_INTERVAL);
         }
-        let (shard, _) = root.receive_vec_with_tag::<u64>(HANDED_OUT);
+        let (shard, _) = root.receive_vec_with_tag::<u64>(SHARD_TO_COMPUTE);
         let Some(shard) = shard.first() else { return };
-        root.send_with_tag(&sharded.compute(*shard as usize)[..], COMPUTED);
+        root.send_with_tag(&sharded.compute(*shard as usize)[..], COMPUTED_SHARD);
     }
 }
 
@@ -153,9 +155,9 @@ struct Distributor<'w> {
     /// Worker 0 is the computing thread of rank 0.
     dispatch: Dispatch,
     /// When each rank last sent a result, or was given work while it was idle.
-    heard: Vec<Instant>,
+    last_heard: Vec<Instant>,
     /// Workers that can be given another shard, once the bound on waiting results permits it.
-    starved: Vec<usize>,
+    ready_workers: Vec<usize>,
     traffic: Traffic,
 }
 
@@ -166,8 +168,8 @@ impl<'w> Distributor<'w> {
             world,
             patience: options.patience,
             dispatch: Dispatch::new(count, ranks),
-            heard: vec![Instant::now(); ranks],
-            starved: Vec::new(),
+            last_heard: vec![Instant::now(); ranks],
+            ready_workers: Vec::new(),
             traffic: Traffic { shards: vec![0; ranks], ..Traffic::default() },
         }
     }
@@ -180,11 +182,11 @@ impl<'w> Distributor<'w> {
         fold: &mut impl FnMut(&Member<N>),
     ) -> Result<(), MpiError> {
         merge.resume(fold)?;
-        let ranks = self.heard.len();
+        let ranks = self.last_heard.len();
         std::thread::scope(|scope| {
             let (hand_out, handed_out) = mpsc::channel::<usize>();
             let (done, computed) = mpsc::channel();
-            let first = if ranks <= RANKS_WITH_WORKING_ROOT {
+            let first = if ranks <= MAX_RANKS_WITH_COMPUTING_ROOT {
                 scope.spawn(move || {
                     for shard in handed_out {
                         if done.send(sharded.compute(shard)).is_err() {
@@ -197,7 +199,7 @@ impl<'w> Distributor<'w> {
                 1
             };
             let own = OwnThread { hand_out, computed };
-            self.starved = (first..ranks).collect();
+            self.ready_workers = (first..ranks).collect();
             self.feed(merge, &own);
             while !self.dispatch.is_over(|shard| merge.has(shard)) {
                 match own.computed.try_recv() {
@@ -210,10 +212,10 @@ impl<'w> Distributor<'w> {
                     Err(TryRecvError::Disconnected) => return Ok(()),
                 }
                 let clock = Instant::now();
-                match self.world.any_process().immediate_probe_with_tag(COMPUTED) {
+                match self.world.any_process().immediate_probe_with_tag(COMPUTED_SHARD) {
                     Some(status) => {
                         let worker = self.world.process_at_rank(status.source_rank());
-                        let (words, _) = worker.receive_vec_with_tag::<u64>(COMPUTED);
+                        let (words, _) = worker.receive_vec_with_tag::<u64>(COMPUTED_SHARD);
                         self.traffic.bytes += 8 * words.len();
                         self.traffic.messages += clock.elapsed();
                         self.take(status.source_rank() as usize, &words, merge, fold)?;
@@ -222,8 +224,8 @@ impl<'w> Distributor<'w> {
                         self.traffic.messages += clock.elapsed();
                     }
                     None => {
-                        self.look_for_the_lost()?;
-                        std::thread::sleep(NAP);
+                        self.check_for_lost_ranks()?;
+                        std::thread::sleep(PROBE_INTERVAL);
                     }
                 }
             }
@@ -240,7 +242,7 @@ impl<'w> Distributor<'w> {
         fold: &mut impl FnMut(&Member<N>),
     ) -> Result<(), MpiError> {
         let clock = Instant::now();
-        self.heard[worker] = clock;
+        self.last_heard[worker] = clock;
         let shard = words.first().map_or(usize::MAX, |word| *word as usize);
         if !self.dispatch.received(worker, shard) {
             return Err(EnsembleError::ForeignShard.into());
@@ -248,44 +250,44 @@ impl<'w> Distributor<'w> {
         self.traffic.shards[worker] += 1;
         merge.add(words, fold)?;
         self.traffic.merging += clock.elapsed();
-        if !self.starved.contains(&worker) {
-            self.starved.push(worker);
+        if !self.ready_workers.contains(&worker) {
+            self.ready_workers.push(worker);
         }
         Ok(())
     }
 
-    /// Hands out the shards that may be computed now to the starved workers.
+    /// Hands out the shards that may be computed now to the workers that can be given one.
     fn feed<L: Lagrangian<N> + Sync, const N: usize>(&mut self, merge: &Merge<'_, '_, '_, L, N>, own: &OwnThread) {
-        let bound = merge.bound(self.heard.len());
-        let mut starved = std::mem::take(&mut self.starved);
+        let bound = merge.bound(self.last_heard.len());
+        let mut ready_workers = std::mem::take(&mut self.ready_workers);
         let mut handed_out = true;
         // One shard to each worker in turn, so that few shards are distributed evenly.
         while std::mem::take(&mut handed_out) {
-            for worker in &starved {
+            for worker in &ready_workers {
                 let idle = self.dispatch.open(*worker).is_empty();
                 let Some(shard) = self.dispatch.next(*worker, bound, |shard| merge.has(shard)) else { continue };
                 handed_out = true;
                 if idle {
-                    self.heard[*worker] = Instant::now();
+                    self.last_heard[*worker] = Instant::now();
                 }
                 if *worker == 0 {
                     // Sending fails where the thread has panicked, which the loop over results detects.
                     let _ = own.hand_out.send(shard);
                 } else {
-                    self.world.process_at_rank(*worker as Rank).send_with_tag(&[shard as u64][..], HANDED_OUT);
+                    self.world.process_at_rank(*worker as Rank).send_with_tag(&[shard as u64][..], SHARD_TO_COMPUTE);
                 }
             }
         }
-        starved.retain(|worker| self.dispatch.wants(*worker));
-        self.starved = starved;
+        ready_workers.retain(|worker| self.dispatch.accepts_shard(*worker));
+        self.ready_workers = ready_workers;
     }
 
     /// Checks whether a rank with open shards has been silent for too long.
-    fn look_for_the_lost(&self) -> Result<(), MpiError> {
+    fn check_for_lost_ranks(&self) -> Result<(), MpiError> {
         let Some(patience) = self.patience else { return Ok(()) };
-        for (rank, heard) in self.heard.iter().enumerate().skip(1) {
+        for (rank, last_heard) in self.last_heard.iter().enumerate().skip(1) {
             let open = self.dispatch.open(rank).len();
-            if open > 0 && heard.elapsed() > patience {
+            if open > 0 && last_heard.elapsed() > patience {
                 return Err(MpiError::RankLost { rank, open, seconds: patience.as_secs_f64() });
             }
         }
@@ -294,11 +296,11 @@ impl<'w> Distributor<'w> {
 
     /// Tells all ranks that there are no more shards, and receives the results that are under way.
     fn dismiss(&self) {
-        for rank in 1..self.heard.len() {
+        for rank in 1..self.last_heard.len() {
             let worker = self.world.process_at_rank(rank as Rank);
-            worker.send_with_tag(&[0u64; 0][..], HANDED_OUT);
+            worker.send_with_tag(&[0u64; 0][..], SHARD_TO_COMPUTE);
             for _ in self.dispatch.open(rank) {
-                worker.receive_vec_with_tag::<u64>(COMPUTED);
+                worker.receive_vec_with_tag::<u64>(COMPUTED_SHARD);
             }
         }
     }

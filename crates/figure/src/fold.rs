@@ -2,9 +2,18 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// The maximal number of turns between two points that are joined by a line; a curve with more turns is not resolved by
+/// The maximum number of turns between two points that are joined by a line. A curve with more turns is not resolved by
 /// its points, and its lines would fill the figure.
-const MOST_TURNS: f64 = 3.0;
+const MAX_TURNS: f64 = 3.0;
+
+/// What a coordinate of a curve is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinate {
+    /// A number, which is drawn as it is.
+    Number,
+    /// An angle, which is reduced to (-pi, pi].
+    Angle,
+}
 
 /// The turn that contains an angle: 0 for the interval (-pi, pi].
 fn turn(angle: f64) -> f64 {
@@ -26,11 +35,18 @@ pub fn fold(angle: f64) -> f64 {
 
 /// The pieces of a curve after reduction of its angular coordinates. The curve is cut where one of them changes its
 /// turn, and each piece reaches the edge there, so that no line crosses the figure.
-pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)>> {
-    let turns_of = |(x, y): (f64, f64)| (if angles.0 { turn(x) } else { 0.0 }, if angles.1 { turn(y) } else { 0.0 });
+pub fn folded(points: &[(f64, f64)], kinds: (Coordinate, Coordinate)) -> Vec<Vec<(f64, f64)>> {
+    let turn_of = |x: f64, kind: Coordinate| match kind {
+        Coordinate::Angle => turn(x),
+        Coordinate::Number => 0.0,
+    };
+    let turns_of = |(x, y): (f64, f64)| (turn_of(x, kinds.0), turn_of(y, kinds.1));
     let place = |(x, y): (f64, f64), turns: (f64, f64)| {
-        let edge = |x: f64, turn: f64, is_angle: bool| if is_angle { (x - TAU * turn).clamp(-PI, PI) } else { x };
-        (edge(x, turns.0, angles.0), edge(y, turns.1, angles.1))
+        let reduced = |x: f64, turn: f64, kind: Coordinate| match kind {
+            Coordinate::Angle => (x - TAU * turn).clamp(-PI, PI),
+            Coordinate::Number => x,
+        };
+        (reduced(x, turns.0, kinds.0), reduced(y, turns.1, kinds.1))
     };
     let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut last: Option<(f64, f64)> = None;
@@ -40,7 +56,7 @@ pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)
         let ends = turns_of(point);
         match (last, begins) {
             (Some(from), Some(begins))
-                if (ends.0 - begins.0).abs() <= MOST_TURNS && (ends.1 - begins.1).abs() <= MOST_TURNS =>
+                if (ends.0 - begins.0).abs() <= MAX_TURNS && (ends.1 - begins.1).abs() <= MAX_TURNS =>
             {
                 let at = |part: f64| (from.0 + part * (point.0 - from.0), from.1 + part * (point.1 - from.1));
                 let mut cuts = cuts((from.0, point.0), (begins.0, ends.0));
@@ -104,7 +120,7 @@ mod tests {
             |rate: f64| -> Vec<(f64, f64)> { (0..=200).map(|k| 0.1 * f64::from(k)).map(|t| (t, rate * t)).collect() };
         for rate in [0.9, -0.9, 7.0, -7.0, 40.0, PI / 2.0, -10.0 * PI] {
             let points = curve(rate);
-            let pieces = folded(&points, (false, true));
+            let pieces = folded(&points, (Coordinate::Number, Coordinate::Angle));
             let turns = (rate.abs() * 20.0 / TAU + 0.5).floor() as usize;
             // There is one more piece where the curve ends, or a piece begins, at an edge.
             assert!((turns..=turns + 2).contains(&pieces.len()), "{rate}: {} for {turns}", pieces.len());
@@ -125,14 +141,14 @@ mod tests {
         }
         // If both coordinates are angles, the lines have the slope of the curve everywhere.
         let torus: Vec<(f64, f64)> = curve(1.0).iter().map(|(t, _)| (3.0 * t, -1.7 * t)).collect();
-        let pieces = folded(&torus, (true, true));
+        let pieces = folded(&torus, (Coordinate::Angle, Coordinate::Angle));
         assert!(pieces.len() > 10);
         for w in pieces.iter().flat_map(|piece| piece.windows(2)) {
             assert!((1.7 * (w[1].0 - w[0].0) + 3.0 * (w[1].1 - w[0].1)).abs() < 1e-12, "{w:?}");
         }
         // A curve without angles is not cut, and points that do not resolve the curve are not joined.
-        assert_eq!(folded(&torus, (false, false)), std::slice::from_ref(&torus));
-        assert_eq!(folded(&[(0.0, 0.0), (1.0, 1e300)], (false, true)).len(), 2);
-        assert!(folded(&[], (true, true)).is_empty());
+        assert_eq!(folded(&torus, (Coordinate::Number, Coordinate::Number)), std::slice::from_ref(&torus));
+        assert_eq!(folded(&[(0.0, 0.0), (1.0, 1e300)], (Coordinate::Number, Coordinate::Angle)).len(), 2);
+        assert!(folded(&[], (Coordinate::Angle, Coordinate::Angle)).is_empty());
     }
 }

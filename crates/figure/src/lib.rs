@@ -3,7 +3,7 @@
 
 mod fold;
 
-pub use fold::{fold, folded};
+pub use fold::{Coordinate, fold, folded};
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::LegendPosition;
@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 /// The style of a curve. The four patterns can be distinguished in black and white, and so can the three markers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Line {
     /// Solid, blue: the result of a discrete Lagrangian.
     Solid,
@@ -40,7 +41,7 @@ pub enum Line {
     Grey(usize),
 }
 
-/// The colours of `Line::Coloured`.
+/// The colours of `Line::Coloured`: blue, red, green, violet, orange and teal, in the order of the numbers.
 const COLOURS: [&str; 6] = [SOLID, "#c1272d", GREEN, "#8e44ad", "#d98200", "#00838f"];
 
 /// The line pattern of a number.
@@ -60,10 +61,10 @@ impl Line {
             Line::Dashed => drawn(points, "#c1272d", 2.2, LineStyle::Custom("8 5".into()), name),
             Line::Dotted => drawn(points, GREY, 2.2, LineStyle::Custom("2 3".into()), name),
             Line::DashDot => drawn(points, GREEN, 2.2, LineStyle::Custom("9 3 2 3".into()), name),
-            Line::Discs => marked(points, SOLID, MarkerShape::Circle, MARKER, name),
-            Line::Dots => marked(points, SOLID, MarkerShape::Circle, DOT, name),
-            Line::Crosses => marked(points, GREY, MarkerShape::Cross, MARKER, name),
-            Line::Pluses => marked(points, GREEN, MarkerShape::Plus, MARKER, name),
+            Line::Discs => marked(points, SOLID, MarkerShape::Circle, MARKER_SIZE, name),
+            Line::Dots => marked(points, SOLID, MarkerShape::Circle, DOT_SIZE, name),
+            Line::Crosses => marked(points, GREY, MarkerShape::Cross, MARKER_SIZE, name),
+            Line::Pluses => marked(points, GREEN, MarkerShape::Plus, MARKER_SIZE, name),
             Line::Coloured(number) => {
                 // In 12 numbers the colours repeat twice and the patterns three times; the shift then gives the other
                 // 12 pairs.
@@ -118,6 +119,7 @@ impl Curve {
 
 /// The range of an axis and the distance of its ticks, which are chosen by hand for figures in print.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Axis {
     /// A linear axis: from, to, distance of ticks.
     Linear(f64, f64, f64),
@@ -185,17 +187,21 @@ const GREY: &str = "#555555";
 /// The colour of dash-dot curves and of upright crosses.
 const GREEN: &str = "#2a7f4f";
 
-/// The size of markers without a line, in pixels.
-const MARKER: f64 = 3.6;
+/// The size of markers without a line, in pixels: larger than the width of a line, so that they differ from it.
+const MARKER_SIZE: f64 = 3.6;
 
-/// The size of a dot.
-const DOT: f64 = 1.0;
+/// The size of the dots of thousands of points, in pixels: so small that few of them overlap.
+const DOT_SIZE: f64 = 1.0;
 
-/// The width and the height of a panel, in pixels.
-const SIZE: (f64, f64) = (560.0, 400.0);
+/// The width and the height of a panel, in pixels, to which the font sizes below are matched.
+const PANEL_SIZE: (f64, f64) = (560.0, 400.0);
 
-/// The additional width for a legend to the right of the axes, in pixels.
-const BESIDE: f64 = 270.0;
+/// The additional width for a legend to the right of the axes, in pixels: room for a sample of a line and about 25
+/// characters.
+const LEGEND_WIDTH: f64 = 270.0;
+
+/// The distance between the panels of a figure, in pixels.
+const PANEL_SPACING: f64 = 24.0;
 
 /// The factor by which everything but the curves is enlarged. It makes the samples of the legend long enough to show a
 /// pattern; the font sizes below are in units of it.
@@ -284,8 +290,8 @@ fn part_of_a_turn(angle: f64) -> String {
 /// A figure of one panel, as SVG.
 pub fn draw(panel: &Panel) -> String {
     let plots = panel.plots();
-    let width = SIZE.0 + if panel.legend_is_beside() { BESIDE } else { 0.0 };
-    let layout = panel.layout(&plots).with_width(width).with_height(SIZE.1);
+    let width = PANEL_SIZE.0 + if panel.legend_is_beside() { LEGEND_WIDTH } else { 0.0 };
+    let layout = panel.layout(&plots).with_width(width).with_height(PANEL_SIZE.1);
     numbered(&kuva::render_to_svg(plots, layout))
 }
 
@@ -322,8 +328,8 @@ pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
     let scene = Figure::new(panels.len().div_ceil(in_a_row).max(1), in_a_row)
         .with_plots(plots)
         .with_layouts(layouts)
-        .with_cell_size(SIZE.0, SIZE.1)
-        .with_spacing(24.0)
+        .with_cell_size(PANEL_SIZE.0, PANEL_SIZE.1)
+        .with_spacing(PANEL_SPACING)
         .with_labels_custom(letters.iter().map(String::as_str).collect(), LabelConfig::default())
         .render();
     numbered(&SvgBackend.render_scene(&scene))

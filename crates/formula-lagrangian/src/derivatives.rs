@@ -14,12 +14,12 @@ struct Adjoint {
 }
 
 /// The nesting depth of conditionals up to which each is written out; deeper ones are selected by the value of `live`.
-const DEEP: usize = 8;
+const MAX_WRITTEN_OUT_DEPTH: usize = 8;
 
 impl Graph {
     /// The value of an adjoint.
     fn chosen(&mut self, adjoint: Adjoint) -> Id {
-        self.chosen_within(adjoint, DEEP)
+        self.chosen_within(adjoint, MAX_WRITTEN_OUT_DEPTH)
     }
 
     fn chosen_within(&mut self, Adjoint { part, live }: Adjoint, deep: usize) -> Id {

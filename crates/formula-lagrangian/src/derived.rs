@@ -8,9 +8,12 @@ use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Structure;
 
-/// The maximum numbers of nodes of a formula with its gradient, and with its second derivatives.
-const WITH_GRADIENT: usize = 10 * MOST_NODES;
-const WITH_HESSIAN: usize = 20 * MOST_NODES;
+/// The maximum number of nodes of a formula with its gradient. Reverse accumulation adds a few nodes for each node of
+/// the formula, so that only formulas close to their own bound exceed it.
+const MOST_NODES_WITH_GRADIENT: usize = 10 * MOST_NODES;
+
+/// The maximum number of nodes of a formula with its second derivatives, which bounds the memory and the time for them.
+const MOST_NODES_WITH_HESSIAN: usize = 20 * MOST_NODES;
 
 /// A formula with its derivatives as tapes, and its proved properties.
 #[derive(Clone, Debug)]
@@ -54,9 +57,9 @@ impl Derived {
             let kinetic = graph.mul(square, half);
             root = graph.add(root, kinetic);
         }
-        let too_large = FormulaError::TooLarge { limit: WITH_GRADIENT };
+        let too_large = FormulaError::TooLarge { limit: MOST_NODES_WITH_GRADIENT };
         let variables = variables(&mut graph, n);
-        let partials = graph.gradient(root, &variables, WITH_GRADIENT).ok_or(too_large.clone())?;
+        let partials = graph.gradient(root, &variables, MOST_NODES_WITH_GRADIENT).ok_or(too_large.clone())?;
         let tape = |graph: &Graph, nodes: &[Id]| Tape::new(graph, nodes, n).ok_or(too_large.clone());
         let (value, force) = (tape(&graph, &[root])?, tape(&graph, partials.get(..n).unwrap_or(&[]))?);
         let of_kick: Vec<Id> = std::iter::once(root).chain(partials.iter().copied().take(n)).collect();
@@ -89,7 +92,8 @@ impl Derived {
         let cyclic = (0..n).map(&mut free).collect();
         let smooth = kinks(&graph, root) == crate::node::Inputs::NONE;
         let switching = switching_functions(&mut graph, root);
-        let switching = Tape::new(&graph, &switching, n).ok_or(FormulaError::TooLarge { limit: WITH_GRADIENT })?;
+        let switching =
+            Tape::new(&graph, &switching, n).ok_or(FormulaError::TooLarge { limit: MOST_NODES_WITH_GRADIENT })?;
         let formula = Formula { graph, ..formula.clone() };
         let mut derived = Derived {
             formula,
@@ -147,7 +151,7 @@ fn second_derivatives(graph: &mut Graph, partials: &[Id], variables: &[Id]) -> O
     let size = variables.len();
     let mut second = vec![*partials.first()?; size * size];
     for (i, partial) in partials.iter().enumerate() {
-        let row = graph.gradient(*partial, variables.get(i..)?, WITH_HESSIAN)?;
+        let row = graph.gradient(*partial, variables.get(i..)?, MOST_NODES_WITH_HESSIAN)?;
         for (j, entry) in row.into_iter().enumerate() {
             *second.get_mut(i * size + i + j)? = entry;
             *second.get_mut((i + j) * size + i)? = entry;

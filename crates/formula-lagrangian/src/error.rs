@@ -3,7 +3,8 @@
 use std::fmt::{Display, Formatter};
 use thiserror::Error;
 
-/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian).
+/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian). Their number is a constant
+/// of the type, and programs that read formulas compile an integrator for each.
 pub const MOST_COORDINATES: usize = 16;
 
 /// Invalid input to a formula.
@@ -78,6 +79,7 @@ pub enum FormulaError {
 /// A position in a text that cannot be parsed, with the reason. `Display` shows the line, with the position marked
 /// below.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ParseError {
     /// The reason, and the correction if one is known.
     pub message: String,
@@ -95,8 +97,9 @@ pub struct ParseError {
     pub mark: usize,
 }
 
-/// The number of characters of a line that are shown before and after the marked position.
-const AROUND: usize = 60;
+/// The number of characters of a line that are shown before and after the marked position, so that
+/// a shown line has at most 120.
+const SHOWN_CHARACTERS: usize = 60;
 
 impl ParseError {
     /// The error at the bytes `start .. end` of a text. Also for programs that read files with formulas in them.
@@ -138,11 +141,11 @@ impl Display for ParseError {
         // The column within the shown text, which may be a part of a longer line.
         let width = text.chars().count();
         let at = (*mark).min(width);
-        let first = at.saturating_sub(AROUND);
-        let shown: String = text.chars().skip(first).take(2 * AROUND).collect();
+        let first = at.saturating_sub(SHOWN_CHARACTERS);
+        let shown: String = text.chars().skip(first).take(2 * SHOWN_CHARACTERS).collect();
         // Tabs are kept, so that the mark is below its position.
         let indent: String = shown.chars().take(at - first).map(|c| if c == '\t' { c } else { ' ' }).collect();
-        let mark = "^".repeat((*length).clamp(1, AROUND));
+        let mark = "^".repeat((*length).clamp(1, SHOWN_CHARACTERS));
         write!(f, "\n  {shown}\n  {indent}{mark}")
     }
 }

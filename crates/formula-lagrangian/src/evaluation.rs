@@ -8,14 +8,14 @@ use contact_geom::nalgebra::SVector;
 
 /// The sizes of the register arrays on the stack; a tape that needs more registers has them on the heap. The registers
 /// are cleared before each evaluation, so that a short tape has a small array.
-const TINY: usize = 4;
-const SMALL: usize = 8;
-const MIDDLE: usize = 32;
-const LARGE: usize = 256;
+const REGISTERS_TINY: usize = 4;
+const REGISTERS_SMALL: usize = 8;
+const REGISTERS_MEDIUM: usize = 32;
+const REGISTERS_LARGE: usize = 256;
 
 /// The dimension up to which inputs and results are copied in the caller of the interpreter, which knows their number
 /// at compile time. In higher dimensions that is slow to compile.
-const FEW: usize = 2;
+const MAX_INLINED_DIMENSION: usize = 2;
 
 /// The point at which a tape is evaluated.
 #[derive(Clone, Copy)]
@@ -44,14 +44,14 @@ impl Tape {
     #[inline(always)]
     pub fn evaluate<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         // Nested dual numbers are not evaluated in long computations, so that their registers may be on the heap.
-        if T::NESTED || self.registers > LARGE {
+        if T::NESTED || self.registers > REGISTERS_LARGE {
             self.interpret::<T, N>(at, &mut vec![T::zero(); self.registers], results);
-        } else if self.registers <= TINY {
-            self.interpret::<T, N>(at, &mut OnStack([T::zero(); TINY]).0, results);
-        } else if self.registers <= SMALL {
-            self.interpret::<T, N>(at, &mut OnStack([T::zero(); SMALL]).0, results);
-        } else if self.registers <= MIDDLE {
-            self.interpret::<T, N>(at, &mut OnStack([T::zero(); MIDDLE]).0, results);
+        } else if self.registers <= REGISTERS_TINY {
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_TINY]).0, results);
+        } else if self.registers <= REGISTERS_SMALL {
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_SMALL]).0, results);
+        } else if self.registers <= REGISTERS_MEDIUM {
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0, results);
         } else {
             self.evaluate_large::<T, N>(at, results);
         }
@@ -60,13 +60,13 @@ impl Tape {
     /// A separate function, so that the large array is in a stack frame of its own.
     #[inline(never)]
     fn evaluate_large<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        self.interpret::<T, N>(at, &mut OnStack([T::zero(); LARGE]).0, results);
+        self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_LARGE]).0, results);
     }
 
     /// The copying of inputs and results is inlined into the caller if there are few of them.
     #[inline(always)]
     fn interpret<T: Scalar, const N: usize>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
-        if const { N == 0 || N > FEW } {
+        if const { N == 0 || N > MAX_INLINED_DIMENSION } {
             self.interpret_apart(at, registers, results);
             return;
         }

@@ -4,7 +4,7 @@ use crate::evaluation::At;
 use crate::formula::index;
 use crate::names::Names;
 use crate::node::Inputs;
-use crate::parser::{MOST_NODES, Parser};
+use crate::parser::{MOST_NODES, Parser, ValueName};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, MOST_COORDINATES};
 use contact_geom::Scalar;
@@ -35,10 +35,10 @@ pub struct Expression {
 }
 
 impl Expression {
-    pub(crate) fn parse(formula: &Formula, text: &str, named: bool) -> Result<Self, FormulaError> {
+    pub(crate) fn parse(formula: &Formula, text: &str, value_name: ValueName) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
         let mut graph = Graph::new();
-        let root = Parser::parse_beside(Some(formula), text, &names, &mut graph, named)?;
+        let root = Parser::parse_beside(Some(formula), text, &names, &mut graph, value_name)?;
         let log_factor = graph.has_log_factor(root, names.dimension);
         let width = names.dimension + usize::from(log_factor);
         let tape = Tape::new(&graph, &[root], width).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;

@@ -1,7 +1,7 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
 use crate::names::Names;
-use crate::parser::{MOST_NODES, Parser};
+use crate::parser::{MOST_NODES, Parser, ValueName};
 use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
 
 /// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
@@ -36,7 +36,7 @@ impl Formula {
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let names = Names::new(coordinates, parameters)?;
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph, false)?;
+        let root = Parser::parse(text, &names, &mut graph, ValueName::Lagrangian)?;
         let values = parameters.iter().map(|(_, value)| *value).collect();
         Ok(Formula { names, graph, root, values })
     }
@@ -106,7 +106,7 @@ impl Formula {
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
     pub fn expression(&self, text: &str) -> Result<Expression, FormulaError> {
-        Expression::parse(self, text, false)
+        Expression::parse(self, text, ValueName::Lagrangian)
     }
 
     /// The same, where the value may have a name that is not in use, as in `E = x'^2/2 + x^2/2`.
@@ -114,7 +114,7 @@ impl Formula {
     /// # Errors
     /// Those of [`expression`](Self::expression).
     pub fn named_expression(&self, text: &str) -> Result<Expression, FormulaError> {
-        Expression::parse(self, text, true)
+        Expression::parse(self, text, ValueName::Any)
     }
 
     /// The number of coordinates.

@@ -112,8 +112,9 @@ fn bad(name: &str, why: &'static str) -> FormulaError {
 /// The number of characters to change, insert or delete, or of neighbouring characters to exchange (Damerau-Levenshtein
 /// distance), for the first characters of long names. Case is ignored.
 fn distance(a: &str, b: &str) -> usize {
-    const LONGEST: usize = 40;
-    let letters = |s: &str| s.chars().take(LONGEST).flat_map(char::to_lowercase).collect::<Vec<_>>();
+    // The time grows with the product of the lengths.
+    const MAX_COMPARED_CHARACTERS: usize = 40;
+    let letters = |s: &str| s.chars().take(MAX_COMPARED_CHARACTERS).flat_map(char::to_lowercase).collect::<Vec<_>>();
     let (x, y) = (letters(a), letters(b));
     let mut rows: Vec<Vec<usize>> = vec![(0..=y.len()).collect()];
     for i in 1..=x.len() {

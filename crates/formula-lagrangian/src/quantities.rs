@@ -6,8 +6,9 @@ use crate::node::{Function, Id, Node, Operation};
 use crate::parser::MOST_NODES;
 use crate::{Formula, Graph};
 
-/// The maximum number of nodes of an expression with the derivatives of L in it.
-const MOST_WITH_DERIVATIVES: usize = 10 * MOST_NODES;
+/// The maximum number of nodes of an expression with the derivatives of L in it: as many as L with its gradient may
+/// have.
+const MOST_NODES_WITH_DERIVATIVES: usize = 10 * MOST_NODES;
 
 /// The meaning of a name in addition to those of a formula. Coordinates, parameters and definitions of the same name
 /// take precedence.
@@ -50,7 +51,7 @@ impl Quantity {
         };
         let value = graph.copied(&formula.graph, formula.root);
         let velocities: Vec<Id> = (first..first + count).map(|i| graph.velocity(i as u32)).collect();
-        let momenta = graph.gradient(value, &velocities, MOST_WITH_DERIVATIVES)?;
+        let momenta = graph.gradient(value, &velocities, MOST_NODES_WITH_DERIVATIVES)?;
         if let Quantity::Momentum(_) = self {
             return momenta.first().copied();
         }

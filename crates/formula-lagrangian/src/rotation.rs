@@ -156,7 +156,6 @@ impl Graph {
                 Node::Unary(Function::Neg, a) => open.push((a, -sign)),
                 _ => summands.push(self.summand(id, sign, components, known)?),
             }
-            // Sums with shared subexpressions may have very many summands.
             if summands.len() + open.len() > MOST_SUMMANDS {
                 return None;
             }
@@ -198,5 +197,6 @@ fn is_vector(a: Option<&Component>, b: Option<&Component>) -> bool {
     a.second != b.second && a.vector == b.vector && a.number.abs() == b.number.abs()
 }
 
-/// The maximum number of summands of one sum that are examined.
+/// The maximum number of summands of one sum that are examined. Sums with shared subexpressions may have very
+/// many.
 const MOST_SUMMANDS: usize = 64;

@@ -1,6 +1,6 @@
 //! Figures of rows: columns against time, and phase portraits.
 
-use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid, fold, folded};
+use contact_figure::{Axis, Coordinate, Curve, Line, Panel, draw, draw_grid, fold, folded};
 use herglotz::runtime::{Column, Comparison, Work, velocity_name};
 use herglotz::{EndsScene, LatticeScene, Scene};
 use std::collections::BTreeSet;
@@ -33,18 +33,19 @@ const MAX_LABEL_LENGTH: usize = 30;
 #[derive(Clone, Copy)]
 struct Quantity<'q> {
     name: &'q str,
-    is_angle: bool,
+    coordinate: Coordinate,
 }
 
 impl<'q> Quantity<'q> {
     /// A column of a scene.
     fn of(scene: &Scene, name: &'q str) -> Self {
-        Quantity { name, is_angle: scene.is_angle(name) }
+        let coordinate = if scene.is_angle(name) { Coordinate::Angle } else { Coordinate::Number };
+        Quantity { name, coordinate }
     }
 
     /// A quantity that is not an angle.
     fn plain(name: &'q str) -> Self {
-        Quantity { name, is_angle: false }
+        Quantity { name, coordinate: Coordinate::Number }
     }
 }
 
@@ -133,20 +134,23 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_owned(),
     };
-    let (x_label, y_label, angles) = (label(x.name), label(y.name), (x.is_angle, y.is_angle));
-    let axis_of = |is_angle: bool, of: fn(&(f64, f64)) -> f64| {
+    let (x_label, y_label, kinds) = (label(x.name), label(y.name), (x.coordinate, y.coordinate));
+    let axis_of = |kind: Coordinate, of: fn(&(f64, f64)) -> f64| {
         let fitted = axis(points.iter().map(of))?;
-        Some(if is_angle { Axis::Angle } else { fitted })
+        Some(match kind {
+            Coordinate::Angle => Axis::Angle,
+            Coordinate::Number => fitted,
+        })
     };
-    let (x, y) = (axis_of(angles.0, |p| p.0)?, axis_of(angles.1, |p| p.1)?);
+    let (x, y) = (axis_of(kinds.0, |p| p.0)?, axis_of(kinds.1, |p| p.1)?);
     let curves = match line {
-        _ if angles == (false, false) => vec![Curve::unnamed(line, points)],
+        _ if kinds == (Coordinate::Number, Coordinate::Number) => vec![Curve::unnamed(line, points)],
         // Single points are not joined by lines.
         Line::Discs | Line::Dots => {
-            let fold_if = |is_angle: bool, x: f64| if is_angle { fold(x) } else { x };
-            vec![Curve::unnamed(line, points.iter().map(|p| (fold_if(angles.0, p.0), fold_if(angles.1, p.1))))]
+            let reduced = |kind: Coordinate, x: f64| if kind == Coordinate::Angle { fold(x) } else { x };
+            vec![Curve::unnamed(line, points.iter().map(|p| (reduced(kinds.0, p.0), reduced(kinds.1, p.1))))]
         }
-        _ => folded(&points, angles).into_iter().map(|piece| Curve::unnamed(line, piece)).collect(),
+        _ => folded(&points, kinds).into_iter().map(|piece| Curve::unnamed(line, piece)).collect(),
     };
     Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
 }

@@ -1,14 +1,14 @@
 //! The implicit midpoint rule for assembled systems.
 
-use super::corrections::{Corrections, Verdict};
-use super::krylov::Krylov;
-use super::max_abs_or_nan;
-use super::sparse::Sparse;
+use super::conjugate_gradients::ConjugateGradients;
+use super::max_norm::max_norm;
+use super::midpoint_matrix::MidpointMatrix;
+use super::newton_convergence::{NewtonConvergence, NewtonDecision};
 use crate::AssemblyError;
-use crate::blocks::BLOCK;
-use crate::kernels::Weight;
-use crate::monitor::{EnergyMonitor, Reached, StepFacts};
-use crate::system::{AssembledSystem, State};
+use crate::blocks::BLOCK_SIZE;
+use crate::kick::KickFactor;
+use crate::monitor::{EnergyMonitor, RunProgress, StepInfo};
+use crate::system::{AssembledSystem, MassSource, State};
 use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solve::ITERATION_LIMIT};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
@@ -23,32 +23,35 @@ use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solv
 /// that further solves would cost more, and stops when the estimated next correction is below round-off.
 pub struct AssembledMidpoint<'a> {
     system: &'a AssembledSystem,
-    pub(super) linear: Linear,
+    pub(super) solver: LinearSolver,
     h: f64,
     t0: f64,
     taken: usize,
-    factorised: bool,
+    /// Whether the factors of the sparse matrix are in use for further corrections.
+    factors_are_current: bool,
     factorisations: u64,
     iterations: u64,
     q: Vec<f64>,
     v: Vec<f64>,
     z: f64,
-    action: bool,
-    /// The mean velocities of the last step (`u`) and of the step before it (`before`).
+    has_action: bool,
+    /// The mean velocities of the last step.
     u: Vec<f64>,
-    before: Vec<f64>,
+    /// Those of the step before it; during a step, the initial guess of the next mean velocities, and then these.
+    other_u: Vec<f64>,
+    /// The positions at the midpoint, padded.
     middle: Vec<f64>,
     residual: Vec<f64>,
-    change: Vec<f64>,
+    correction: Vec<f64>,
     monitor: EnergyMonitor,
 }
 
 /// The solver for the corrections of Newton's method.
-pub(super) enum Linear {
+pub(super) enum LinearSolver {
     /// Factors of the sparse matrix.
-    Sparse(Box<Sparse>),
+    Factors(Box<MidpointMatrix>),
     /// Conjugate gradients, by products with the matrix.
-    Krylov(Krylov),
+    ConjugateGradients(ConjugateGradients),
 }
 
 impl<'a> AssembledMidpoint<'a> {
@@ -65,7 +68,9 @@ impl<'a> AssembledMidpoint<'a> {
         start: State,
         memory: Option<usize>,
     ) -> Result<Self, AssemblyError> {
-        Self::with(system, h, start, || Ok(Linear::Sparse(Box::new(Sparse::new(system, memory)?))))
+        Self::with_solver(system, h, start, || {
+            Ok(LinearSolver::Factors(Box::new(MidpointMatrix::new(system, memory)?)))
+        })
     }
 
     /// The same steps by Newton's method with conjugate gradients, for systems with a full matrix, such as N bodies.
@@ -89,53 +94,53 @@ impl<'a> AssembledMidpoint<'a> {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub fn matrix_free(system: &'a AssembledSystem, h: f64, start: State) -> Result<Self, AssemblyError> {
-        Self::with(system, h, start, || Ok(Linear::Krylov(Krylov::new(system)?)))
+        Self::with_solver(system, h, start, || Ok(LinearSolver::ConjugateGradients(ConjugateGradients::new(system)?)))
     }
 
-    fn with(
+    fn with_solver(
         system: &'a AssembledSystem,
         h: f64,
         start: State,
-        linear: impl FnOnce() -> Result<Linear, AssemblyError>,
+        solver: impl FnOnce() -> Result<LinearSolver, AssemblyError>,
     ) -> Result<Self, AssemblyError> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h }.into());
         }
         start.check(system)?;
         system.check_separable()?;
-        system.check_masses(false)?;
+        system.check_masses(MassSource::Diagonal)?;
         AssembledSystem::check_number("gamma", system.rate(start.t))?;
         let half = 0.5 * h * system.rate(start.t + 0.5 * h);
         if half.abs() >= 1.0 {
             return Err(InputError::Sigma { sigma: (1.0 + half) / (1.0 - half) }.into());
         }
         let n = system.unknowns();
-        let linear = linear()?;
+        let solver = solver()?;
         let mut q = vec![0.0; n + 2];
         q[1..=n].copy_from_slice(start.q);
         let zeros = vec![0.0; n];
         let log_sigma = ((1.0 + half) / (1.0 - half)).ln();
-        let monitor = EnergyMonitor::new(system, start, StepFacts { h, log_sigma, order: 2 }, |bounded| {
-            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), bounded)
+        let monitor = EnergyMonitor::new(system, start, StepInfo { h, log_sigma, order: 2 }, |kind| {
+            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), kind)
         });
         let mut midpoint = AssembledMidpoint {
             system,
-            linear,
+            solver,
             h,
             t0: start.t,
             taken: 0,
-            factorised: false,
+            factors_are_current: false,
             factorisations: 0,
             iterations: 0,
             middle: q.clone(),
             q,
             v: start.v.to_vec(),
             z: start.z.unwrap_or(0.0),
-            action: start.z.is_some(),
+            has_action: start.z.is_some(),
             u: start.v.to_vec(),
-            before: zeros.clone(),
+            other_u: zeros.clone(),
             residual: zeros.clone(),
-            change: zeros,
+            correction: zeros,
             monitor,
         };
         midpoint.forces(start.t);
@@ -155,7 +160,7 @@ impl<'a> AssembledMidpoint<'a> {
         for taken in 0..steps {
             self.step().map_err(|cause| StepFailure { taken, cause })?;
             if self.monitor.is_due(self.taken) {
-                self.look();
+                self.check_energy();
             }
         }
         Ok(())
@@ -163,12 +168,12 @@ impl<'a> AssembledMidpoint<'a> {
 
     /// Checks the energy.
     #[cold]
-    fn look(&mut self) {
+    fn check_energy(&mut self) {
         let State { t, z, .. } = self.state();
         let log_factor = self.taken as f64 * self.sigma().ln();
-        let (reached, z) = (Reached { t, log_factor, taken: self.taken }, z.unwrap_or(0.0));
+        let (progress, z) = (RunProgress { t, log_factor, taken: self.taken }, z.unwrap_or(0.0));
         let AssembledMidpoint { system, q, v, monitor, .. } = self;
-        monitor.look(system, reached, |t, bounded| system.energies((t, q, v, z), bounded));
+        monitor.check(system, progress, |t, kind| system.energies((t, q, v, z), kind));
     }
 
     /// The first step at which the energy showed that the steps do not resolve the motion, if there is one: results
@@ -180,8 +185,8 @@ impl<'a> AssembledMidpoint<'a> {
     /// depends on time, nor from `T + V` if `gamma h > 0`. For a constant gamma the conformal factor of a step is also
     /// compared with `e^(gamma h)`.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
-        if self.monitor.tells(self.taken) {
-            self.look();
+        if self.monitor.can_check(self.taken) {
+            self.check_energy();
         }
         self.monitor.unresolved()
     }
@@ -193,7 +198,7 @@ impl<'a> AssembledMidpoint<'a> {
             t: self.t0 + self.taken as f64 * self.h,
             q: &self.q[1..=n],
             v: &self.v,
-            z: self.action.then_some(self.z),
+            z: self.has_action.then_some(self.z),
         }
     }
 
@@ -215,7 +220,10 @@ impl<'a> AssembledMidpoint<'a> {
 
     /// The number of matrix-vector products of the conjugate gradients so far.
     pub fn products(&self) -> u64 {
-        if let Linear::Krylov(krylov) = &self.linear { krylov.products() } else { 0 }
+        match &self.solver {
+            LinearSolver::Factors(_) => 0,
+            LinearSolver::ConjugateGradients(solver) => solver.products(),
+        }
     }
 
     /// The number of Newton iterations so far; each has one linear solve and one evaluation of the forces.
@@ -231,107 +239,107 @@ impl<'a> AssembledMidpoint<'a> {
         if half.is_nan() || half.abs() >= 1.0 {
             return Err(StepError::SigmaVanished { sigma: (1.0 + half) / (1.0 - half) });
         }
-        // The initial guess is the linear extrapolation of the mean velocities, stored in `before`.
-        for ((before, u), v) in self.before.iter_mut().zip(&self.u).zip(&self.v) {
-            *before = if self.taken == 0 { *v } else { 2.0 * u - *before };
+        // The initial guess is the linear extrapolation of the mean velocities, stored in `other_u`.
+        for ((guess, u), v) in self.other_u.iter_mut().zip(&self.u).zip(&self.v) {
+            *guess = if self.taken == 0 { *v } else { 2.0 * u - *guess };
         }
-        let root = self.solve(t, half);
-        if root.is_err() {
+        let solution = self.solve(t, half);
+        if solution.is_err() {
             // A retry starts from the mean velocity of the last step.
-            self.before.copy_from_slice(&self.u);
+            self.other_u.copy_from_slice(&self.u);
         }
-        root?;
-        let gain = 1.0 / (1.0 - half);
+        solution?;
+        let factor = 1.0 / (1.0 - half);
         let mut twice_kinetic = 0.0;
         for i in 0..n {
-            let u = self.before[i];
+            let u = self.other_u[i];
             self.middle[i + 1] = self.q[i + 1] + 0.5 * h * u;
             self.q[i + 1] += h * u;
-            self.v[i] = (2.0 * u - (1.0 + half) * self.v[i]) * gain;
-            if self.action {
+            self.v[i] = (2.0 * u - (1.0 + half) * self.v[i]) * factor;
+            if self.has_action {
                 twice_kinetic += self.system.mass(i) * u * u;
             }
         }
-        if self.action {
+        if self.has_action {
             let potential = self.system.potential(t, &self.middle);
-            self.z = ((1.0 + half) * self.z + h * (0.5 * twice_kinetic - potential)) * gain;
+            self.z = ((1.0 + half) * self.z + h * (0.5 * twice_kinetic - potential)) * factor;
         }
-        std::mem::swap(&mut self.u, &mut self.before);
+        std::mem::swap(&mut self.u, &mut self.other_u);
         self.taken += 1;
         Ok(())
     }
 
-    /// Solves for the mean velocity; `before` holds the initial guess, and then the solution.
+    /// Solves for the mean velocity; `other_u` holds the initial guess, and then the solution.
     fn solve(&mut self, t: f64, half: f64) -> Result<(), StepError> {
         let (h, n) = (self.h, self.system.unknowns());
-        let resolution = max_abs_or_nan(&self.q) / h.abs();
-        let mut corrections = Corrections::new();
-        let mut size = f64::INFINITY;
+        let resolution = max_norm(&self.q) / h.abs();
+        let mut convergence = NewtonConvergence::new();
+        let mut residual = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
             for i in 0..n {
-                self.middle[i + 1] = self.q[i + 1] + 0.5 * h * self.before[i];
+                self.middle[i + 1] = self.q[i + 1] + 0.5 * h * self.other_u[i];
             }
             // `residual` first holds -V_q, then the residual of the equation.
             self.forces(t);
             for i in 0..n {
                 let m = self.system.mass(i);
-                let (u, v) = (self.before[i], self.v[i]);
+                let (u, v) = (self.other_u[i], self.v[i]);
                 self.residual[i] = m * (u - (1.0 + half) * v) - 0.5 * h * self.residual[i];
             }
-            size = max_abs_or_nan(&self.residual);
-            if !size.is_finite() {
+            residual = max_norm(&self.residual);
+            if !residual.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            if !self.factorised && matches!(self.linear, Linear::Sparse(_)) {
-                corrections.forget();
+            if !self.factors_are_current && matches!(self.solver, LinearSolver::Factors(_)) {
+                convergence.restart();
             }
             self.correct(t)?;
-            for (u, change) in self.before.iter_mut().zip(&self.change) {
-                *u -= change;
+            for (u, correction) in self.other_u.iter_mut().zip(&self.correction) {
+                *u -= correction;
             }
             self.iterations += 1;
-            let (now, speed) = (max_abs_or_nan(&self.change), max_abs_or_nan(&self.before));
-            if !now.is_finite() {
+            let (size_of_correction, speed) = (max_norm(&self.correction), max_norm(&self.other_u));
+            if !size_of_correction.is_finite() {
                 return Err(StepError::NonFinite);
             }
             // A correction below this changes neither the position nor the velocity.
             let round_off = f64::EPSILON * (speed + resolution);
-            match corrections.judge(now, round_off) {
-                Verdict::Done => return Ok(()),
-                Verdict::Further => {}
-                Verdict::Factorise => self.factorised = false,
+            match convergence.decide(size_of_correction, round_off) {
+                NewtonDecision::Converged => return Ok(()),
+                NewtonDecision::Continue => {}
+                NewtonDecision::Refactorise => self.factors_are_current = false,
             }
         }
-        self.factorised = false;
-        Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
+        self.factors_are_current = false;
+        Err(StepError::NotConverged { residual, iterations: ITERATION_LIMIT })
     }
 
     /// Computes `-V_q` at the midpoint, into `residual`.
     fn forces(&mut self, t: f64) {
-        for (block, force) in self.residual.chunks_mut(BLOCK).enumerate() {
+        for (block, force) in self.residual.chunks_mut(BLOCK_SIZE).enumerate() {
             force.fill(0.0);
             for list in &self.system.potentials {
-                list.kick(block, t, &self.middle, Weight::Same(1.0), force, None);
+                list.kick(block, t, &self.middle, KickFactor::Uniform(1.0), force, None);
             }
         }
     }
 
-    /// Computes the correction for the present residual, into `change`.
+    /// Computes the correction for the present residual, into `correction`.
     fn correct(&mut self, t: f64) -> Result<(), StepError> {
         let factor = 0.25 * self.h * self.h;
-        self.change.copy_from_slice(&self.residual);
-        if let Linear::Krylov(krylov) = &mut self.linear {
-            return krylov.solve(self.system, (t, &self.middle), factor, &mut self.change);
+        self.correction.copy_from_slice(&self.residual);
+        if let LinearSolver::ConjugateGradients(solver) = &mut self.solver {
+            return solver.solve(self.system, (t, &self.middle), factor, &mut self.correction);
         }
-        let fresh = !self.factorised;
-        if fresh {
+        let is_new = !self.factors_are_current;
+        if is_new {
             self.factorise(t)?;
         }
-        let Linear::Sparse(sparse) = &mut self.linear else { return Ok(()) };
-        sparse.factors.solve(&mut self.change)?;
-        let n = self.change.len();
-        if fresh && !sparse.solves(&self.change, &self.residual, &mut self.middle[1..=n]) {
-            self.factorised = false;
+        let LinearSolver::Factors(matrix) = &mut self.solver else { return Ok(()) };
+        matrix.factors.solve(&mut self.correction)?;
+        let n = self.correction.len();
+        if is_new && !matrix.is_solution(&self.correction, &self.residual, &mut self.middle[1..=n]) {
+            self.factors_are_current = false;
             return Err(StepError::Singular { pivot: 0.0 });
         }
         Ok(())
@@ -339,9 +347,9 @@ impl<'a> AssembledMidpoint<'a> {
 
     /// Factorises `M + (h^2/4) V_qq` at the midpoint.
     pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
-        if let Linear::Sparse(sparse) = &mut self.linear {
-            sparse.factorise(self.system, (t, &self.middle), 0.25 * self.h * self.h)?;
-            self.factorised = true;
+        if let LinearSolver::Factors(matrix) = &mut self.solver {
+            matrix.factorise(self.system, (t, &self.middle), 0.25 * self.h * self.h)?;
+            self.factors_are_current = true;
             self.factorisations += 1;
         }
         Ok(())

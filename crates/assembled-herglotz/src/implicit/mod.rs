@@ -1,30 +1,22 @@
 //! Implicit integrators: sparse nonlinear equations, solved with faer.
 
 mod border;
-mod corrections;
-mod factors;
+mod cholesky;
+mod conjugate_gradients;
 mod gauss;
-mod krylov;
+mod gauss_table;
 mod lu;
+mod max_norm;
 mod midpoint;
+mod midpoint_matrix;
+mod newton_convergence;
 mod pattern;
-mod second;
-mod sparse;
-mod stages;
+mod stage_equations;
+mod stage_jacobian;
 #[cfg(test)]
 mod tests;
+mod velocity_solver;
 
 pub use gauss::AssembledGauss;
 pub use midpoint::AssembledMidpoint;
-pub(crate) use pattern::{FullPattern, Pattern};
-
-/// The largest absolute component; infinite if a component is NaN.
-fn max_abs_or_nan(x: &[f64]) -> f64 {
-    let mut largest = 0.0f64;
-    let mut sum = 0.0;
-    for x in x {
-        largest = largest.max(x.abs());
-        sum += x;
-    }
-    if sum.is_nan() { f64::INFINITY } else { largest }
-}
+pub(crate) use pattern::{FullPattern, LowerPattern};

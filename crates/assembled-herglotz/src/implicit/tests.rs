@@ -1,7 +1,7 @@
 //! Compares the assembled matrix of a step with second derivatives of the whole Lagrangian by dual numbers.
 
 use super::AssembledMidpoint;
-use super::midpoint::Linear;
+use super::midpoint::LinearSolver;
 use crate::{AssembledSystem, Difference, FIXED, Potential, State};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint};
@@ -64,12 +64,12 @@ fn the_assembled_matrix_is_that_of_the_whole() {
     midpoint.factorise(start.t).unwrap();
     let x = VelocityPoint { q: SVector::from(q), v: SVector::zeros(), z: 0.0 };
     let whole = Whole.hessian(start.t, &x).qq;
-    let Linear::Sparse(sparse) = &midpoint.linear else { unreachable!() };
-    let pattern = sparse.factors.pattern();
+    let LinearSolver::Factors(matrix) = &midpoint.solver else { unreachable!() };
+    let pattern = matrix.factors.pattern();
     for i in 1..=N {
         for j in 1..=N {
             let at = pattern.entry(i, j);
-            let found = sparse.entries.get(at as usize).copied().unwrap_or(0.0);
+            let found = matrix.entries.get(at as usize).copied().unwrap_or(0.0);
             let expected = f64::from(i == j) - 0.25 * H * H * whole[(i - 1, j - 1)];
             // Sums of a few terms of size one.
             assert!((found - expected).abs() <= 20.0 * f64::EPSILON, "({i}, {j}): {found}, not {expected}");

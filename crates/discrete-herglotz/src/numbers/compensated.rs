@@ -29,7 +29,7 @@ impl CompensatedSum {
 
 /// The sum and its round-off error, by Knuth's TwoSum; either number may be the larger.
 #[inline(always)]
-pub(crate) fn exact_sum(a: f64, b: f64) -> (f64, f64) {
+pub fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let of_b = sum - a;
     (sum, (a - (sum - of_b)) + (b - of_b))

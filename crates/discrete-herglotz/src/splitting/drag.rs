@@ -45,9 +45,7 @@ impl<const N: usize> Drag<N> {
     #[inline(never)]
     pub(crate) fn drift(&self, lagrangian: &impl Lagrangian<N>, t: f64, s: f64) -> Drift {
         if let Drag::Constant(gamma) = self {
-            let damping = (gamma * s).exp_m1();
-            let length = if *gamma == 0.0 { s } else { damping / gamma };
-            return Drift { length, damping, lift: 0.5 * (1.0 + damping) * length };
+            return Drift::constant(*gamma, s);
         }
         // A step that begins with a kick ends with an empty drift.
         if s == 0.0 {
@@ -61,8 +59,7 @@ impl<const N: usize> Drag<N> {
             let so_far: f64 = rates.iter().zip(&g.a[i]).map(|(rate, a)| s * a.0 * rate).sum();
             length += s * g.b[i].0 * so_far.exp();
         }
-        let damping = growth.exp_m1();
-        Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
+        Drift::new(length, growth.exp_m1())
     }
 }
 
@@ -71,13 +68,28 @@ impl<const N: usize> Drag<N> {
 ///
 /// For any values of the two integrals it is a conformal contact map with the factor `1 + damping`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drift {
+pub struct Drift {
     /// The integral of `e^g`; for a constant gamma `(e^(gamma s) - 1)/gamma`.
-    pub(crate) length: f64,
+    pub length: f64,
     /// `e^g(s) - 1`: multiplying the momentum by `e^g` itself would accumulate the round-off of that factor.
-    pub(crate) damping: f64,
+    pub damping: f64,
     /// The coefficient of `p.M^-1 p` in the action, `e^g(s) length / 2`.
-    pub(crate) lift: f64,
+    pub lift: f64,
+}
+
+impl Drift {
+    /// The drift with these two integrals.
+    #[inline(always)]
+    pub fn new(length: f64, damping: f64) -> Self {
+        Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
+    }
+
+    /// The drift over a time s of either sign with a constant gamma.
+    #[inline(always)]
+    pub fn constant(gamma: f64, s: f64) -> Self {
+        let damping = (gamma * s).exp_m1();
+        Drift::new(if gamma == 0.0 { s } else { damping / gamma }, damping)
+    }
 }
 
 #[cfg(test)]

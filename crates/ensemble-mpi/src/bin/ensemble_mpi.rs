@@ -58,13 +58,13 @@ struct Arguments {
 }
 
 /// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at an index: a number in `[-1, 1)`.
-fn random(seed: u64, place: u64) -> f64 {
+fn random(seed: u64, index: u64) -> f64 {
     let mixed = |x: u64| {
         let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         x ^ (x >> 31)
     };
-    let word = mixed(mixed(seed).wrapping_add((place + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+    let word = mixed(mixed(seed).wrapping_add((index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
     (word >> 11) as f64 * f64::EPSILON - 1.0
 }
 
@@ -188,7 +188,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn report(Merged { tally, resumed, traffic }: &Merged, elapsed: Duration, rates: bool) {
+fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, rates: bool) {
     println!("{} members: {} completed, {} failed", tally.members, tally.completed, tally.failed);
     println!("{resumed} shards from the checkpoint");
     if !rates {

@@ -1,6 +1,9 @@
 //! Error messages of the parser, with the correction to make.
 
-use super::*;
+use super::Parser;
+use crate::ParseError;
+use crate::hints::{instead_of_function, instead_of_name, velocity_of};
+use crate::token::{Token, Word};
 
 impl<'a> Parser<'a> {
     pub(super) fn unexpected(&self, word: Word<'a>, wanted: &str) -> ParseError {

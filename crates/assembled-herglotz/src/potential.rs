@@ -38,7 +38,7 @@ pub trait Potential<const K: usize, const P: usize = 0>: Send + Sync + 'static {
             x.d[i] = T::one();
             x
         });
-        self.energy(KernelDual::constant(t), &column(lifted), &c.map(KernelDual::constant)).d
+        self.energy(KernelDual::constant(t), &vector(lifted), &c.map(KernelDual::constant)).d
     }
 }
 
@@ -55,12 +55,12 @@ macro_rules! difference {
         impl<W: Potential<$d, P>, const P: usize> Potential<$k, P> for Difference<W> {
             #[inline(always)]
             fn energy<T: Scalar>(&self, t: T, q: &SVector<T, $k>, c: &[T; P]) -> T {
-                self.0.energy(t, &column(std::array::from_fn(|i| q[$d + i] - q[i])), c)
+                self.0.energy(t, &vector(std::array::from_fn(|i| q[$d + i] - q[i])), c)
             }
             #[inline(always)]
             fn gradient<T: Scalar>(&self, t: T, q: &SVector<T, $k>, c: &[T; P]) -> SVector<T, $k> {
-                let g: SVector<T, $d> = self.0.gradient(t, &column(std::array::from_fn(|i| q[$d + i] - q[i])), c);
-                column(std::array::from_fn(|i| if i < $d { -g[i] } else { g[i - $d] }))
+                let g: SVector<T, $d> = self.0.gradient(t, &vector(std::array::from_fn(|i| q[$d + i] - q[i])), c);
+                vector(std::array::from_fn(|i| if i < $d { -g[i] } else { g[i - $d] }))
             }
         }
     )*};
@@ -69,6 +69,6 @@ difference! { 1, 2; 2, 4; 3, 6; }
 
 /// A vector with these components.
 #[inline(always)]
-pub(crate) fn column<T, const K: usize>(x: [T; K]) -> SVector<T, K> {
+pub(crate) fn vector<T, const K: usize>(x: [T; K]) -> SVector<T, K> {
     SVector::from_array_storage(ArrayStorage([x]))
 }

@@ -9,18 +9,19 @@ use faer::matrix_free::{IdentityPrecond, InitialGuessStatus, LinOp};
 use faer::{MatMut, MatRef, Par};
 use std::sync::{Mutex, PoisonError};
 
-/// The relative residual of a solution. Newton's method corrects the remaining error.
-const LEFT: f64 = 1e-8;
+/// The relative residual of a solution, about the square root of the machine epsilon. Newton's method corrects the
+/// remaining error, and two iterations reach round-off.
+const RELATIVE_RESIDUAL: f64 = 1e-8;
 
 /// The maximum number of matrix-vector products for one solution. A step that needs more is far too long for its
 /// forces.
-const MOST: u32 = 1000;
+const MAX_PRODUCTS: u32 = 1000;
 
 /// Solves `(M + (h^2/4) V_qq) x = b` by faer's conjugate gradients in the variables `M^(1/2) x`. In these variables the
 /// matrix is the identity plus the contribution of the forces, for any masses.
-pub(super) struct Krylov {
+pub(super) struct ConjugateGradients {
     /// `M^(-1/2)`.
-    roots: Vec<f64>,
+    inverse_roots: Vec<f64>,
     /// A vector and its product with the matrix, both padded.
     padded: Mutex<[Vec<f64>; 2]>,
     scaled: Vec<f64>,
@@ -28,19 +29,19 @@ pub(super) struct Krylov {
     products: u64,
 }
 
-impl Krylov {
+impl ConjugateGradients {
     /// The solver for a system in which every unknown has a mass.
     ///
     /// # Errors
     /// [`AssemblyError::Memory`].
     pub fn new(system: &AssembledSystem) -> Result<Self, AssemblyError> {
         let n = system.unknowns();
-        let roots = (0..n).map(|i| system.mass(i).sqrt().recip()).collect();
+        let inverse_roots = (0..n).map(|i| system.mass(i).sqrt().recip()).collect();
         let request =
             conjugate_gradient_scratch::<f64>(IdentityPrecond { dim: n }, IdentityPrecond { dim: n }, 1, Par::Seq);
         let too_much = |_| AssemblyError::Memory { needed: request.size_bytes(), limit: usize::MAX };
-        Ok(Krylov {
-            roots,
+        Ok(ConjugateGradients {
+            inverse_roots,
             padded: Mutex::new([vec![0.0; n + 2], vec![0.0; n + 2]]),
             scaled: vec![0.0; n],
             scratch: MemBuffer::try_new(request).map_err(too_much)?,
@@ -65,17 +66,17 @@ impl Krylov {
         factor: f64,
         b: &mut [f64],
     ) -> Result<(), StepError> {
-        let Krylov { roots, padded, scaled, scratch, products } = self;
+        let ConjugateGradients { inverse_roots, padded, scaled, scratch, products } = self;
         let n = b.len();
-        for ((y, b), root) in scaled.iter_mut().zip(b.iter_mut()).zip(roots.iter()) {
+        for ((y, b), root) in scaled.iter_mut().zip(b.iter_mut()).zip(inverse_roots.iter()) {
             (*y, *b) = (*b * root, 0.0);
         }
-        let matrix = Scaled { system, t, q, factor, roots, padded };
+        let matrix = ScaledMatrix { system, t, q, factor, inverse_roots, padded };
         let params = CgParams {
             // With `Zero`, faer 0.24.4 uses a residual that it has not initialised.
             initial_guess: InitialGuessStatus::MaybeNonZero,
-            rel_tolerance: LEFT,
-            max_iters: MOST as usize,
+            rel_tolerance: RELATIVE_RESIDUAL,
+            max_iters: MAX_PRODUCTS as usize,
             ..CgParams::default()
         };
         let outcome = conjugate_gradient(
@@ -91,11 +92,11 @@ impl Krylov {
         match outcome {
             Ok(info) => *products += info.iter_count as u64,
             Err(CgError::NoConvergence { abs_residual, .. }) => {
-                return Err(StepError::NotConverged { residual: abs_residual, iterations: MOST });
+                return Err(StepError::NotConverged { residual: abs_residual, iterations: MAX_PRODUCTS });
             }
             Err(_) => return Err(StepError::Singular { pivot: 0.0 }),
         }
-        for (x, root) in b.iter_mut().zip(roots.iter()) {
+        for (x, root) in b.iter_mut().zip(inverse_roots.iter()) {
             *x *= root;
         }
         if b.iter().sum::<f64>().is_finite() { Ok(()) } else { Err(StepError::NonFinite) }
@@ -103,32 +104,32 @@ impl Krylov {
 }
 
 /// `1 + (h^2/4) M^(-1/2) V_qq M^(-1/2)`, applied to vectors by directional derivatives of the forces.
-struct Scaled<'a> {
+struct ScaledMatrix<'a> {
     system: &'a AssembledSystem,
     t: f64,
     q: &'a [f64],
     factor: f64,
-    roots: &'a [f64],
+    inverse_roots: &'a [f64],
     padded: &'a Mutex<[Vec<f64>; 2]>,
 }
 
-impl std::fmt::Debug for Scaled<'_> {
+impl std::fmt::Debug for ScaledMatrix<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Scaled").field("unknowns", &self.roots.len()).finish()
+        f.debug_struct("ScaledMatrix").field("unknowns", &self.inverse_roots.len()).finish()
     }
 }
 
-impl LinOp<f64> for Scaled<'_> {
+impl LinOp<f64> for ScaledMatrix<'_> {
     fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
         StackReq::EMPTY
     }
 
     fn nrows(&self) -> usize {
-        self.roots.len()
+        self.inverse_roots.len()
     }
 
     fn ncols(&self) -> usize {
-        self.roots.len()
+        self.inverse_roots.len()
     }
 
     fn apply(&self, mut out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
@@ -136,13 +137,13 @@ impl LinOp<f64> for Scaled<'_> {
         let [x, product] = &mut *padded;
         for j in 0..rhs.ncols() {
             product.fill(0.0);
-            for (i, root) in self.roots.iter().enumerate() {
+            for (i, root) in self.inverse_roots.iter().enumerate() {
                 x[i + 1] = rhs[(i, j)] * root;
             }
             for list in &self.system.potentials {
-                list.hessian_times(self.t, self.q, x, product);
+                list.add_hessian_product(self.t, self.q, x, product);
             }
-            for (i, root) in self.roots.iter().enumerate() {
+            for (i, root) in self.inverse_roots.iter().enumerate() {
                 out[(i, j)] = rhs[(i, j)] + self.factor * root * product[i + 1];
             }
         }

@@ -1,6 +1,7 @@
 //! Sparse Cholesky factors of a symmetric matrix, by faer.
 
-use super::pattern::Pattern;
+use super::max_norm::max_norm;
+use super::pattern::LowerPattern;
 use crate::AssemblyError;
 use discrete_herglotz::StepError;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
@@ -12,29 +13,30 @@ use faer::{Conj, MatMut, Par, Side};
 
 /// The factors of a sequence of matrices with the same pattern: `L L^T` if the matrix is positive definite, else
 /// `L D L^T`. The symbolic analysis is made once.
-pub(crate) struct Factors {
-    pattern: Pattern,
+pub(crate) struct CholeskyFactors {
+    pattern: LowerPattern,
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
     scratch: MemBuffer,
-    definite: bool,
+    is_definite: bool,
 }
 
-impl Factors {
+impl CholeskyFactors {
     /// Analyses a pattern.
     ///
     /// # Errors
     /// [`AssemblyError::Memory`] if factors and workspace need more than `limit` bytes. The check is made before
     /// anything of that size is allocated.
-    pub fn new(pattern: Pattern, limit: usize) -> Result<Self, AssemblyError> {
+    pub fn new(pattern: LowerPattern, limit: usize) -> Result<Self, AssemblyError> {
         let n = pattern.unknowns();
-        // faer fails here only for lack of memory; then the size of the pattern is reported.
-        let own = 4 * pattern.rows.len();
+        // faer fails here only for lack of memory; then the size of the pattern is reported, of 4 bytes for each row
+        // index.
+        let pattern_bytes = 4 * pattern.rows.len();
         let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
-        let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.begins, None, &pattern.rows);
+        let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
         let symbolic =
             factorize_symbolic_cholesky(lower, Side::Lower, SymmetricOrdering::Amd, CholeskySymbolicParams::default())
-                .map_err(|_| too_much(own))?;
+                .map_err(|_| too_much(pattern_bytes))?;
         let request = StackReq::any_of(&[
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()),
@@ -48,11 +50,11 @@ impl Factors {
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.len_val()).map_err(|_| too_much(needed))?;
         values.resize(symbolic.len_val(), 0.0);
-        Ok(Factors { pattern, symbolic, values, scratch, definite: true })
+        Ok(CholeskyFactors { pattern, symbolic, values, scratch, is_definite: true })
     }
 
     #[cfg(test)]
-    pub fn pattern(&self) -> &Pattern {
+    pub fn pattern(&self) -> &LowerPattern {
         &self.pattern
     }
 
@@ -65,15 +67,15 @@ impl Factors {
         if !entries.iter().sum::<f64>().is_finite() {
             return Err(StepError::NonFinite);
         }
-        let Factors { pattern, symbolic, values, scratch, definite } = self;
+        let CholeskyFactors { pattern, symbolic, values, scratch, is_definite } = self;
         let n = pattern.unknowns();
-        let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.begins, None, &pattern.rows);
+        let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
         let matrix = SparseColMatRef::new(lower, entries);
         let stack = MemStack::new(scratch);
         let (regular, par) = (Default::default(), Par::Seq);
         let llt = symbolic.factorize_numeric_llt(values, matrix, Side::Lower, regular, par, stack, Default::default());
-        *definite = llt.is_ok();
-        if *definite {
+        *is_definite = llt.is_ok();
+        if *is_definite {
             return Ok(());
         }
         let ldlt = symbolic.factorize_numeric_ldlt(
@@ -96,7 +98,7 @@ impl Factors {
         let n = b.len();
         let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
         let stack = MemStack::new(&mut self.scratch);
-        if self.definite {
+        if self.is_definite {
             let factors = LltRef::new(&self.symbolic, &self.values);
             factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
         } else {
@@ -110,7 +112,7 @@ impl Factors {
     pub fn residual(&self, entries: &[f64], x: &[f64], b: &[f64], work: &mut [f64]) -> (f64, f64) {
         work.copy_from_slice(b);
         let mut size = 0.0f64;
-        for (column, ends) in self.pattern.begins.windows(2).enumerate() {
+        for (column, ends) in self.pattern.column_starts.windows(2).enumerate() {
             let (from, to) = (ends[0] as usize, ends[1] as usize);
             for (row, a) in self.pattern.rows[from..to].iter().zip(&entries[from..to]) {
                 let row = *row as usize;
@@ -121,6 +123,6 @@ impl Factors {
                 size = size.max((a * x[column]).abs());
             }
         }
-        (super::max_abs_or_nan(work), size)
+        (max_norm(work), size)
     }
 }
