@@ -2,7 +2,6 @@
 //! check and document its functions.
 
 mod arrays;
-mod assembled;
 mod checks;
 mod condition;
 mod contact;
@@ -14,6 +13,7 @@ mod operators;
 mod path;
 mod run;
 mod signals;
+mod sparse;
 mod symbol;
 mod system;
 mod text;
@@ -24,8 +24,6 @@ use pyo3::prelude::*;
 /// The extension module.
 #[pymodule]
 mod _core {
-    #[pymodule_export]
-    use crate::assembled::{run_bodies, run_lattice};
     #[pymodule_export]
     use crate::checks::{check, compare, geometry};
     #[pymodule_export]
@@ -46,6 +44,8 @@ mod _core {
     use crate::path::{PathRecord, search_path};
     #[pymodule_export]
     use crate::run::{Record, resume, run};
+    #[pymodule_export]
+    use crate::sparse::{run_bodies, run_lattice};
     #[pymodule_export]
     use crate::symbol::Symbol;
     #[pymodule_export]

@@ -14,7 +14,7 @@ use nalgebra::SVector;
 /// For few bodies over many revolutions, Gauss collocation with two to five steps per period of the fastest body is
 /// recommended. Its kernels are compiled for each N; this system is therefore not part of
 /// [`visit_catalogue`](super::visit_catalogue). For any number of bodies see `bodies` of the crate
-/// `assembled-herglotz`.
+/// `sparse-herglotz`.
 ///
 /// ```
 /// use contact_geom::{Lagrangian, systems::Bodies};

@@ -1,9 +1,9 @@
 //! Errors of a request.
 
-use assembled_herglotz::AssemblyError;
 use contact_geom::GeometryError;
 use discrete_herglotz::{CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError};
 use formula_lagrangian::FormulaError;
+use sparse_herglotz::SparseError;
 use thiserror::Error;
 
 /// Invalid input to a system that is defined at run time.
@@ -75,7 +75,7 @@ pub enum RuntimeError {
     },
     /// A system of many coordinates, or its integrator.
     #[error(transparent)]
-    Assembly(#[from] AssemblyError),
+    Assembly(#[from] SparseError),
     /// The formula of a part of a system.
     #[error("`{part}`: {error}")]
     Part {

@@ -19,7 +19,6 @@
 //! # Ok::<(), herglotz::runtime::RuntimeError>(())
 //! ```
 
-mod assembled;
 mod catalogue;
 mod check;
 mod column;
@@ -34,10 +33,10 @@ mod parameters;
 mod path;
 mod peer;
 mod request;
+mod sparse;
 mod symmetry;
 mod system;
 
-pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
@@ -51,6 +50,7 @@ pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
+pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem};
 pub use symmetry::FormulaSymmetry;
 pub use system::System;
 

@@ -7,7 +7,7 @@ use super::location::{Location, Named, Span};
 use super::output::{RowTimes, of_formula};
 use super::step_control::step_control;
 use crate::runtime::{
-    AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError,
+    AnyIntegrator, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError, SiteMotion, SiteSystem,
     Start, StepControl, Steps, velocity_name,
 };
 use schemars::JsonSchema;
@@ -102,10 +102,10 @@ pub(crate) struct LatticeWant {
 
 /// A scene of a lattice that has been read and validated.
 pub struct LatticeScene {
-    /// The assembled system.
-    pub system: Assembled,
+    /// The sparse system.
+    pub system: SiteSystem,
     /// The motion, with its rows.
-    pub motion: AssembledMotion,
+    pub motion: SiteMotion,
     /// The names of the components at a site.
     pub coordinates: Vec<String>,
     /// The number of sites along each direction.
@@ -204,7 +204,7 @@ impl LatticeScene {
                 "rows of a lattice have the whole state; leave `columns` out",
             ));
         }
-        let motion = AssembledMotion { rows, ..AssembledMotion::new(start, end, by, steps) };
+        let motion = SiteMotion { rows, ..SiteMotion::new(start, end, by, steps) };
         Ok(LatticeScene { system, motion, coordinates, sizes, text: text.into(), spans, run: run.span() })
     }
 

@@ -29,7 +29,7 @@ __version__ = "0.1.0"
 
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
-    "_assembled": "AssembledSolution bodies lattice",
+    "_sparse": "SparseSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_path": "Path path",
@@ -61,7 +61,7 @@ def catalogue():
 
 
 __all__ = [
-    "AssembledSolution",
+    "SparseSolution",
     "Check",
     "Comparison",
     "Contact",

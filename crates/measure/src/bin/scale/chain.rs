@@ -4,16 +4,14 @@
 use crate::memory::peak;
 use crate::report::Report;
 use crate::seconds::{best, done, together};
-use assembled_herglotz::systems::{FputBond, fput_chain};
-use assembled_herglotz::{
-    AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State,
-};
 use contact_examples::Failure;
 use discrete_herglotz::SplittingScheme;
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Mat, Side};
+use sparse_herglotz::systems::{FputBond, fput_chain};
+use sparse_herglotz::{SparseError, SparseGauss, SparseMidpoint, SparseSplitting, SparseSystem, State};
 use std::hint::black_box;
 
 const CASE: &str = "chain";
@@ -24,10 +22,10 @@ const BOND: FputBond = FputBond { alpha: 0.0, beta: 1.0 };
 /// peers: measured with another program on a machine of this kind.
 const BOOST: [(f64, f64); 3] = [(1e-4, 574e-6), (1e-8, 585e-6), (1e-12, 585e-6)];
 
-/// Converts an error of the crate assembled-herglotz: invalid input to `Failure::Input`, any other to `Failure::Exact`.
-pub fn refused(error: AssemblyError) -> Failure {
+/// Converts an error of the crate sparse-herglotz: invalid input to `Failure::Input`, any other to `Failure::Exact`.
+pub fn refused(error: SparseError) -> Failure {
     match error {
-        AssemblyError::Input(cause) => Failure::Input(cause),
+        SparseError::Input(cause) => Failure::Input(cause),
         other => Failure::Exact(other.to_string()),
     }
 }
@@ -45,7 +43,7 @@ fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
     ((0..n).map(of).collect(), vec![0.0; n])
 }
 
-fn chain(n: usize) -> Result<AssembledSystem, Failure> {
+fn chain(n: usize) -> Result<SparseSystem, Failure> {
     fput_chain(n, BOND, GAMMA).map_err(refused)
 }
 
@@ -59,7 +57,7 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
     let from = State { t: 0.0, q: &q, v: &v, z: None };
     let reference = {
         let scheme = SplittingScheme::SOFRONIOU_SPALETTA_10;
-        let mut motion = AssembledSplitting::new(&system, &scheme, 0.25, from).map_err(refused)?;
+        let mut motion = SparseSplitting::new(&system, &scheme, 0.25, from).map_err(refused)?;
         let _ = motion.advance(400);
         let end = motion.state();
         [end.q, end.v].concat()
@@ -76,14 +74,14 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
             let h = 100.0 / steps as f64;
             let mut error_here = f64::NAN;
             let mut library = || {
-                let Ok(mut motion) = AssembledSplitting::new(&system, scheme, h, from) else { return };
+                let Ok(mut motion) = SparseSplitting::new(&system, scheme, h, from) else { return };
                 let _ = motion.advance(steps);
                 let end = motion.state();
                 error_here = error(&mut end.q.iter().chain(end.v).copied());
             };
             library();
             let mut hand = || done(by_hand(scheme, h, steps, &q, &v));
-            let mut motion = AssembledSplitting::new(&system, scheme, h, from).map_err(refused)?;
+            let mut motion = SparseSplitting::new(&system, scheme, h, from).map_err(refused)?;
             let mut steps_only = || {
                 let _ = motion.advance(steps);
                 black_box(motion.state().z);
@@ -147,7 +145,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
         for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6] {
             let (seconds, bytes) = peak(|| {
                 let system = chain(n)?;
-                let mut motion = AssembledSplitting::new(&system, &scheme, 0.1, from).map_err(refused)?;
+                let mut motion = SparseSplitting::new(&system, &scheme, 0.1, from).map_err(refused)?;
                 Ok::<f64, Failure>(best(3, || done((motion.advance(10), motion.state().z))) / 10.0)
             });
             report.row(CASE, &format!("a step by {}", scheme.name()), n, seconds?, Some(bytes));
@@ -159,13 +157,13 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
         }
         let (seconds, bytes) = peak(|| {
             let system = chain(n)?;
-            let mut motion = AssembledMidpoint::new(&system, 0.1, from, None).map_err(refused)?;
+            let mut motion = SparseMidpoint::new(&system, 0.1, from, None).map_err(refused)?;
             Ok::<f64, Failure>(best(3, || done(motion.advance(3))) / 3.0)
         });
         report.row(CASE, "a step by the midpoint rule", n, seconds?, Some(bytes));
         let (seconds, bytes) = peak(|| {
             let system = chain(n)?;
-            let mut motion = AssembledGauss::new(&system, 2, 0.1, from, None).map_err(refused)?;
+            let mut motion = SparseGauss::new(&system, 2, 0.1, from, None).map_err(refused)?;
             Ok::<f64, Failure>(best(3, || done(motion.advance(3))) / 3.0)
         });
         report.row(CASE, "a step by Gauss collocation, s = 2", n, seconds?, Some(bytes));
@@ -179,7 +177,7 @@ fn copy(report: &mut Report, n: usize) -> Result<(), Failure> {
     let (q, v) = start(n);
     // The action is not computed: the potential energies for it would be part of the measured time.
     let from = State { t: 0.0, q: &q, v: &v, z: None };
-    let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.1, from).map_err(refused)?;
+    let mut motion = SparseSplitting::new(&system, &SplittingScheme::STRANG, 0.1, from).map_err(refused)?;
     let (mut a, mut b) = (q.clone(), v.clone());
     const STAGES: usize = 20;
     let mut copies = || {
@@ -204,7 +202,7 @@ fn factorisation(report: &mut Report, n: usize) -> Result<(), Failure> {
     let h = 0.1;
     // The action is not computed: the potential energies for it would be part of the measured time.
     let from = State { t: 0.0, q: &q, v: &v, z: None };
-    let mut motion = AssembledMidpoint::new(&system, h, from, None).map_err(refused)?;
+    let mut motion = SparseMidpoint::new(&system, h, from, None).map_err(refused)?;
     // M + (h^2/4) V_qq at the initial state.
     let place = |i: usize| if i == 0 || i > n { 0.0 } else { q[i - 1] };
     let slope = |i: usize| 0.25 * h * h * (1.0 + 3.0 * BOND.beta * (place(i + 1) - place(i)).powi(2));

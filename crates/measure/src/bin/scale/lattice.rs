@@ -4,10 +4,10 @@ use crate::chain::refused;
 use crate::memory::peak;
 use crate::report::Report;
 use crate::seconds::{best, done};
-use assembled_herglotz::systems::{SineGordon, lattice};
-use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, State};
 use contact_examples::Failure;
 use discrete_herglotz::SplittingScheme;
+use sparse_herglotz::systems::{SineGordon, lattice};
+use sparse_herglotz::{SparseMidpoint, SparseSplitting, State};
 
 const CASE: &str = "lattice";
 
@@ -26,7 +26,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let site = SineGordon { omega_squared: 1.0 };
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
-            let mut motion = AssembledMidpoint::new(&system, 0.2, from, Some(MEMORY)).map_err(refused)?;
+            let mut motion = SparseMidpoint::new(&system, 0.2, from, Some(MEMORY)).map_err(refused)?;
             let first = best(1, || done(motion.advance(1)));
             Ok::<_, Failure>((first, best(3, || done(motion.advance(2))) / 2.0))
         });
@@ -35,7 +35,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         report.row(CASE, "a step by the midpoint rule", n, later, Some(bytes));
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
-            let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.2, from).map_err(refused)?;
+            let mut motion = SparseSplitting::new(&system, &SplittingScheme::STRANG, 0.2, from).map_err(refused)?;
             Ok::<_, Failure>(best(3, || done(motion.advance(5))) / 5.0)
         });
         report.row(CASE, "a step by strang", n, seconds?, Some(bytes));

@@ -1,5 +1,5 @@
 //! Peak memory, by an allocator that counts. Unlike that of the tests (`tests/common/counting_allocator.rs`) it counts
-//! over all threads, since ensembles and assembled systems are run on several.
+//! over all threads, since ensembles and sparse systems are run on several.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

@@ -3,13 +3,13 @@
 use crate::chain::refused;
 use crate::peer::python;
 use crate::report::Report;
-use assembled_herglotz::systems::OuterSolarSystem;
-use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_examples::{Failure, print};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, numbers::max_or_nan};
 use discrete_herglotz::{Problem, SplittingScheme, Start, Stepper, StepperOptions, gauss::GaussStepper};
+use sparse_herglotz::systems::OuterSolarSystem;
+use sparse_herglotz::{SparseSplitting, SparseSystem, State};
 use std::time::Instant;
 
 const CASE: &str = "solar";
@@ -112,7 +112,7 @@ fn best_of_two(run: impl Fn() -> Result<(Vec<f64>, f64), Failure>) -> Result<(Ve
 
 /// The final positions by a splitting with compensated sums, and the run time in seconds.
 fn motion(
-    system: &AssembledSystem,
+    system: &SparseSystem,
     scheme: &SplittingScheme,
     days: f64,
     steps: usize,
@@ -121,7 +121,7 @@ fn motion(
     // The action is not computed: the potential energies for it would be part of the measured time.
     let start = State { t: 0.0, q: &q, v: &v, z: None };
     best_of_two(|| {
-        let motion = AssembledSplitting::new(system, scheme, days / steps as f64, start).map_err(refused)?;
+        let motion = SparseSplitting::new(system, scheme, days / steps as f64, start).map_err(refused)?;
         let mut motion = motion.compensated();
         let clock = Instant::now();
         let done = motion.advance(steps);

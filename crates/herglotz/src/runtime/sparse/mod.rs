@@ -1,0 +1,13 @@
+//! Systems of many coordinates: lattices given by the formulas of a site and of a bond, and gravitating bodies.
+
+mod bodies;
+mod lattice;
+mod run;
+mod stepper;
+mod system;
+mod term;
+
+pub use bodies::Bodies;
+pub use lattice::{Boundary, Lattice};
+pub use run::SiteMotion;
+pub use system::SiteSystem;

@@ -1,0 +1,124 @@
+//! Errors for invalid input, detected before the first step.
+
+use discrete_herglotz::InputError;
+use thiserror::Error;
+
+/// Invalid input to a sparse system or to one of its integrators, detected before the first step.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SparseError {
+    /// The number of unknowns is 0 or exceeds the range of the indices.
+    #[error("a system of {found} unknowns; it must have from 1 to {most}")]
+    Unknowns {
+        /// The requested number.
+        found: usize,
+        /// The largest possible number.
+        most: usize,
+    },
+    /// An element refers to an unknown that does not exist.
+    #[error(
+        "element {element} of list {list} has the unknown {unknown}; the system has the unknowns 0 to {last} (and FIXED)"
+    )]
+    OutOfRange {
+        /// The list of elements, counted from 0 in the order in which they were added.
+        list: usize,
+        /// The element in the list.
+        element: usize,
+        /// The unknown that the element refers to.
+        unknown: usize,
+        /// The last unknown of the system.
+        last: usize,
+    },
+    /// An element contains an unknown twice.
+    #[error("element {element} of list {list} has the unknown {unknown} twice; an element's unknowns must differ")]
+    Repeated {
+        /// The list of elements.
+        list: usize,
+        /// The element in the list.
+        element: usize,
+        /// The repeated unknown.
+        unknown: usize,
+    },
+    /// A parameter of an element is not finite.
+    #[error("element {element} of list {list} has a parameter {value}; parameters must be finite")]
+    Parameter {
+        /// The list of elements.
+        list: usize,
+        /// The element in the list.
+        element: usize,
+        /// The parameter.
+        value: f64,
+    },
+    /// The mass of an unknown is missing, or is not positive and finite.
+    #[error("the unknown {unknown} has the mass {mass}; the method needs a positive finite mass of each unknown")]
+    Mass {
+        /// The first such unknown.
+        unknown: usize,
+        /// Its mass.
+        mass: f64,
+    },
+    /// The length of a vector differs from the number of unknowns.
+    #[error("{what} has {found} components; the system has {expected} unknowns")]
+    Length {
+        /// The name of the vector.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The number of unknowns.
+        expected: usize,
+    },
+    /// A value is infinite or NaN.
+    #[error("component {index} of {what} is {value}; it must be finite")]
+    NonFinite {
+        /// The name of the vector or number.
+        what: &'static str,
+        /// The index of the component; 0 for a number.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The force is not finite at the start.
+    #[error(
+        "the force on the unknown {unknown} is not finite at the start; choose a start inside the domain of the terms"
+    )]
+    Undefined {
+        /// The first such unknown.
+        unknown: usize,
+    },
+    /// A method for separable systems was applied to a system with general local terms.
+    #[error(
+        "the system has general local terms; splittings and `SparseMidpoint` take potentials only: use `SparseGauss`"
+    )]
+    NotSeparable,
+    /// An operation needs the action, which the state does not have.
+    #[error(
+        "the Lagrangian depends on the action z, which the state does not have; start the motion with one, as `z: Some(0.0)`"
+    )]
+    NoAction,
+    /// The matrix `L_vv` is singular at the start.
+    #[error("the matrix L_vv is singular at the start: the Lagrangian is not regular; give each unknown a mass")]
+    SingularMass,
+    /// The factors of the step's matrix need more memory than the limit.
+    #[error(
+        "the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it if it was set, or take an explicit method"
+    )]
+    Memory {
+        /// The estimate from the symbolic analysis.
+        needed: usize,
+        /// The limit that was set, or the memory that is available.
+        limit: usize,
+    },
+    /// A system of the catalogue has invalid dimensions or parameters.
+    #[error("{what} = {value}; {remedy}")]
+    Parameters {
+        /// The parameter.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The accepted values.
+        remedy: &'static str,
+    },
+    /// Input that the integrators of small systems reject as well.
+    #[error(transparent)]
+    Input(#[from] InputError),
+}
