@@ -61,7 +61,7 @@ impl<'a> Parser<'a> {
         named: bool,
     ) -> Parsed<Id> {
         if text.len() > LONGEST_TEXT {
-            let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
+            let message = format!("the text has {} bytes; it can have at most {LONGEST_TEXT}", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
@@ -94,7 +94,7 @@ impl<'a> Parser<'a> {
                     if self.named {
                         self.define(name, first, value)?;
                     } else if name != "L" {
-                        let message = format!("after the definition of `{name}` a value is expected");
+                        let message = format!("expected a value after the definition of `{name}`");
                         return Err(self.error(self.word(0), message));
                     }
                     return Ok(value);
@@ -105,7 +105,7 @@ impl<'a> Parser<'a> {
             let value = self.expression(0)?;
             if self.ends_line()? {
                 let word = self.word(0);
-                let message = "only one value is possible, and it is the last; a definition has the form `name = ...`";
+                let message = "a formula has a single value, at its end; write a definition as `name = ...`";
                 return Err(self.error(word, message));
             }
             return Ok(value);
@@ -131,7 +131,7 @@ impl<'a> Parser<'a> {
             || self.names.parameters.iter().any(|p| p == name)
             || self.locals.iter().any(|(local, _)| *local == name);
         if taken {
-            return Err(self.error(word, format!("the name `{name}` is taken; take another for this definition")));
+            return Err(self.error(word, format!("the name `{name}` is in use; choose another name for this definition")));
         }
         self.locals.push((name, value));
         Ok(())
@@ -154,7 +154,8 @@ impl<'a> Parser<'a> {
         self.at = (self.at + 1).min(self.words.len());
         self.read += 1;
         if self.read > MOST_WORDS || self.graph.len() > MOST_NODES {
-            let message = format!("the formula has more than {MOST_NODES} parts, its sums written out");
+            let message = format!("the formula has more than {MOST_NODES} operations after its sums are expanded; \
+                                   simplify it");
             return Err(self.error(word, message));
         }
         Ok(word)
@@ -183,7 +184,8 @@ impl<'a> Parser<'a> {
     /// An expression whose operators have a higher precedence than `weakest`.
     fn expression(&mut self, weakest: u8) -> Parsed<Id> {
         if self.depth >= DEEPEST_NESTING {
-            let message = format!("nested more than {DEEPEST_NESTING} deep; give a part a name");
+            let message = format!("the formula is nested more than {DEEPEST_NESTING} levels deep; define a part of it \
+                                   beforehand, as `name = ...`");
             return Err(self.error(self.word(0), message));
         }
         self.depth += 1;
@@ -225,7 +227,7 @@ impl<'a> Parser<'a> {
     /// Rejects numbers that are not finite, such as `1/0`.
     fn check_number(&self, id: Id, word: Word<'a>) -> Parsed<()> {
         match self.graph.as_number(id) {
-            Some(x) if !x.is_finite() => Err(self.error(word, format!("this is {x}, where a finite number is needed"))),
+            Some(x) if !x.is_finite() => Err(self.error(word, format!("the value is {x}; it must be a finite number"))),
             _ => Ok(()),
         }
     }
@@ -265,7 +267,8 @@ impl<'a> Parser<'a> {
         let has_prime = prime.token == Token::Sign('\'');
         if let Some((_, value)) = self.locals.iter().rev().find(|(local, _)| *local == name) {
             if has_prime {
-                return Err(self.error(prime, format!("`{name}` is a definition, whose rate is to be written out")));
+                return Err(self.error(prime, format!("`{name}` is a definition and has no velocity; write its \
+                                                      derivative out")));
             }
             return Ok(*value);
         }
@@ -318,7 +321,7 @@ impl<'a> Parser<'a> {
             }
         };
         let found = quantity.node(formula, self.graph);
-        found.ok_or_else(|| self.error(word, format!("`{name}` has more parts than an expression may have")))
+        found.ok_or_else(|| self.error(word, format!("`{name}` has more operations than an expression can have")))
     }
 
     /// Whether a name has a value, so that a bracket after it is a product with a missing `*`.
@@ -334,7 +337,7 @@ impl<'a> Parser<'a> {
         let index = match block.count {
             Some(_) => self.index(block)?,
             None if self.word(0).token == Token::Sign('[') => {
-                return Err(self.error(self.word(0), format!("`{}` is one number and has no entries", block.name)));
+                return Err(self.error(self.word(0), format!("`{}` is a single number and has no entries", block.name)));
             }
             None => block.first as u32,
         };
@@ -352,8 +355,8 @@ impl<'a> Parser<'a> {
         if self.word(0).token == sign {
             let name = self.text.get(word.span.0..word.span.1).unwrap_or("x");
             let message = format!(
-                "a second derivative, which no Lagrangian of Herglotz' principle has: write L of `{name}` and `{name}'` alone; the \
-                 acceleration follows from it"
+                "the formula has a second derivative of `{name}`; write L in terms of `{name}` and `{name}'`, since \
+                 Herglotz' equation determines the acceleration"
             );
             return Err(self.error(word, message));
         }
@@ -365,14 +368,14 @@ impl<'a> Parser<'a> {
         let (name, count) = (&block.name, block.count.unwrap_or(1));
         let open = self.word(0);
         if open.token != Token::Sign('[') {
-            return Err(self.error(open, format!("`{name}` has {count} entries: write `{name}[0]`")));
+            return Err(self.error(open, format!("`{name}` has {count} entries; write one of them as `{name}[0]`")));
         }
         self.next()?;
         let word = self.word(0);
         let index = self.bracketed(|parser| parser.whole(), ']')?;
         match usize::try_from(index) {
             Ok(i) if i < count => Ok((block.first + i) as u32),
-            _ => Err(self.error(word, format!("entry {index} of `{name}`, which has the entries 0 to {}", count - 1))),
+            _ => Err(self.error(word, format!("`{name}` has no entry {index}; its entries are 0 to {}", count - 1))),
         }
     }
 
@@ -382,8 +385,8 @@ impl<'a> Parser<'a> {
         let id = self.expression(0)?;
         match self.graph.as_number(id) {
             Some(x) if x.fract() == 0.0 && x.abs() <= 1e9 => Ok(x as i64),
-            Some(x) => Err(self.error(word, format!("{x} where an integer is expected"))),
-            None => Err(self.error(word, "an integer is expected that does not depend on parameters or on the state")),
+            Some(x) => Err(self.error(word, format!("expected an integer, found {x}"))),
+            None => Err(self.error(word, "expected an integer that does not depend on parameters or on the state")),
         }
     }
 
@@ -464,15 +467,15 @@ impl<'a> Parser<'a> {
         let word = self.next()?;
         let Token::Name(index) = word.token else {
             self.at = self.at.saturating_sub(1);
-            return Err(self.unexpected(word, "the name of an index, as in `sum(i, 0, n-1, q[i]^2)`,"));
+            return Err(self.unexpected(word, "the name of an index, such as `i` in `sum(i, 0, n-1, q[i]^2)`"));
         };
         if self.word(0).token != Token::Sign(',') {
             let message =
-                format!("{} where `,` is expected: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
+                format!("expected `,`, found {}: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
             return Err(self.error(self.word(0), message));
         }
         if is_reserved(index) || self.is_value(index) {
-            return Err(self.error(word, format!("the name `{index}` is taken; take another for the index")));
+            return Err(self.error(word, format!("the name `{index}` is in use; choose another name for the index")));
         }
         self.expect(',')?;
         let first = self.whole()?;

@@ -117,7 +117,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         check_stages(self.stages)?;
         if const { !L::HINTS.time_transformation } {
             return Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`)",
+                hypothesis: "a Lagrangian that declares a time transformation (`Hints::time_transformation`, \
+                             `dt_dtau`)",
             });
         }
         if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }

@@ -39,7 +39,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             }
             // The step size for an accuracy is computed from a root of that order.
             if info.order == 0 {
-                return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
+                return Err(InputError::Hypothesis { hypothesis: "an integrator with an order of at least one" });
             }
         }
         // Trial runs check the equations of motion along the whole span.
@@ -120,7 +120,8 @@ pub(crate) const NO_STEP: InputError = InputError::Count { what: "the number of 
 
 /// The hypothesis of integrators in transformed time on the steps.
 const SIZED: &str =
-    "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
+    "steps of a given size in transformed time, or a requested accuracy, since the number of steps depends on the \
+     motion";
 
 fn check_count(count: f64) -> Result<(), InputError> {
     if count <= MOST_STEPS {

@@ -89,18 +89,19 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     let (defect, herglotz::runtime::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
     let mut parts = vec![
         format!(
-            "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {CONTACT:.0e}",
+            "{verdict}: the pullback of dz - p dq by a step of {} with {integrator} is sigma_d (dz - p dq) with a \
+             defect of {defect:.1e}, of which {CONTACT:.0e} is allowed",
             short(*step_size)
         ),
         table(&places),
     ];
     if !momenta.is_empty() {
-        parts.push(format!("the momenta are predicted to {:.1e} of their size", check.momentum_defect()));
+        parts.push(format!("the momenta agree with their predictions to {:.1e} of their size", check.momentum_defect()));
     }
     if !check.statements.is_empty() {
         let step = check.statements.first().map_or(*step_size, |stated| stated.step_size);
         let formula = format!(
-            "the theorems of the discrete theory for this system with h = {}, worst of a few places:",
+            "largest residuals of the theorems of the discrete theory at a few places of the motion, for h = {}:",
             short(step)
         );
         parts.push(format!("{formula}\n{}", table(&statements)));

@@ -103,11 +103,13 @@ impl Scene {
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
         if let Some(lattice) = file::place_of_table(text, "lattice") {
-            let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
+            let message = "a lattice works only with `herglotz run`; the other commands are for systems of up to 16 \
+                           coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
         if let Some(ends) = file::place_of_table(text, "ends") {
-            let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
+            let message = "a path between ends works only with `herglotz run`; the other commands are for motions \
+                           from a start";
             return Err(SceneError::at(text, ends, message));
         }
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
@@ -292,8 +294,8 @@ fn check_version(text: &str) -> Result<(), SceneError> {
         return Ok(());
     }
     let found = *version;
-    let what = if found > VERSION { "is of a later program; take that" } else { "is not known" };
-    let message = format!("the version {found} of scene files {what}, or write the scene for version {VERSION}");
+    let what = if found > VERSION { "requires a newer program; update it, or" } else { "does not exist;" };
+    let message = format!("version {found} of scene files {what} write the scene for version {VERSION}");
     Err(SceneError::at(text, version.span(), message))
 }
 
@@ -307,12 +309,13 @@ fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option<&'static C
         },
         (Some(name), ..) => refuse(name.span(), "give a `catalogue` or a `lagrangian` with `coordinates`, not both"),
         (None, Some(_), Some(_)) => Ok(None),
-        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a text in quotes"),
+        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a string in quotes"),
         (None, None, Some(_)) => {
             refuse(system.span(), "the system has no `coordinates`; add their names, as in coordinates = [\"x\"]")
         }
         (None, None, None) => {
-            refuse(system.span(), "the system has no `lagrangian` with `coordinates`, and no `catalogue`; add either")
+            refuse(system.span(), "the system has neither a `lagrangian` with `coordinates` nor a `catalogue`; add \
+                                   one of them")
         }
     }
 }
@@ -387,12 +390,12 @@ fn way(text: &str, run: &Location<RunTable>) -> Result<StepControl, SceneError> 
             return Err(SceneError::at(
                 text,
                 steps.span(),
-                "give the length of a step or the number of steps, not both",
+                "give the length `step` or the number `steps` of the steps, not both",
             ));
         }
         (Some(step), None) => Some(Steps::Size(positive(text, step, "step")?)),
         (None, Some(steps)) if **steps == 0 => {
-            return Err(SceneError::at(text, steps.span(), "`steps` is 0, where at least 1 is needed"));
+            return Err(SceneError::at(text, steps.span(), "`steps` is 0; it must be at least 1"));
         }
         (None, Some(steps)) => Some(Steps::Count(**steps)),
         (None, None) => None,
@@ -402,11 +405,11 @@ fn way(text: &str, run: &Location<RunTable>) -> Result<StepControl, SceneError> 
         (Some(accuracy), by, None) => Ok(StepControl::Accuracy { wanted: positive(text, accuracy, "accuracy")?, by }),
         (None, Some(by), Some(steps)) => Ok(StepControl::Steps { by, steps }),
         (Some(accuracy), _, Some(_)) => {
-            refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the step is chosen for the accuracy")
+            refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the accuracy determines the step")
         }
         (None, None, Some(_)) => refuse(
             run.span(),
-            "the run has steps and no `integrator`; name one, or give an `accuracy` instead of the steps",
+            "the run has steps but no `integrator`; add one, or give an `accuracy` instead of the steps",
         ),
         (None, Some(_), None) => refuse(run.span(), "the run has neither a `step` nor an `accuracy`; add one of them"),
         (None, None, None) => refuse(
@@ -419,7 +422,7 @@ fn way(text: &str, run: &Location<RunTable>) -> Result<StepControl, SceneError> 
 fn integrator(text: &str, name: &Location<String>) -> Result<AnyIntegrator, SceneError> {
     name.parse().map_err(|_| {
         let all: Vec<String> = AnyIntegrator::all().iter().map(ToString::to_string).collect();
-        let message = format!("there is no integrator `{}`; `herglotz list integrators` lists them", **name);
+        let message = format!("unknown integrator `{}`; `herglotz list integrators` prints the names", **name);
         SceneError::unknown(text, name.span(), name, all.iter().map(String::as_str), message)
     })
 }
@@ -429,7 +432,7 @@ fn finite(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> 
     if x.is_finite() {
         return Ok(**x);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a finite number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}; it must be a finite number", **x)))
 }
 
 /// Checks that a number is positive and finite.
@@ -437,7 +440,7 @@ fn positive(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError
     if **x > 0.0 {
         return finite(text, x, name);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a positive number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}; it must be a positive number", **x)))
 }
 
 /// The JSON schema of scene files.

@@ -93,7 +93,7 @@ pub(crate) fn read(
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    complete(text, given(text, keys(formula), "a start", table)?, &formula.coordinates(), entry, at)
+    complete(text, given(text, keys(formula), "the start", table)?, &formula.coordinates(), entry, at)
 }
 
 /// The ends of a path: the times, the positions, and the action of the start.
@@ -125,7 +125,8 @@ impl Ends {
         })?;
         let q1 = all(text, &names, of_end.q, None, ["coordinate", "end"], end_at, &|x| x.to_owned())?;
         let Some(t1) = of_end.t else {
-            return Err(SceneError::at(text, end_at, "the end has no time; add `t = 1.0` to [ends], or another value"));
+            return Err(SceneError::at(text, end_at, "the end of the path has no time; add `t = 1.0` to [ends], or \
+                                                     another value"));
         };
         let t0 = of_start.t.or(entry.map(|entry| entry.t)).unwrap_or(0.0);
         Ok(Ends { t: [t0, t1], q: [q0, q1], z0: of_start.z.unwrap_or(0.0) })
@@ -141,21 +142,21 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
         let Some(key) = keys.iter().find(|key| key.name == **name) else {
             let known = || keys.iter().map(|key| key.name.as_str());
             let all = known().collect::<Vec<_>>().join(", ");
-            let message = format!("there is no `{}` in {place}; there are {all}", **name);
+            let message = format!("unknown name `{}` in {place}; the known names are {all}", **name);
             return Err(SceneError::unknown(text, name.span(), name, known(), message));
         };
         let wrong_count = |found: &str| {
             let wanted = match key.entries.len() {
                 _ if !key.is_list => "a number".to_owned(),
-                count => format!("a list of {count} numbers, or one number for all,"),
+                count => format!("a list of {count} numbers, or one number for all"),
             };
-            SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
+            SceneError::at(text, numbers.span(), format!("`{}` is {found}; it must be {wanted}", **name))
         };
         let values: Vec<Location<f64>> = match &**numbers {
             // For an array, the number is the value of all its entries.
             Numbers::One(x) => vec![Location::new(*x, numbers.span()); key.entries.len()],
             Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
-            Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
+            Numbers::Many(list) => return Err(wrong_count(&format!("a list of length {}", list.len()))),
         };
         for (i, x) in key.entries.clone().zip(&values) {
             given.set(key.part, i, super::finite(text, x, name)?);
@@ -184,7 +185,8 @@ fn all(
             let key = if bare { name.clone() } else { format!("\"{name}\"") };
             let table = if place == "end" { "ends" } else { "start" };
             let message =
-                format!("the {what} `{name}` has no {place}; add `{key} = 0.0` to [{table}], or another value");
+                format!("the {what} `{name}` has no value at the {place}; add `{key} = 0.0` to [{table}], or another \
+                         value");
             SceneError::at(text, at, message)
         })?);
     }
@@ -205,7 +207,7 @@ fn complete(
     let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
     let by_momentum = given.p.iter().any(Option::is_some);
     if by_momentum && given.v.iter().any(Option::is_some) {
-        let message = "the start has velocities and momenta; give one kind for all coordinates";
+        let message = "the start has both velocities and momenta; give one kind for all coordinates";
         return Err(SceneError::at(text, at, message));
     }
     let rate = if by_momentum {

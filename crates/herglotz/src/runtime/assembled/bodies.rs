@@ -37,10 +37,10 @@ impl Bodies {
     pub fn system(&self) -> Result<Assembled, RuntimeError> {
         let Bodies { masses, dimensions, g, gamma } = self;
         if masses.len() < 2 {
-            return Err(argument("masses", format!("has {} bodies, where at least 2 are needed", masses.len())));
+            return Err(argument("masses", format!("has {} bodies; at least 2 are required", masses.len())));
         }
         if let Some((i, m)) = masses.iter().enumerate().find(|(_, m)| !(**m > 0.0 && m.is_finite())) {
-            return Err(argument("masses", format!("has {m} for body {i}, where a positive finite number is needed")));
+            return Err(argument("masses", format!("has {m} for body {i}; it must be a positive finite number")));
         }
         for (what, value) in [("G", *g), ("gamma", *gamma)] {
             if !value.is_finite() {
@@ -55,7 +55,7 @@ impl Bodies {
             2 => attracting::<2, 4>(make()?, masses, *g)?,
             3 => attracting::<3, 6>(make()?, masses, *g)?,
             other => {
-                return Err(argument("q0", format!("has {other} components for each body, where 2 or 3 are possible")));
+                return Err(argument("q0", format!("has {other} components for each body; it must have 2 or 3")));
             }
         };
         Ok(Assembled { system, places: n, components: *dimensions, masses: each, full: true })

@@ -40,7 +40,7 @@ impl AssembledMotion {
         let span = self.end - self.start.t;
         if !(span != 0.0 && span.is_finite()) {
             let why = format!(
-                "ends at {}, where the motion starts at {}; give a later or earlier end",
+                "ends at {}, and the motion starts at {}; give a finite end that is later or earlier than the start",
                 self.end, self.start.t
             );
             return Err(argument("t", why));
@@ -52,7 +52,7 @@ impl AssembledMotion {
                 if !(h > 0.0 && h.is_finite()) {
                     return Err(argument(
                         "step",
-                        format!("is {h}, where a positive number is needed; the end says the direction"),
+                        format!("is {h}; it must be a positive number, since the end gives the direction"),
                     ));
                 }
                 // As for small systems: a quotient that differs from an integer by rounding only is taken for that
@@ -65,7 +65,7 @@ impl AssembledMotion {
         if count > LARGEST {
             return Err(argument(
                 "step",
-                format!("gives {count:.1e} steps, more than can be counted; take a longer one"),
+                format!("gives {count:.1e} steps, which exceeds the largest possible number; take a longer step"),
             ));
         }
         Ok((span / count, count as usize))
@@ -124,7 +124,7 @@ pub(super) fn run(
         RunInfo { of, motion, stepper, h, count, taken: 0, some: 1, log_factor: 0.0, last: start, numbers, watch };
     let status = match course.go() {
         Ok(()) => Status::Completed,
-        Err(Ended::Stopped) => Status::Stopped { step: course.taken, t: course.time(course.taken), by: "the watch" },
+        Err(Ended::Stopped) => Status::Stopped { step: course.taken, t: course.time(course.taken), by: "the monitor" },
         Err(Ended::Failed(cause)) => Status::Failed { step: course.taken, t: course.time(course.taken), cause },
         Err(Ended::Refused(error)) => return Err(error),
     };
@@ -134,7 +134,7 @@ pub(super) fn run(
 /// Checks the times of the rows.
 fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
-        OutputTimes::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
+        OutputTimes::Every(0) => return Err(argument("every", "is 0; it must be at least 1")),
         OutputTimes::Every(_) => return Ok(()),
         OutputTimes::At(times) => times,
     };

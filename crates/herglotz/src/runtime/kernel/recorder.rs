@@ -67,7 +67,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
             self.numbers.clear();
             self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
             if self.watch.row(&self.numbers).is_break() {
-                return ControlFlow::Break(Stop::here("its watch"));
+                return ControlFlow::Break(Stop::here("the monitor"));
             }
         }
         ControlFlow::Continue(())
@@ -87,14 +87,14 @@ impl<'r, const N: usize> Recorder<'r, N> {
             if let Some(interrupted) = at.resume_state() {
                 self.watch.interrupted(interrupted);
             }
-            return ControlFlow::Break(Stop::here("its watch"));
+            return ControlFlow::Break(Stop::here("the monitor"));
         }
         if at.k.is_multiple_of(POLL)
             && self.watch.wants_checkpoint()
             && let Some(saved) = at.resume_state()
             && self.watch.checkpoint(at.k, saved).is_break()
         {
-            return ControlFlow::Break(Stop::here("its watch"));
+            return ControlFlow::Break(Stop::here("the monitor"));
         }
         ControlFlow::Continue(())
     }
@@ -151,7 +151,8 @@ pub(super) fn check_events<const N: usize>(
 ) -> Result<(), RuntimeError> {
     let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
     if of_terminal {
-        let why = "is given for a terminal event, which counts from the start of the motion; leave one of them out";
+        let why = "is given for a terminal event, which is detected from the start of the motion; remove one of the \
+                   two";
         return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
     }
     let has_factor = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_conformal_factor);
@@ -274,7 +275,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
             let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
             let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
             if hand_on(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
-                return ControlFlow::Break(Stop::here("its watch"));
+                return ControlFlow::Break(Stop::here("the monitor"));
             }
         }
         ended
