@@ -199,7 +199,7 @@ fn plans_in_words() {
     {
         assert!(titles(&plan, false).contains(&skipped), "{skipped}: {plan}");
     }
-    assert_eq!(titles(&plan, true), ["iteration", "probes of the structure"]);
+    assert_eq!(titles(&plan, true), ["iteration", "checks of the structure"]);
     let text = plan.to_string();
     assert!(text.starts_with("10 steps of 1 by gauss_8, t = 0 .. 10\ncomputed:\n  iteration: "), "{text}");
     assert!(text.contains("and is not requested\n") && text.contains("the product is not requested\n"), "{text}");
@@ -217,7 +217,7 @@ fn plans_in_words() {
     assert!(titles(&plan, true).contains(&"action z"));
     let mut decay = MomentumDecay::new(Symmetry::Translation([1.0].into()));
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().observe(&mut decay).plan(until).unwrap();
-    assert_eq!(titles(&plan, true), ["iteration", "conformal factor", "probes of the structure"]);
+    assert_eq!(titles(&plan, true), ["iteration", "conformal factor", "checks of the structure"]);
     // A linear motion needs no iteration, and a mass matrix that varies is evaluated.
     let of_oscillator = from_start(&oscillator);
     assert!(titles(&ten_steps(&of_oscillator, gauss(8)).plan(until).unwrap(), false).contains(&"iteration"));

@@ -7,7 +7,9 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum GeometryError {
     /// A slice has the wrong number of entries.
-    #[error("{what} has {found} entries where the configuration space has dimension {expected}; pass {expected}")]
+    #[error(
+        "{what} has {found} entries, but the configuration space has dimension {expected}; pass {expected} entries"
+    )]
     WrongSize {
         /// The coordinate that the slice specifies.
         what: &'static str,
@@ -17,7 +19,7 @@ pub enum GeometryError {
         found: usize,
     },
     /// A number is infinite or NaN.
-    #[error("{what}[{index}] = {value} where a finite number is needed")]
+    #[error("{what}[{index}] = {value}; it must be a finite number")]
     NonFinite {
         /// What the number is.
         what: &'static str,
@@ -38,7 +40,7 @@ pub enum GeometryError {
         remedy: &'static str,
     },
     /// A function is not defined at a point, or could not be evaluated there.
-    #[error("{what} is not defined at this point; choose one inside its domain")]
+    #[error("{what} is not defined at this point; choose a point inside its domain")]
     Undefined {
         /// The usual name of the function.
         what: &'static str,

@@ -63,13 +63,13 @@ statements! {
     /// A path and z_0 give every z_k, and the differential of the action of any number of steps has the stated formula.
     ActionDifferential = 13, "3", "differential of the discrete action";
     /// The differential of the discrete action of two steps is the one that the remark writes out.
-    TwoSteps = 14, "3", "the same for two steps";
+    TwoSteps = 14, "3", "differential of the action of two steps";
     /// Where sigma_d is not zero, a path has a critical action exactly if it solves the discrete Herglotz equations.
     DiscreteHerglotzPrinciple = 15, "3", "discrete Herglotz principle";
     /// The condition of Vermeeren, Bravetti and Seri on Q x Q x R^2 is equivalent to the discrete Herglotz equations.
     VermeerenBravettiSeri = 16, "3", "condition on Q x Q x R^2";
     /// The transform F+L_d is a local diffeomorphism exactly if F-L_d is one.
-    DiscreteRegularity = 17, "3.1", "F+ and F- regular together";
+    DiscreteRegularity = 17, "3.1", "F+ regular iff F- regular";
     /// The states F+L_d(q0, q1, z0) and F-L_d(q1, q2, z1) are equal exactly if the discrete Herglotz equations hold.
     MomentumMatching = 18, "3.1", "momentum matching";
     /// The flow Phi_d, F+L_d and then the inverse of F-L_d, exists exactly if F-L_d is a local diffeomorphism.
@@ -101,7 +101,7 @@ statements! {
     /// The retraction to the start of a motion inverts exp_h, and the one to its end is the flow phi_h after it.
     ExactRetractions = 32, "4.1", "exact retractions";
     /// The linear equation of the variation of z has the stated solution, and L_h^e = z(h) - z(0).
-    LinearEquation = 33, "4.2", "linear equation, action";
+    LinearEquation = 33, "4.2", "linear equation of the action";
     /// The derivatives of L_h^e are D1 = -p0 e^b, D2 = p1 and Dz = e^b - 1, where b is the integral of L_z.
     ExactDerivatives = 34, "4.2", "D1, D2, Dz of L_h^e";
     /// The discrete Legendre transforms of L_h^e are FL after the exact retractions.

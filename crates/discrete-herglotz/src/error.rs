@@ -8,27 +8,28 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum InputError {
     /// The step is 0 or not finite, or negative where the direction is given otherwise, as by the end of a run.
-    #[error(
-        "the step h = {h} must be a finite number and not 0; and positive where the end of the run tells its direction"
-    )]
+    #[error("the step h = {h} must be a finite nonzero number, and positive if the end of the run gives the direction")]
     Step {
         /// The step that was passed.
         h: f64,
     },
     /// The span of a run is not finite, or 0 where it must not be.
-    #[error("the span of time is {span}; it must be finite and not 0 (negative to go back)")]
+    #[error("the span of time is {span}; it must be finite and nonzero (negative for a run backward in time)")]
     Span {
         /// The span that was passed.
         span: f64,
     },
     /// A requested error is not a positive finite number.
-    #[error("the wanted relative error is {wanted}; it must be positive and finite")]
+    #[error("the requested relative error is {wanted}; it must be positive and finite")]
     Tolerance {
         /// The requested error.
         wanted: f64,
     },
     /// A scale of a coordinate is not a positive finite number.
-    #[error("the scale of coordinate {index} is {scale}; scales are sizes of the coordinates, positive and finite")]
+    #[error(
+        "the scale of coordinate {index} is {scale}; a scale is the size of a coordinate and must be positive and \
+         finite"
+    )]
     Scale {
         /// The coordinate, counted from 0.
         index: usize,
@@ -36,7 +37,7 @@ pub enum InputError {
         scale: f64,
     },
     /// A requested accuracy is not reached.
-    #[error("the wanted relative error {wanted:e} is not {}: {cause}", how_near(*wanted, *reached))]
+    #[error("the requested relative error {wanted:e} is not {}: {cause}", how_near(*wanted, *reached))]
     Accuracy {
         /// The requested error.
         wanted: f64,
@@ -47,7 +48,7 @@ pub enum InputError {
         cause: SelectionFailure,
     },
     /// A number is too large to be counted or stored, or its items are too close to be distinguished.
-    #[error("{what} = {found:e}; at most {most:e} are possible: {remedy}")]
+    #[error("{what} is {found:e}; it can be at most {most:e}: {remedy}")]
     TooMany {
         /// What is counted.
         what: &'static str,
@@ -59,27 +60,32 @@ pub enum InputError {
         remedy: &'static str,
     },
     /// A run has neither steps nor an accuracy from which they are chosen.
-    #[error("the run has no steps; give them by `steps`, or ask for an `accuracy`")]
+    #[error("the run has no steps; set them with `steps`, or request an `accuracy`")]
     NoSteps,
     /// A run with given steps has no integrator.
-    #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
+    #[error(
+        "the run has no integrator; set it with `by`, or request an `accuracy` without steps, for which an integrator \
+         is selected"
+    )]
     NoIntegrator,
     /// The trial runs of a plan were interrupted.
-    #[error("the trial runs were interrupted before a step was found; run it again, or give a step")]
+    #[error("the trial runs were interrupted before they determined a step; run again, or give a step")]
     Interrupted,
     /// The resumed run differs from the interrupted one.
     #[error(
-        "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
+        "the run differs from the interrupted one; resume it with the same problem, integrator, steps, end and requests"
     )]
     AnotherRun,
     /// A checkpoint was requested for a run whose stepper does not implement saving.
     #[error(
-        "the integrator's stepper cannot be saved; leave the checkpoint out, or give it `Stepper::save` and `restore`"
+        "the stepper of the integrator cannot be saved; remove the checkpoint, or implement `Stepper::save` and \
+         `restore`"
     )]
     Unsaved,
     /// Times of output are not in order, not finite, or outside of the span of the run.
     #[error(
-        "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"
+        "the time t = {t} of row {index} is out of order, not finite or outside of the span of the run; give finite \
+         times within the span, in the direction of the run"
     )]
     Times {
         /// The first row with such a time.
@@ -91,13 +97,13 @@ pub enum InputError {
     #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
     Undefined,
     /// The number of stages of a collocation method is out of range.
-    #[error("{found} stages; contact Gauss collocation has from 1 to 16")]
+    #[error("the number of stages is {found}; contact Gauss collocation has from 1 to 16")]
     Stages {
         /// The number of stages that was passed.
         found: usize,
     },
     /// The rate of a time transformation is zero, negative or not defined at the start.
-    #[error("the rate dt/dtau is {rate} at the start; it must be positive and finite")]
+    #[error("the rate dt/dtau of the time transformation is {rate} at the start; it must be positive and finite")]
     TimeTransformation {
         /// The rate at the start.
         rate: f64,
@@ -106,7 +112,7 @@ pub enum InputError {
     #[error("the configuration space has dimension 0; a Lagrangian needs at least one coordinate")]
     Dimension,
     /// A count of steps, rows or points is too small.
-    #[error("{what} = {found}; at least {least} is needed")]
+    #[error("{what} is {found}; it must be at least {least}")]
     Count {
         /// What is counted.
         what: &'static str,
@@ -116,7 +122,7 @@ pub enum InputError {
         found: usize,
     },
     /// A path has another number of steps than the problem.
-    #[error("the path has {found} steps where the problem has {expected}; pass {expected} + 1 points")]
+    #[error("the path has {found} steps, but the problem has {expected}; pass {expected} + 1 points")]
     PathLength {
         /// The number of steps of the problem.
         expected: usize,
@@ -128,8 +134,8 @@ pub enum InputError {
     Geometry(#[from] GeometryError),
     /// The conformal factor is not positive at the start.
     #[error(
-        "sigma_d = {sigma} at the start, where it must be positive (h L_z > -1 for rules explicit in z); \
-         take a smaller step"
+        "sigma_d = {sigma} at the start, but it must be positive (h L_z > -1 for rules explicit in z); take a smaller \
+         step"
     )]
     Sigma {
         /// The value of sigma_d.
@@ -137,18 +143,23 @@ pub enum InputError {
     },
     /// The two initial points coincide, and the discrete Lagrangian is not regular there.
     #[error(
-        "q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points"
+        "the initial points coincide (q0 = q1), and the discrete Lagrangian is not regular there; pass two different \
+         points"
     )]
     EqualPoints,
     /// The method requires a form of the Lagrangian that this one does not claim to have.
-    #[error("the Lagrangian does not claim to be {claim}; claim it in `structure` if it is, or take another method")]
+    #[error(
+        "the method requires the property `{claim}`, which the Lagrangian does not claim; claim it in `structure` if \
+         it holds, or choose another method"
+    )]
     Unclaimed {
         /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
         claim: &'static str,
     },
     /// A claim on the form of the Lagrangian is false.
     #[error(
-        "the Lagrangian claims to be {claim}, and is not: a derivative that should vanish has the relative size {size:e}"
+        "the Lagrangian claims the property `{claim}`, which does not hold: a derivative that must vanish has the \
+         relative size {size:e}; correct its `structure`"
     )]
     FalseClaim {
         /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
@@ -158,11 +169,12 @@ pub enum InputError {
     },
     /// A Lagrangian has switching functions that its `HINTS` do not state.
     #[error(
-        "the Lagrangian has `switching_functions`; state them by `const HINTS: Hints = Hints {{ switching_functions: true, ..Hints::NONE }}`"
+        "the Lagrangian has `switching_functions` that its hints do not declare; add `const HINTS: Hints = Hints {{ \
+         switching_functions: true, ..Hints::NONE }}`"
     )]
     SwitchingUnstated,
     /// The Lagrangian does not satisfy a hypothesis of the method.
-    #[error("the method needs {hypothesis}; take another method or another Lagrangian")]
+    #[error("the method requires {hypothesis}; choose another method or another Lagrangian")]
     Hypothesis {
         /// The hypothesis.
         hypothesis: &'static str,
@@ -173,16 +185,16 @@ pub enum InputError {
     )]
     NoTimeTransformation,
     /// The first step fails.
-    #[error("no first step from this start: {0}")]
+    #[error("the first step fails: {0}")]
     FirstStep(StepError),
 }
 
 /// The part of the message for an accuracy that was not reached, depending on the difference between the trial runs.
 fn how_near(wanted: f64, reached: f64) -> String {
     if !reached.is_finite() {
-        "reached, and no two trial runs could be compared".to_owned()
+        "reached, since no two trial runs could be compared".to_owned()
     } else if reached <= wanted {
-        format!("certain, though trial runs agree to {reached:.1e}")
+        format!("guaranteed, although trial runs agree to {reached:.1e}")
     } else {
         format!("reached (trial runs agree to {reached:.1e})")
     }
@@ -203,7 +215,10 @@ impl InputError {
 #[non_exhaustive]
 pub enum StepError {
     /// Newton's method did not reach round-off.
-    #[error("Newton's method left a residual of {residual:e} after {iterations} iterations; take a smaller step")]
+    #[error(
+        "the iteration did not converge: it left a residual of {residual:e} after {iterations} iterations; take a \
+         smaller step"
+    )]
     NotConverged {
         /// The largest component of the last residual, a momentum.
         residual: f64,
@@ -217,7 +232,7 @@ pub enum StepError {
         pivot: f64,
     },
     /// sigma_d = 1 + Dz L_d is not positive.
-    #[error("sigma_d = {sigma} is not positive, so the step is not conformally contact; take a smaller step")]
+    #[error("sigma_d = {sigma} is not positive, so that the step is not conformally contact; take a smaller step")]
     SigmaVanished {
         /// The value of sigma_d.
         sigma: f64,
@@ -225,8 +240,8 @@ pub enum StepError {
     /// The integrating factor of a stage of a collocation step is not positive, so that the step is not conformally
     /// contact.
     #[error(
-        "the integrating factor of a stage is {rho}, where it must be positive: the step is too long for the rate L_z of the \
-         conformal factor; take a smaller step or more stages"
+        "the integrating factor of a stage is {rho}, but it must be positive: the step is too long for the rate L_z \
+         of the conformal factor; take a smaller step or more stages"
     )]
     StageFactor {
         /// The smallest factor of a stage, 1 at the start of the step.
@@ -239,15 +254,18 @@ pub enum StepError {
         t: f64,
     },
     /// The two points of a step are conjugate along the exact motion, so that they do not determine it.
-    #[error("the points of the step are conjugate (singular value {smallest:e}); take another step")]
+    #[error(
+        "the two points of the step are conjugate (smallest singular value {smallest:e}); take a step of another size"
+    )]
     ConjugatePoint {
         /// The smallest singular value of the derivative of the end position in the initial velocity, a time.
         smallest: f64,
     },
     /// The subdivision of a step fails: the shortest part does not resolve the motion, or there are too many parts.
     #[error(
-        "the step cannot be divided into parts that resolve the motion near t = {t}: the defect of its curve there is that of \
-         round-off, or of a kink that the Lagrangian does not tell; allow a larger one, take shorter steps, or end the run before"
+        "the step cannot be divided into parts that resolve the motion near t = {t}: the defect of the interpolated \
+         motion there is due to round-off, or to a kink for which the Lagrangian has no switching function; allow a \
+         larger defect, take shorter steps, or end the run before this time"
     )]
     Undivided {
         /// The time.
@@ -255,8 +273,8 @@ pub enum StepError {
     },
     /// The Lagrangian switches too often within a step.
     #[error(
-        "the Lagrangian switches at its kinks or jumps without end near t = {t}: the motion is held on a surface from both sides, or \
-         crosses it ever faster; smooth the kink, or end the run before"
+        "the Lagrangian switches too often near t = {t}: the motion slides along the surface of a kink or a jump, or \
+         crosses it at ever shorter intervals; smooth the kink, or end the run before this time"
     )]
     Switching {
         /// The time that is reached.
@@ -265,8 +283,9 @@ pub enum StepError {
     /// The Lagrangian jumps across a surface that depends on the velocity or on the action, or that the motion only
     /// touches; there the corner conditions do not determine how the motion continues.
     #[error(
-        "the Lagrangian jumps at t = {t} across a surface that depends on the velocity or on z, or that the motion only touches, where \
-         the principle does not say how the motion goes on; smooth the jump, or end the run before"
+        "the Lagrangian jumps at t = {t} across a surface that depends on the velocity or on z, or that the motion \
+         only touches, so that the variational principle does not determine how the motion continues; smooth the \
+         jump, or end the run before this time"
     )]
     JumpAlong {
         /// The time of the jump.
@@ -276,15 +295,15 @@ pub enum StepError {
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
     /// The function of an event is not finite.
-    #[error("the function of an event is not finite at t = {t}; give one that is defined along the motion")]
+    #[error("the function of an event is not finite at t = {t}; use a function that is defined along the motion")]
     Event {
         /// The time.
         t: f64,
     },
     /// A formula branches on a value that differs between SIMD lanes.
     #[error(
-        "the Lagrangian or the time transformation asks for one value (`re`, `extent`, `==`) of lanes that differ; \
-         choose by `if_less`, `max`, `min`, `abs` or `signum`"
+        "the Lagrangian or the time transformation branches on a value (by `re`, `extent` or `==`) that differs \
+         between SIMD lanes; use `if_less`, `max`, `min`, `abs` or `signum` instead"
     )]
     Branched,
 }
@@ -300,11 +319,12 @@ impl From<StepError> for GeometryError {
 #[non_exhaustive]
 pub enum SelectionFailure {
     /// Round-off: shorter steps do not improve the result.
-    #[error("round-off of the motion is larger; ask for less")]
+    #[error("the round-off of the motion is larger; request a larger error")]
     RoundOff,
     /// The motion is chaotic: runs with different steps separate like those from different initial states.
     #[error(
-        "the motion is chaotic, and round-off grows beyond the wanted error after t = {t}; end the run there, or ask for less"
+        "the motion is chaotic, and its round-off exceeds the requested error after t = {t}; end the run there, or \
+         request a larger error"
     )]
     Chaos {
         /// The last time, in tenths of the span, at which runs agree.
@@ -319,8 +339,9 @@ pub enum SelectionFailure {
     /// Runs agree where they are compared, but between the nodes of their steps the motion does not satisfy the
     /// equations.
     #[error(
-        "between the nodes of their steps the motion misses its equations by {defect:.1e} of its size, which shorter steps better only \
-         with order {order:.1}: a kink, a jump or something narrow lies there; ask for less, or smooth the Lagrangian"
+        "between the nodes of the steps the equation of motion has a relative defect of {defect:.1e}, which decreases \
+         only with order {order:.1} for shorter steps, because of a kink, a jump or a narrow pulse of the Lagrangian; \
+         request a larger error, or smooth the Lagrangian"
     )]
     DefectBetweenNodes {
         /// The largest defect of the finer run, relative to the largest momentum.
@@ -330,8 +351,8 @@ pub enum SelectionFailure {
     },
     /// Runs whose nodes coincide agree with each other, but not with a run with other nodes.
     #[error(
-        "a trial run with one step more {}: a kink, a jump or a pulse lies at the ends of their steps; end the span beside it, or smooth the \
-         Lagrangian",
+        "a trial run with one more step {}: a kink, a jump or a pulse of the Lagrangian coincides with the ends of \
+         the steps of the other runs; end the span before it, or smooth the Lagrangian",
         how_far(*distance)
     )]
     FeatureAtNodes {
@@ -341,7 +362,8 @@ pub enum SelectionFailure {
     },
     /// A step fails however short it is.
     #[error(
-        "the motion cannot be followed beyond t = {t}, however short the steps: end the span before it (the last attempt: {cause})"
+        "the motion cannot be computed beyond t = {t} even with very short steps; end the span before this time (last \
+         failure: {cause})"
     )]
     StepFailed {
         /// The time that is reached.
@@ -351,7 +373,8 @@ pub enum SelectionFailure {
     },
     /// Near a certain time the motion is too fast, or the force too narrow, for the steps that can be tried.
     #[error(
-        "near t = {t} the motion is not resolved by any step that was tried: it is too fast or too narrow there; take a shorter span"
+        "near t = {t} none of the tried steps resolves the motion, which is too fast there or has too narrow a force; \
+         take a shorter span"
     )]
     Unresolved {
         /// The time.
@@ -359,8 +382,8 @@ pub enum SelectionFailure {
     },
     /// The trial runs would exceed their budget.
     #[error(
-        "the budget of the trial runs is used up, since the steps that the motion needs are too many to be tried; take a method of higher \
-         order, a shorter span, or give a step"
+        "the budget of the trial runs is used up, since the motion needs too many steps; choose a method of higher \
+         order or a shorter span, or give a step"
     )]
     Budget,
 }
@@ -368,7 +391,7 @@ pub enum SelectionFailure {
 /// The part of the message for a run whose final state has this distance from those of others.
 fn how_far(distance: f64) -> String {
     if distance.is_finite() {
-        format!("ends {distance:.1e} away from them")
+        format!("ends {distance:.1e} away from the others")
     } else {
         "does not resolve the motion".to_owned()
     }
@@ -380,12 +403,13 @@ fn how_runs_converge(order: f64) -> String {
     const NONE: f64 = 0.25;
     if order >= NONE {
         format!(
-            "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is low; ask for \
-             less, or take a method of higher order if the Lagrangian is smooth"
+            "the trial runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or \
+             the method has a low order; request a larger error, or choose a method of higher order if the Lagrangian \
+             is smooth"
         )
     } else {
-        "runs do not converge as their steps get shorter: the Lagrangian is not smooth along the motion, or the motion amplifies its \
-         round-off; ask for less, or end the run before"
+        "the trial runs do not converge as their steps get shorter: the Lagrangian is not smooth along the motion, or \
+         the motion amplifies its round-off; request a larger error, or end the run earlier"
             .to_owned()
     }
 }
@@ -405,7 +429,8 @@ impl std::fmt::Display for UnresolvedStep {
         let UnresolvedStep { step, defect } = self;
         write!(
             f,
-            "step {step} does not resolve the motion (defect {defect:.1e}); what follows may be wrong: take a smaller step"
+            "step {step} does not resolve the motion (defect {defect:.1e}), and later results may be wrong; take a \
+             smaller step"
         )
     }
 }
@@ -452,8 +477,8 @@ impl std::fmt::Display for Status {
             Status::Stopped { step, t, by } => write!(f, "stopped by {by} at t = {t}, in step {step}"),
             Status::FalseClaim { step, claim, size } => write!(
                 f,
-                "unreliable: after step {step} the Lagrangian is not {claim}, as it claims (relative size {size:e}); correct \
-                 its structure and run again"
+                "unreliable: after step {step} the Lagrangian violates the property `{claim}` that it claims (by the \
+                 relative size {size:e}); correct its `structure` and run again"
             ),
             Status::Failed { step, t, cause } => write!(f, "failed in step {step} at t = {t}: {cause}"),
         }

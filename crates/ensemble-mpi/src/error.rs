@@ -20,7 +20,8 @@ pub enum MpiError {
     },
     /// Two ranks have constructed different ensembles.
     #[error(
-        "rank {rank} has another ensemble than rank 0; start all ranks with the same program, members, integrator, steps, end and requests"
+        "rank {rank} has a different ensemble from rank 0; start all ranks with the same program, members, \
+         integrator, steps, end and requests"
     )]
     AnotherEnsemble {
         /// The first rank whose ensemble is not that of rank 0.
@@ -29,8 +30,8 @@ pub enum MpiError {
     /// No result of a rank has arrived for longer than [`Options::patience`](crate::Options::patience). Collective
     /// calls are no longer possible: end the job with [`abort`](mpi::topology::Communicator::abort).
     #[error(
-        "nothing was heard of rank {rank} for {seconds} s, and {open} of its shards are open; run again from the checkpoint, or with more patience than \
-         a shard takes"
+        "rank {rank} has sent no message for {seconds} s, and {open} of its shards are incomplete; run again from the \
+         checkpoint, or set a patience that is longer than the time of a shard"
     )]
     RankLost {
         /// The rank.

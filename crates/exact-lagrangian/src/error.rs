@@ -28,7 +28,7 @@ pub enum ExactError<const N: usize> {
     },
     /// The motion needs more work than [`EVALUATIONS`](crate::EVALUATIONS): the drag is very strong, or the time very
     /// long.
-    #[error("t = {t} was reached with the largest number of evaluations; go on from there, or take a smaller h")]
+    #[error("the largest number of evaluations was reached at t = {t}; continue from there, or take a smaller h")]
     Unfinished {
         /// The time that was reached.
         t: f64,
@@ -37,8 +37,8 @@ pub enum ExactError<const N: usize> {
     },
     /// No motion through the two points was found.
     #[error(
-        "no motion through the two points found: from velocity {:?} it misses the second by {residual:e}; \
-         pass a guess of the initial velocity, or take a smaller h", last.v.as_slice()
+        "no motion through the two points was found: with the initial velocity {:?} it misses the second point by \
+         {residual:e}; pass a guess of the initial velocity, or take a smaller h", last.v.as_slice()
     )]
     NotConverged {
         /// The start of the last motion tried.
@@ -51,7 +51,7 @@ pub enum ExactError<const N: usize> {
     /// The points are conjugate along the motion: `dq1/dv0` is singular to round-off, and the exponential map is not a
     /// local diffeomorphism there.
     #[error(
-        "the two points are conjugate along the motion (smallest singular value of dq1/dv0 {smallest:e}): \
+        "the two points are conjugate along the motion (smallest singular value of dq1/dv0 {smallest:e}), so that \
          they do not determine it; take another h"
     )]
     ConjugatePoint {

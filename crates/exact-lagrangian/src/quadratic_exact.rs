@@ -118,7 +118,7 @@ impl<const N: usize> QuadraticExact<N> {
         let conjugate = InputError::FirstStep(StepError::ConjugatePoint { smallest: smallest * unit });
         if Fold::of(&displacement.v, &velocity.v, h).decayed {
             return Err(InputError::Hypothesis {
-                hypothesis: "a motion that has not decayed below the smallest number",
+                hypothesis: "a motion that stays above the smallest positive number",
             });
         }
         if smallest <= rounding {
@@ -295,7 +295,7 @@ fn over_mass<const N: usize, const M: usize>(
     w: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,
 ) -> Result<SMatrix<f64, N, M>, InputError> {
-    let (what, remedy) = ("W = L_vv", "take a regular Lagrangian");
+    let (what, remedy) = ("W = L_vv", "use a regular Lagrangian");
     let unit = SVector::<f64, N>::from_fn(|i, _| w.row(i).amax().sqrt());
     let scaled = SMatrix::<f64, N, N>::from_fn(|i, j| w[(i, j)] / (unit[i] * unit[j]));
     let Regularity { smallest, largest } = singular_values(&scaled);

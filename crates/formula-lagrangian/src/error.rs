@@ -24,15 +24,15 @@ pub enum FormulaError {
     },
     /// The number of coordinates is outside the range that is compiled.
     #[error(
-        "{found} coordinates, where 1 to {MOST_COORDINATES} are possible; any number may have a lattice by the formulas of a site and of a bond, or bodies: \
-         `lattice` and `bodies` in Python, [lattice] in a scene"
+        "the formula has {found} coordinates; it can have from 1 to {MOST_COORDINATES}. Use a lattice or bodies for \
+         systems with more: `lattice` and `bodies` in Python, [lattice] in a scene"
     )]
     Dimension {
         /// The number of coordinates.
         found: usize,
     },
     /// A Lagrangian was requested with a dimension other than that of the formula.
-    #[error("the formula has {found} coordinates, not {asked}: ask for FormulaLagrangian<{found}>")]
+    #[error("the formula has {found} coordinates, not {asked}; use FormulaLagrangian<{found}>")]
     OtherDimension {
         /// The number of coordinates of the formula.
         found: usize,
@@ -48,7 +48,9 @@ pub enum FormulaError {
         known: String,
     },
     /// A graph has a coordinate or a parameter without a name.
-    #[error("the graph has a {what} of index {index}, where {count} are named")]
+    #[error(
+        "the graph contains the {what} with index {index}, but only {count} have names; give a name to each {what}"
+    )]
     Unknown {
         /// A coordinate, a velocity or a parameter.
         what: &'static str,
@@ -58,10 +60,10 @@ pub enum FormulaError {
         count: usize,
     },
     /// A formula was built from symbols of different graphs.
-    #[error("symbols of different graphs were mixed: take all that a formula is made of from the same `Symbols`")]
+    #[error("the formula combines symbols of different graphs; build it from the symbols of a single `Symbols`")]
     Mixed,
     /// A parameter has a value that is not finite.
-    #[error("the parameter `{name}` is {value}, where a finite number is needed")]
+    #[error("the parameter `{name}` is {value}; it must be a finite number")]
     ParameterValue {
         /// The name.
         name: String,
@@ -69,7 +71,10 @@ pub enum FormulaError {
         value: f64,
     },
     /// The formula, or one of its derivatives, is too large.
-    #[error("the formula with its derivatives has more than {limit} parts; write it in Rust, or take a smaller one")]
+    #[error(
+        "the formula and its derivatives have more than {limit} operations; simplify the formula, or write the \
+         Lagrangian in Rust"
+    )]
     TooLarge {
         /// The bound.
         limit: usize,

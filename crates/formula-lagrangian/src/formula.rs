@@ -159,8 +159,8 @@ impl Formula {
 pub(crate) fn index(names: &Names, parameter: &str, value: f64) -> Result<usize, FormulaError> {
     let Some(i) = names.parameters.iter().position(|name| name == parameter) else {
         let known = match names.parameters.as_slice() {
-            [] => "the formula has none".to_owned(),
-            some => format!("those of the formula are {}", some.join(", ")),
+            [] => "the formula has no parameters".to_owned(),
+            some => format!("the parameters of the formula are {}", some.join(", ")),
         };
         return Err(FormulaError::UnknownParameter { name: parameter.to_owned(), known });
     };

@@ -11,12 +11,12 @@ pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
         "where" | "piecewise" | "ifelse" | "select" | "cond" => CHOICE,
         "heaviside" | "step" | "theta_step" | "unitstep" => "write `if(t > 1, 1, 0)` for a step at 1",
         "floor" | "ceil" | "round" | "mod" | "fmod" | "frac" => {
-            "it jumps: write each piece by `if(a < b, then, otherwise)`"
+            "it is discontinuous; write each piece with `if(a < b, then, otherwise)`"
         }
         "interp" | "interp1d" | "spline" | "cubicspline" | "table" => {
-            "write its pieces by `if(a < b, then, otherwise)`, or a polynomial"
+            "write its pieces with `if(a < b, then, otherwise)`, or use a polynomial"
         }
-        "polyval" | "poly" | "polynomial" => "write it out, as `c0 + x*(c1 + x*c2)`",
+        "polyval" | "poly" | "polynomial" => "write the polynomial out, as in `c0 + x*(c1 + x*c2)`",
         "log10" => "write `ln(x)/ln(10)`",
         "log2" => "write `ln(x)/ln(2)`",
         "cot" => "write `1/tan(x)`",
@@ -37,9 +37,9 @@ pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
 pub(crate) fn instead_of_name(name: &str) -> Option<&'static str> {
     Some(match name {
         "e" | "E" | "euler" => "write `exp(x)` for a power of Euler's number, or `exp(1)`",
-        "inf" | "infinity" | "nan" => "a formula has finite numbers alone",
+        "inf" | "infinity" | "nan" => "the numbers of a formula must be finite",
         "and" | "or" | "not" | "else" => CHOICE,
-        "lambda" | "def" | "return" => "give a function to Python's `solve` as it is, not its text",
+        "lambda" | "def" | "return" => "pass the Python function itself to `solve`, not its text",
         _ => return None,
     })
 }
@@ -60,13 +60,13 @@ pub(crate) fn instead_of_character(c: char) -> Option<&'static str> {
     Some(match c {
         '@' => "a product of vectors is written `sum(i, 0, n-1, q[i]*v[i])`",
         '&' | '|' | '!' | '?' | ':' | '~' | '\u{2264}' | '\u{2265}' => CHOICE,
-        '%' => "a remainder jumps: write each piece by `if(a < b, then, otherwise)`",
-        '{' | '}' => "brackets are round: `(` and `)`",
+        '%' => "a remainder is discontinuous; write each piece with `if(a < b, then, otherwise)`",
+        '{' | '}' => "use round brackets: `(` and `)`",
         '\\' | '$' => "write `sin(x)`, `x/y`, `x'` in place of TeX",
         '\u{b2}' => "write `^2`",
         '\u{b3}' => "write `^3`",
         '\u{221a}' => "write `sqrt(x)`",
-        '"' => "no texts are in a formula",
+        '"' => "a formula cannot contain strings",
         _ => return None,
     })
 }

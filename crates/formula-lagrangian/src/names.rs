@@ -33,7 +33,7 @@ impl Names {
                 Some((name, rest)) => {
                     let count = rest.strip_suffix(']').and_then(|count| count.trim().parse::<usize>().ok());
                     let Some(count) = count.filter(|count| *count > 0) else {
-                        return Err(bad(coordinate, "is not of the form `q[3]`, with the number of entries"));
+                        return Err(bad(coordinate, "is not of the form `q[3]`, where 3 is the number of entries"));
                     };
                     (name.trim(), Some(count))
                 }
@@ -59,10 +59,10 @@ impl Names {
     fn check(&self, name: &str) -> Result<(), FormulaError> {
         let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
         if !(first && name.chars().all(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_')) {
-            return Err(bad(name, "is not a letter followed by letters, digits and `_`"));
+            return Err(bad(name, "must be a letter or `_` followed by letters, digits and `_`"));
         }
         if is_reserved(name) {
-            return Err(bad(name, "has a meaning of its own; take another"));
+            return Err(bad(name, "is reserved; choose another name"));
         }
         if self.blocks.iter().any(|b| b.name == name) || self.parameters.iter().any(|p| p == name) {
             return Err(bad(name, "is given twice"));

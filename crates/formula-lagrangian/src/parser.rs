@@ -64,7 +64,7 @@ impl<'a> Parser<'a> {
         value_name: ValueName,
     ) -> Parsed<Id> {
         if text.len() > LONGEST_TEXT {
-            let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
+            let message = format!("the text has {} bytes; it can have at most {LONGEST_TEXT}", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
@@ -97,7 +97,7 @@ impl<'a> Parser<'a> {
                     if self.value_name == ValueName::Any {
                         self.define(name, first, value)?;
                     } else if name != "L" {
-                        let message = format!("after the definition of `{name}` a value is expected");
+                        let message = format!("expected a value after the definition of `{name}`");
                         return Err(self.error(self.word(0), message));
                     }
                     return Ok(value);
@@ -108,7 +108,7 @@ impl<'a> Parser<'a> {
             let value = self.expression(0)?;
             if self.ends_line()? {
                 let word = self.word(0);
-                let message = "only one value is possible, and it is the last; a definition has the form `name = ...`";
+                let message = "a formula has a single value, at its end; write a definition as `name = ...`";
                 return Err(self.error(word, message));
             }
             return Ok(value);
@@ -134,7 +134,9 @@ impl<'a> Parser<'a> {
             || self.names.parameters.iter().any(|p| p == name)
             || self.locals.iter().any(|(local, _)| *local == name);
         if taken {
-            return Err(self.error(word, format!("the name `{name}` is taken; take another for this definition")));
+            return Err(
+                self.error(word, format!("the name `{name}` is in use; choose another name for this definition"))
+            );
         }
         self.locals.push((name, value));
         Ok(())
@@ -157,7 +159,10 @@ impl<'a> Parser<'a> {
         self.at = (self.at + 1).min(self.words.len());
         self.read += 1;
         if self.read > MOST_WORDS || self.graph.len() > MOST_NODES {
-            let message = format!("the formula has more than {MOST_NODES} parts, its sums written out");
+            let message = format!(
+                "the formula has more than {MOST_NODES} operations after its sums are expanded; \
+                                   simplify it"
+            );
             return Err(self.error(word, message));
         }
         Ok(word)

@@ -38,7 +38,11 @@ impl<const N: usize> FormulaLagrangian<N> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
         if !letters || KEYWORDS.contains(&name) {
-            return Err(FormulaError::Name { name: name.to_owned(), why: "is not that of a type, such as `MySystem`" });
+            return Err(FormulaError::Name {
+                name: name.to_owned(),
+                why: "is not a valid name of a Rust type, such as \
+                                                                         `MySystem`",
+            });
         }
         let mut text = String::new();
         // Writing to a string does not fail.

@@ -66,7 +66,8 @@ pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
                 Ok(x) if x.is_finite() => Token::Number(x),
                 Ok(_) => return Err(ParseError::at(text, span, "this number is too large")),
                 Err(_) if word == "." && matches!(words.last(), Some(Word { token: Token::Name(_), .. })) => {
-                    let message = "a name has no point: write `sin(x)` for `np.sin(x)`, and `pi` for `math.pi`";
+                    let message = "names do not contain a point; write `sin(x)` for `np.sin(x)`, and `pi` for \
+                                   `math.pi`";
                     return Err(ParseError::at(text, span, message));
                 }
                 Err(_) => return Err(ParseError::at(text, span, format!("`{word}` is not a number"))),

@@ -121,7 +121,10 @@ impl Table {
         let open = || -> std::io::Result<File> {
             let file = OpenOptions::new().append(true).open(&path)?;
             if file.metadata()?.len() < bytes {
-                return Err(std::io::Error::other("it is shorter than it was when the run was interrupted; run anew"));
+                return Err(std::io::Error::other(
+                    "the file is shorter than when the run was interrupted; run without \
+                                                  --resume",
+                ));
             }
             file.set_len(bytes)?;
             Ok(file)

@@ -155,7 +155,7 @@ impl Motion {
         for (what, found) in [("q0", q.len()), length] {
             if found != expected {
                 return Err(value_error(format!(
-                    "`{what}` has {found} numbers, where the system has {expected} coordinates"
+                    "`{what}` has {found} numbers, but the system has {expected} coordinates"
                 )));
             }
         }

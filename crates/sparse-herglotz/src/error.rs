@@ -8,7 +8,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum SparseError {
     /// The number of unknowns is 0 or exceeds the range of the indices.
-    #[error("a system of {found} unknowns; it must have from 1 to {most}")]
+    #[error("the system has {found} unknowns; it must have from 1 to {most}")]
     Unknowns {
         /// The requested number.
         found: usize,
@@ -17,7 +17,8 @@ pub enum SparseError {
     },
     /// An element refers to an unknown that does not exist.
     #[error(
-        "element {element} of list {list} has the unknown {unknown}; the system has the unknowns 0 to {last} (and FIXED)"
+        "element {element} of list {list} refers to the unknown {unknown}; the unknowns of the system are 0 to {last} \
+         (and FIXED)"
     )]
     OutOfRange {
         /// The list of elements, counted from 0 in the order in which they were added.
@@ -30,7 +31,7 @@ pub enum SparseError {
         last: usize,
     },
     /// An element contains an unknown twice.
-    #[error("element {element} of list {list} has the unknown {unknown} twice; an element's unknowns must differ")]
+    #[error("element {element} of list {list} has the unknown {unknown} twice; the unknowns of an element must differ")]
     Repeated {
         /// The list of elements.
         list: usize,
@@ -40,7 +41,7 @@ pub enum SparseError {
         unknown: usize,
     },
     /// A parameter of an element is not finite.
-    #[error("element {element} of list {list} has a parameter {value}; parameters must be finite")]
+    #[error("element {element} of list {list} has the parameter {value}; parameters must be finite")]
     Parameter {
         /// The list of elements.
         list: usize,
@@ -50,7 +51,7 @@ pub enum SparseError {
         value: f64,
     },
     /// The mass of an unknown is missing, or is not positive and finite.
-    #[error("the unknown {unknown} has the mass {mass}; the method needs a positive finite mass of each unknown")]
+    #[error("the unknown {unknown} has the mass {mass}; the method requires a positive finite mass for each unknown")]
     Mass {
         /// The first such unknown.
         unknown: usize,
@@ -91,16 +92,15 @@ pub enum SparseError {
     )]
     NotSeparable,
     /// An operation needs the action, which the state does not have.
-    #[error(
-        "the Lagrangian depends on the action z, which the state does not have; start the motion with one, as `z: Some(0.0)`"
-    )]
+    #[error("the Lagrangian depends on the action z, which the initial state lacks; give it, as in `z: Some(0.0)`")]
     NoAction,
     /// The matrix `L_vv` is singular at the start.
     #[error("the matrix L_vv is singular at the start: the Lagrangian is not regular; give each unknown a mass")]
     SingularMass,
     /// The factors of the step's matrix need more memory than the limit.
     #[error(
-        "the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it if it was set, or take an explicit method"
+        "the factors of the matrix of a step need {needed} bytes, but the limit is {limit}; raise the limit if it was \
+         set, or use an explicit method"
     )]
     Memory {
         /// The estimate from the symbolic analysis.

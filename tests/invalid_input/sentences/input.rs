@@ -157,7 +157,7 @@ fn input_errors() {
             gauss.transformed_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
-        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the steps between two rows", "= 0", "at least 1"];
+        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "= 0", "at least 1"];
         InputError::PathLength { .. } => {
             let ends = [End::Position([0.0].into()), End::Free];
             let path = DiscretePath::new(vec![[0.0].into(); 3]).unwrap();

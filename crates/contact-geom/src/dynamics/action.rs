@@ -115,7 +115,7 @@ impl<const N: usize> Symmetry<N> {
         for &(i, j) in pairs {
             Self::rotation(i, j)?;
             if std::mem::replace(&mut taken[i], true) || std::mem::replace(&mut taken[j], true) {
-                let what = "the coordinates of all planes of rotation, which must differ,";
+                let what = "the list of coordinates of the planes of rotation, which must all differ,";
                 return Err(GeometryError::WrongSize { what, expected: N, found: 2 * pairs.len() });
             }
             planes[i] = Some(j);

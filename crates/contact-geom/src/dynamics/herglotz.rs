@@ -185,7 +185,11 @@ fn rates_of_many<T: Scalar, const N: usize>(
 
 /// The error for a singular W.
 fn irregular(singular: SingularMatrix) -> GeometryError {
-    singular.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular")
+    singular.of(
+        "W = L_vv",
+        "L is not regular here, so that Herglotz' equation does not determine the acceleration; \
+                             choose a regular Lagrangian",
+    )
 }
 
 /// The Herglotz vector field at a fixed time, as a field that can be differentiated.

@@ -42,11 +42,12 @@ impl std::fmt::Display for PathStatus {
         match self {
             PathStatus::Found => write!(f, "found"),
             PathStatus::NotConverged => {
-                write!(f, "not converged: start from a path that is nearer, as by continuation")
+                write!(f, "not converged: start from a closer path, for example by continuation")
             }
             PathStatus::Stalled => write!(
                 f,
-                "stalled: no correction lessens the residual; there may be no critical path near, start from another one"
+                "stalled: no correction reduces the residual, so that there may be no critical path nearby; start \
+                 from another path"
             ),
             PathStatus::Conjugate { regularity } => write!(
                 f,
@@ -54,7 +55,7 @@ impl std::fmt::Display for PathStatus {
             ),
             PathStatus::Undefined { step, cause } => write!(f, "the path is not defined in step {step}: {cause}"),
             PathStatus::SigmaVanished { step, sigma } => {
-                write!(f, "sigma_d = {sigma} in step {step}, where it must be positive: take smaller steps")
+                write!(f, "sigma_d = {sigma} in step {step}, but it must be positive: take smaller steps")
             }
         }
     }

@@ -99,7 +99,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     /// # Errors
     /// [`GeometryError::NonFinite`].
     pub fn starting_at(self, t0: f64, z0: f64) -> Result<Self, InputError> {
-        finite("the time and the action of the start", &SVector::from([t0, z0]))?;
+        finite("(t0, z0)", &SVector::from([t0, z0]))?;
         Ok(BoundaryPath { t0, z0, ..self })
     }
 
@@ -278,7 +278,11 @@ fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), Inpu
     }
     let most = available_memory() / bytes;
     if steps >= most || Vec::<u8>::new().try_reserve_exact(steps.saturating_mul(bytes)).is_err() {
-        let (what, remedy) = ("the number of steps of the path", "take longer steps, or a machine with more memory");
+        let (what, remedy) = (
+            "the number of steps of the path",
+            "take longer steps, or use a machine with more \
+                                                                  memory",
+        );
         return Err(InputError::TooMany { what, found: steps as f64, most: most.min(steps - 1) as f64, remedy });
     }
     Ok(())

@@ -11,9 +11,7 @@ pub enum EnsembleError {
     #[error("the ensemble has no members; give it at least one")]
     Empty,
     /// The number of threads is 0.
-    #[error(
-        "the ensemble is to run on 0 threads; give it at least 1, or say nothing for as many as there are processors"
-    )]
+    #[error("the number of threads is 0; it must be at least 1, and defaults to the number of processors")]
     Threads,
     /// The run of a member is refused, for a reason that holds for all members, or because a claim about the Lagrangian
     /// is false.
@@ -26,7 +24,8 @@ pub enum EnsembleError {
     },
     /// The members have observers, whose results are not part of a checkpoint.
     #[error(
-        "an ensemble under the eyes of observers has no checkpoint; leave it out, or take `rows_every` for the states on the way"
+        "an ensemble with observers cannot be saved to a checkpoint; remove the checkpoint, or record states with \
+         `rows_every` instead of observers"
     )]
     Observed,
     /// The checkpoint file cannot be read or written.
@@ -39,7 +38,8 @@ pub enum EnsembleError {
     },
     /// The file contains the shards of another ensemble.
     #[error(
-        "{} has the shards of another ensemble; go on with the same members, integrator, steps, end and requests, or give another file",
+        "{} contains the shards of another ensemble; use the same members, integrator, steps, end and requests, or \
+         another file",
         .path.display()
     )]
     AnotherEnsemble {
@@ -48,7 +48,8 @@ pub enum EnsembleError {
     },
     /// A shard that was computed elsewhere does not belong to this ensemble.
     #[error(
-        "a shard that was computed elsewhere is none of this ensemble; compare the fingerprints of all who compute"
+        "a shard that was computed elsewhere does not belong to this ensemble; compare the fingerprints of all \
+         processes"
     )]
     ForeignShard,
 }

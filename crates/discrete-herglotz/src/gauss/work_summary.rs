@@ -21,40 +21,56 @@ pub enum GaussRoute {
 
 fn mass_matrix(constant: bool) -> PlanEntry {
     if constant {
-        PlanEntry::skipped("mass matrix", "W is constant: inverted once")
+        PlanEntry::skipped("mass matrix", "W is constant and is inverted once")
     } else {
-        PlanEntry::computed("mass matrix", "at the stages, once a step")
+        PlanEntry::computed("mass matrix", "W is evaluated at the stages, once a step")
     }
 }
 
 fn action(structure: &Structure) -> PlanEntry {
     let drives = !structure.is_affine_in_z();
-    PlanEntry::computed("action z", if drives { "it drives the motion" } else { "the stages of this route carry it" })
+    PlanEntry::computed(
+        "action z",
+        if drives {
+            "the motion depends on it"
+        } else {
+            "the stage equations of this \
+                                                                                     route include it"
+        },
+    )
 }
 
 /// The summary for steps that are equal in physical time.
 pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
-    let newton = PlanEntry::skipped("Newton's method", "only in steps whose iteration does not contract");
-    let gradients = PlanEntry::skipped("Jacobian", "the iteration needs gradients alone");
+    let newton = PlanEntry::skipped(
+        "Newton's method",
+        "used only in steps whose fixed-point iteration does not \
+                                                        contract",
+    );
+    let gradients = PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients");
     match route {
         GaussRoute::Linear => vec![
-            PlanEntry::skipped("iteration", "L is quadratic: the step is one matrix, made once"),
-            PlanEntry::skipped("forces", "the matrix holds them"),
+            PlanEntry::skipped("iteration", "L is quadratic: each step applies one precomputed matrix"),
+            PlanEntry::skipped("forces", "the precomputed matrix contains them"),
             PlanEntry::skipped("action z", DECOUPLED),
         ],
         GaussRoute::Condensed => vec![
-            PlanEntry::computed("iteration", "the accelerations of the stages alone, to round-off"),
+            PlanEntry::computed("iteration", "determines the accelerations of the stages to round-off"),
             mass_matrix(true),
-            PlanEntry::skipped("integrating factor", "gamma is constant: its stages are computed once"),
+            PlanEntry::skipped("integrating factor", "gamma is constant: the values at the stages are computed once"),
             PlanEntry::skipped(
                 "Jacobian",
-                "one factorisation for a linear force, renewed where the force's slope has changed",
+                "factorised once for a linear force, and again only where the derivative of the force has changed",
             ),
             newton,
             PlanEntry::skipped("action z", DECOUPLED),
         ],
         GaussRoute::ConstantMass | GaussRoute::General => vec![
-            PlanEntry::computed("iteration", "velocities, actions and integrating factors of the stages, to round-off"),
+            PlanEntry::computed(
+                "iteration",
+                "determines the velocities, actions and integrating factors of the \
+                                              stages to round-off",
+            ),
             mass_matrix(route == GaussRoute::ConstantMass),
             gradients,
             newton,
@@ -68,12 +84,16 @@ pub(crate) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<Pla
     vec![
         PlanEntry::computed(
             "time step",
-            "the rate dt/dtau follows the motion: equal steps of its time, a shorter one at the end",
+            "the steps are equal in transformed time, with a shorter one at the end; dt/dtau depends on the position",
         ),
-        PlanEntry::computed("iteration", "velocities, actions, factors and rates of the stages, to round-off"),
+        PlanEntry::computed(
+            "iteration",
+            "determines the velocities, actions, integrating factors and rates dt/dtau \
+                                          of the stages to round-off",
+        ),
         mass_matrix(structure.constant_mass),
-        PlanEntry::skipped("Jacobian", "the iteration needs gradients alone"),
-        PlanEntry::skipped("Newton's method", "steps whose iteration does not contract are refused"),
+        PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients"),
+        PlanEntry::skipped("Newton's method", "a step whose fixed-point iteration does not contract fails"),
         action(structure),
     ]
 }

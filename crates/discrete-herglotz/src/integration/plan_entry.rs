@@ -26,4 +26,4 @@ impl PlanEntry {
 }
 
 /// The reason for skipping the action.
-pub(crate) const DECOUPLED: &str = "L = L0 + gamma z: it does not act back, and is not requested";
+pub(crate) const DECOUPLED: &str = "L = L0 + gamma z: the motion does not depend on z, and z is not requested";

@@ -85,7 +85,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         state.check()?;
         let Some(lengths) = scheme.substeps() else {
             return Err(InputError::Hypothesis {
-                hypothesis: "a composition of symmetric steps, no Nyström splitting",
+                hypothesis: "a composition of symmetric steps, not a Nyström splitting",
             });
         };
         let (mut rules, mut substeps, mut time) = (Vec::new(), Vec::new(), 0.0);

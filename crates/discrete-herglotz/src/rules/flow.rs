@@ -250,8 +250,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
 pub(crate) fn work_summary_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
     let solved = if explicit {
         [
-            PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),
-            PlanEntry::skipped("Jacobian", "no equation is solved"),
+            PlanEntry::skipped("Newton's method", "each step is explicit and evaluates only forces"),
+            PlanEntry::skipped("Jacobian", "each step is explicit"),
         ]
     } else {
         [
@@ -259,7 +259,7 @@ pub(crate) fn work_summary_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
             PlanEntry::computed("Jacobian", "second derivatives of L at each iterate"),
         ]
     };
-    let action = PlanEntry::computed("action z", "the flow of a discrete Lagrangian carries it");
+    let action = PlanEntry::computed("action z", "the state of a discrete Lagrangian flow includes it");
     solved.into_iter().chain([action]).collect()
 }
 

@@ -288,7 +288,7 @@ impl FromStr for Method {
 
 /// The error for a name that no method has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no method {name:?}; the methods are {}", names())]
+#[error("unknown method {name:?}; the methods are {}", names())]
 pub struct UnknownMethod {
     /// The requested name.
     pub name: String,

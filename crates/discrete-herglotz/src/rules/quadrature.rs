@@ -354,7 +354,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         if scaled.condition() < 1.0 / f64::EPSILON {
             return Ok(());
         }
-        let (what, remedy) = ("the matrix L_vv at the start", "take a regular Lagrangian");
+        let (what, remedy) = ("the matrix L_vv at the start", "use a regular Lagrangian");
         Err(GeometryError::Singular { what, pivot: scaled.smallest, remedy }.into())
     }
 

@@ -176,7 +176,7 @@ impl<'de> serde::Deserialize<'de> for AnyIntegrator {
 
 /// The error of a name that belongs to no integrator.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no integrator {name:?}; there are {}", AnyIntegrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]
+#[error("unknown integrator {name:?}; the integrators are {}", AnyIntegrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]
 pub struct UnknownIntegrator {
     /// The requested name.
     pub name: String,

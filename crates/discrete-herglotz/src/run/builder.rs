@@ -141,7 +141,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             }
             (Until::Steps(_), _) => {
                 return Err(InputError::Hypothesis {
-                    hypothesis: "steps of a given size, to be ended after a number of them",
+                    hypothesis: "steps of a given size for a run that ends after a number of steps",
                 });
             }
         };

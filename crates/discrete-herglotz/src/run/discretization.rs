@@ -46,7 +46,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
         let info = integrator.info();
         if switches && info.in_transformed_time {
-            let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in transformed time";
+            let hypothesis = "a Lagrangian without kinks and jumps, since the steps are equal in transformed time";
             return Err(InputError::Hypothesis { hypothesis });
         }
         Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches })

@@ -135,29 +135,27 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         }
         let what = "conformal factor";
         entries.push(match (needs.conformal_factor, self.constant_rate) {
-            (false, true) => {
-                PlanEntry::skipped(what, "sigma_d is the same in every step, and the product is not requested")
-            }
-            (true, true) => {
-                PlanEntry::computed(what, "requested; sigma_d is the same in every step: a power at the end")
-            }
+            (false, true) => PlanEntry::skipped(what, "not requested; sigma_d is the same in every step"),
+            (true, true) => PlanEntry::computed(
+                what,
+                "requested; sigma_d is the same in every step, and its power is computed at \
+                                           the end",
+            ),
             (true, false) => {
-                PlanEntry::computed(what, "requested, and different in every step: a product along the run")
+                PlanEntry::computed(what, "requested; sigma_d varies, and its product is computed along the run")
             }
-            (false, false) => {
-                PlanEntry::skipped(what, "the product is not requested; each step checks that its own is positive")
-            }
+            (false, false) => PlanEntry::skipped(what, "not requested; each step checks that its sigma_d is positive"),
         });
-        let what = "probes of the structure";
+        let what = "checks of the structure";
         entries.push(if const { L::HINTS.proved } {
-            PlanEntry::skipped(what, "it is proved from the formula of L")
+            PlanEntry::skipped(what, "the structure is proved from the formula of L")
         } else if structure == Structure::default() {
-            PlanEntry::skipped(what, "nothing is claimed of L")
+            PlanEntry::skipped(what, "L claims no property")
         } else {
-            PlanEntry::computed(what, "it is claimed: at the start, and along the run")
+            PlanEntry::computed(what, "the properties that L claims are checked at the start and along the run")
         });
         let (what, autonomous) = ("time at the stages", structure.autonomous);
-        let why = if autonomous { "L does not depend on it" } else { "L depends on it" };
+        let why = if autonomous { "L does not depend on t" } else { "L depends on t" };
         entries.push(PlanEntry { what, computed: !autonomous, why: why.into() });
         entries
     }
@@ -167,7 +165,7 @@ impl<L: Lagrangian<N>, const N: usize> Display for Plan<'_, L, N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Discretization { problem, count, h, info, t_end, .. } = &self.steps;
         let (t0, entries) = (problem.t0, self.entries());
-        let of = if info.in_transformed_time { " of the transformed time" } else { "" };
+        let of = if info.in_transformed_time { " in transformed time" } else { "" };
         writeln!(f, "{count} steps of {h}{of} by {}, t = {t0} .. {t_end}", info.name)?;
         for (title, computed) in [("computed", true), ("skipped", false)] {
             writeln!(f, "{title}:")?;

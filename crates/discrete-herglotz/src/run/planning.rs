@@ -46,7 +46,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             }
             // The step size for an accuracy is computed from a root of that order.
             if info.order == 0 {
-                return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
+                return Err(InputError::Hypothesis { hypothesis: "an integrator with an order of at least one" });
             }
         }
         let accuracy = matches!(length, StepControl::Accuracy(..));
@@ -128,8 +128,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
 pub(crate) const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
 
 /// The hypothesis of integrators in transformed time on the steps.
-const SIZED: &str =
-    "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
+const SIZED: &str = "steps of a given size in transformed time, or a requested accuracy, since the number of steps depends on the \
+     motion";
 
 fn check_count(count: f64) -> Result<(), InputError> {
     if count <= MAX_STEPS {

@@ -19,18 +19,19 @@ pub enum CheckpointError {
     #[error("the checkpoint cannot be read: {0}")]
     Unreadable(#[from] std::io::Error),
     /// The file is of another kind.
-    #[error("the file is no checkpoint of a run; give one that `Checkpoint` has written")]
+    #[error("the file is not a checkpoint of a run; give a file that `Checkpoint` has written")]
     Foreign,
     /// The file has another version of the format.
     #[error(
-        "the checkpoint has version {found}, where this library reads {VERSION}; go on with the library that wrote it"
+        "the checkpoint has version {found}, but this library reads version {VERSION}; resume with the library that \
+         wrote it"
     )]
     Version {
         /// The version of the file.
         found: u64,
     },
     /// The file is damaged or incomplete.
-    #[error("the checkpoint is damaged; start the run anew, or from another checkpoint")]
+    #[error("the checkpoint is damaged; start the run again, or resume from another checkpoint")]
     Damaged,
 }
 

@@ -110,7 +110,7 @@ impl Riccati {
         let x = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
         let c = 0.5 * lagrangian.hessian(t, &x).zz;
         let flow = Riccati { b: lagrangian.gradient(t, &x).z - 2.0 * c * state.z, c };
-        let hypothesis = "f(z) to be a polynomial of degree two; pass the flow of another";
+        let hypothesis = "an f(z) that is a polynomial of degree two, or the given flow of another f(z)";
         if is_rate_of(&flow, lagrangian, t, state) { Ok(flow) } else { Err(InputError::Hypothesis { hypothesis }) }
     }
 }

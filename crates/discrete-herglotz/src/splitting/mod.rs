@@ -23,9 +23,9 @@ use crate::PlanEntry;
 /// The work summary of the steps of a splitting, with the given entry for the action.
 fn work_summary(action: PlanEntry) -> Vec<PlanEntry> {
     vec![
-        PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),
-        PlanEntry::skipped("Jacobian", "no equation is solved"),
-        PlanEntry::skipped("shared kicks", "the last force of a step is the first of the next"),
+        PlanEntry::skipped("Newton's method", "each step is explicit and evaluates only forces"),
+        PlanEntry::skipped("Jacobian", "each step is explicit"),
+        PlanEntry::skipped("shared kicks", "the last force of a step is reused as the first of the next"),
         action,
     ]
 }

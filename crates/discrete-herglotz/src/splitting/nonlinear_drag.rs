@@ -148,7 +148,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        super::work_summary(PlanEntry::computed("action z", "it drives the motion"))
+        super::work_summary(PlanEntry::computed("action z", "the motion depends on it"))
     }
 
     fn save(&self) -> Option<Vec<u64>> {

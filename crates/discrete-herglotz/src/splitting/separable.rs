@@ -58,7 +58,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         let inverse = if is_identity(&mass) {
             None
         } else {
-            Some(inverted(&mass).map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?)
+            Some(inverted(&mass).map_err(|e| e.of("the mass matrix L_vv", "use a regular Lagrangian"))?)
         };
         Ok(SeparableForm { lagrangian, mass, inverse })
     }

@@ -64,7 +64,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         if most_misfit > 0.0 && most_misfit.is_finite() {
             return Ok(());
         }
-        Err(InputError::Hypothesis { hypothesis: "a positive and finite `most_misfit` of its parts" })
+        Err(InputError::Hypothesis { hypothesis: "a positive and finite `most_misfit`" })
     }
 
     fn stepper(

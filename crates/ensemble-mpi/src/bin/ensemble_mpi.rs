@@ -128,7 +128,7 @@ impl Table {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let Some(universe) = mpi::initialize() else {
-        eprintln!("error: the MPI library is in use already");
+        eprintln!("error: the MPI library is already initialized");
         return ExitCode::from(2);
     };
     let world = universe.world();
@@ -194,7 +194,7 @@ fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, ra
     if !rates {
         return;
     }
-    println!("{:.3} s in all", elapsed.as_secs_f64());
+    println!("total time: {:.3} s", elapsed.as_secs_f64());
     println!("shards by rank: {:?}", traffic.shards);
     let all: usize = traffic.shards.iter().sum();
     let received: usize = traffic.shards.iter().skip(1).sum();

@@ -115,9 +115,13 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
 
     fn work_summary(&self) -> Vec<PlanEntry> {
         vec![
-            PlanEntry::computed("panels", "as many in a step as round-off asks for, with a look between their nodes"),
-            PlanEntry::skipped("Newton's method", "Herglotz' field is integrated"),
-            PlanEntry::computed("action z", "Herglotz' field has it"),
+            PlanEntry::computed(
+                "panels",
+                "their number in a step is chosen for an error of round-off, with a check \
+                                           of the defect between their nodes",
+            ),
+            PlanEntry::skipped("Newton's method", "each panel is solved by fixed-point iteration"),
+            PlanEntry::computed("action z", "it is a component of the Herglotz field"),
         ]
     }
 }

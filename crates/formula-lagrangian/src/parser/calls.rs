@@ -84,15 +84,15 @@ impl<'a> Parser<'a> {
         let word = self.next()?;
         let Token::Name(index) = word.token else {
             self.at = self.at.saturating_sub(1);
-            return Err(self.unexpected(word, "the name of an index, as in `sum(i, 0, n-1, q[i]^2)`,"));
+            return Err(self.unexpected(word, "the name of an index, such as `i` in `sum(i, 0, n-1, q[i]^2)`"));
         };
         if self.word(0).token != Token::Sign(',') {
             let message =
-                format!("{} where `,` is expected: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
+                format!("expected `,`, found {}: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
             return Err(self.error(self.word(0), message));
         }
         if is_reserved(index) || self.is_value(index) {
-            return Err(self.error(word, format!("the name `{index}` is taken; take another for the index")));
+            return Err(self.error(word, format!("the name `{index}` is in use; choose another name for the index")));
         }
         self.expect(',')?;
         let first = self.whole()?;

@@ -15,7 +15,10 @@ impl<'a> Parser<'a> {
     /// An expression whose operators have a higher precedence than `weakest`.
     pub(super) fn expression(&mut self, weakest: u8) -> Parsed<Id> {
         if self.depth >= DEEPEST_NESTING {
-            let message = format!("nested more than {DEEPEST_NESTING} deep; give a part a name");
+            let message = format!(
+                "the formula is nested more than {DEEPEST_NESTING} levels deep; define a part of it \
+                                   beforehand, as `name = ...`"
+            );
             return Err(self.error(self.word(0), message));
         }
         self.depth += 1;
@@ -53,7 +56,7 @@ impl<'a> Parser<'a> {
     /// Rejects numbers that are not finite, such as `1/0`.
     pub(super) fn check_number(&self, id: Id, word: Word<'a>) -> Parsed<()> {
         match self.graph.as_number(id) {
-            Some(x) if !x.is_finite() => Err(self.error(word, format!("this is {x}, where a finite number is needed"))),
+            Some(x) if !x.is_finite() => Err(self.error(word, format!("the value is {x}; it must be a finite number"))),
             _ => Ok(()),
         }
     }

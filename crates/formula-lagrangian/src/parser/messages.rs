@@ -16,7 +16,7 @@ impl<'a> Parser<'a> {
                 "; a condition is `if(a < b, then, otherwise)`, with `<` or `>`"
             }
             (Some(Token::Name(name)), Token::Sign('(')) if self.is_value(name) => {
-                "; a product is written with `*`, and a coordinate, which is a function of time, by its name alone"
+                "; a product is written with `*`, and a coordinate as its name without `(t)`"
             }
             (_, Token::Sign('\'')) => "; only coordinates have a velocity, `x'`",
             (Some(Token::Number(_) | Token::Name(_) | Token::Sign(')' | ']')), Token::Name(_) | Token::Number(_))
@@ -26,7 +26,7 @@ impl<'a> Parser<'a> {
             }
             _ => "",
         };
-        self.error(word, format!("{} where {wanted} is expected{hint}", word.shown()))
+        self.error(word, format!("expected {wanted}, found {}{hint}", word.shown()))
     }
 
     pub(super) fn unknown(&self, name: &str, word: Word<'a>, kind: &str) -> ParseError {

@@ -21,7 +21,13 @@ impl<'a> Parser<'a> {
         let has_prime = prime.token == Token::Sign('\'');
         if let Some((_, value)) = self.locals.iter().rev().find(|(local, _)| *local == name) {
             if has_prime {
-                return Err(self.error(prime, format!("`{name}` is a definition, whose rate is to be written out")));
+                return Err(self.error(
+                    prime,
+                    format!(
+                        "`{name}` is a definition and has no velocity; write its \
+                                                      derivative out"
+                    ),
+                ));
             }
             return Ok(*value);
         }
@@ -74,7 +80,7 @@ impl<'a> Parser<'a> {
             }
         };
         let found = quantity.node(formula, self.graph);
-        found.ok_or_else(|| self.error(word, format!("`{name}` has more parts than an expression may have")))
+        found.ok_or_else(|| self.error(word, format!("`{name}` has more operations than an expression can have")))
     }
 
     /// Whether a name has a value, so that a bracket after it is a product with a missing `*`.
@@ -90,7 +96,7 @@ impl<'a> Parser<'a> {
         let index = match block.count {
             Some(_) => self.index(block)?,
             None if self.word(0).token == Token::Sign('[') => {
-                return Err(self.error(self.word(0), format!("`{}` is one number and has no entries", block.name)));
+                return Err(self.error(self.word(0), format!("`{}` is a single number and has no entries", block.name)));
             }
             None => block.first as u32,
         };
@@ -108,8 +114,8 @@ impl<'a> Parser<'a> {
         if self.word(0).token == sign {
             let name = self.text.get(word.span.0..word.span.1).unwrap_or("x");
             let message = format!(
-                "a second derivative, which no Lagrangian of Herglotz' principle has: write L of `{name}` and `{name}'` alone; the \
-                 acceleration follows from it"
+                "the formula has a second derivative of `{name}`; write L in terms of `{name}` and `{name}'`, since \
+                 Herglotz' equation determines the acceleration"
             );
             return Err(self.error(word, message));
         }
@@ -121,14 +127,14 @@ impl<'a> Parser<'a> {
         let (name, count) = (&block.name, block.count.unwrap_or(1));
         let open = self.word(0);
         if open.token != Token::Sign('[') {
-            return Err(self.error(open, format!("`{name}` has {count} entries: write `{name}[0]`")));
+            return Err(self.error(open, format!("`{name}` has {count} entries; write one of them as `{name}[0]`")));
         }
         self.next()?;
         let word = self.word(0);
         let index = self.bracketed(|parser| parser.whole(), ']')?;
         match usize::try_from(index) {
             Ok(i) if i < count => Ok((block.first + i) as u32),
-            _ => Err(self.error(word, format!("entry {index} of `{name}`, which has the entries 0 to {}", count - 1))),
+            _ => Err(self.error(word, format!("`{name}` has no entry {index}; its entries are 0 to {}", count - 1))),
         }
     }
 
@@ -138,8 +144,8 @@ impl<'a> Parser<'a> {
         let id = self.expression(0)?;
         match self.graph.as_number(id) {
             Some(x) if x.fract() == 0.0 && x.abs() <= MAX_INTEGER => Ok(x as i64),
-            Some(x) => Err(self.error(word, format!("{x} where an integer is expected"))),
-            None => Err(self.error(word, "an integer is expected that does not depend on parameters or on the state")),
+            Some(x) => Err(self.error(word, format!("expected an integer, found {x}"))),
+            None => Err(self.error(word, "expected an integer that does not depend on parameters or on the state")),
         }
     }
 }

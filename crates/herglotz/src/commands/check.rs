@@ -97,12 +97,13 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
         table(&samples),
     ];
     if !momenta.is_empty() {
-        parts.push(format!("the momenta are predicted to {:.1e} of their size", check.momentum_defect()));
+        parts
+            .push(format!("the momenta agree with their predictions to {:.1e} of their size", check.momentum_defect()));
     }
     if !check.statements.is_empty() {
         let step = check.statements.first().map_or(*step_size, |stated| stated.step_size);
         let formula = format!(
-            "the theorems of the discrete theory for this system with h = {}, worst of a few places:",
+            "largest residuals of the theorems of the discrete theory at a few places of the motion, for h = {}:",
             short(step)
         );
         parts.push(format!("{formula}\n{}", table(&statements)));

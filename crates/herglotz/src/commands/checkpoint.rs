@@ -41,9 +41,9 @@ impl Checkpoint {
         let text = std::fs::read_to_string(&path)
             .map_err(|_| refuse("there is no interrupted run in this directory; run without --resume"))?;
         let read: Checkpoint =
-            serde_json::from_str(&text).map_err(|_| refuse("it is damaged; run without --resume"))?;
+            serde_json::from_str(&text).map_err(|_| refuse("the checkpoint is damaged; run without --resume"))?;
         if read.scene != scene.fingerprint() {
-            return Err(refuse("the scene is not the one that was interrupted; run without --resume"));
+            return Err(refuse("the scene differs from that of the interrupted run; run without --resume"));
         }
         Ok(read)
     }

@@ -79,19 +79,19 @@ fn in_words(comparison: &Comparison) -> String {
         }
         None => format!("{error:.0e}: none"),
     };
-    let mut lines = vec![format!("the reference: {}", comparison.reference)];
+    let mut lines = vec![format!("reference: {}", comparison.reference)];
     // Integrators with the same reason share a line.
     for same in comparison.left_out.chunk_by(|a, b| a.1 == b.1) {
         let names: Vec<&str> = same.iter().map(|(name, _)| name.as_str()).collect();
         let why = same.first().map_or("", |(_, why)| why);
-        lines.push(format!("left out: {}: {why}", names.join(", ")));
+        lines.push(format!("not applicable: {}: {why}", names.join(", ")));
     }
-    lines.push(format!("the best for {}", ERRORS.map(best).join("; ")));
+    lines.push(format!("fastest integrator for an error of {}", ERRORS.map(best).join("; ")));
     // Peers have variable steps, so only their number is given.
     let of_peer = |error: f64| match comparison.best_of_peers(error) {
-        Some(work) => format!("{error:.0e}: {} by {} steps in {:.2e} s", work.integrator, work.steps, work.seconds),
+        Some(work) => format!("{error:.0e}: {} with {} steps in {:.2e} s", work.integrator, work.steps, work.seconds),
         None => format!("{error:.0e}: none"),
     };
-    lines.push(format!("beside them for {}", ERRORS.map(of_peer).join("; ")));
+    lines.push(format!("fastest method of another library for an error of {}", ERRORS.map(of_peer).join("; ")));
     lines.join("\n")
 }

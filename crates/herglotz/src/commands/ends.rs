@@ -12,7 +12,7 @@ impl Run {
     pub(super) fn run_ends(&self, text: &str) -> Result<(), Failure> {
         if self.resume || !self.scene.changes.is_empty() {
             return Err(Failure::Input(
-                "--resume and --set are not for a scene with [ends]; run it without them".into(),
+                "--resume and --set do not apply to a scene with [ends]; run it without them".into(),
             ));
         }
         let scene = EndsScene::read(text).map_err(|error| self.scene.explain(error))?;
@@ -64,12 +64,13 @@ impl Run {
         } else {
             let status = if found.is_found() { "found" } else { "not found" };
             let error = match found.error_estimate {
-                Some(error) => format!("by what the steps leave out it is off by {error:.1e} of its range"),
+                Some(error) => format!("the estimated truncation error is {error:.1e} of the range of the path"),
                 None if found.is_found() => {
-                    "how far it is off is not known by this integrator: midpoint and other rules of order 2 tell"
+                    "this integrator gives no estimate of the truncation error; midpoint and other rules of order 2 \
+                     give one"
                         .to_owned()
                 }
-                None => "it is the last one of the search".to_owned(),
+                None => "this is the last path of the search".to_owned(),
             };
             let mut lines = vec![
                 format!(
@@ -77,11 +78,11 @@ impl Run {
                     short(step_size)
                 ),
                 format!("{error}; the regularity of its ends is {regularity:.1e}"),
-                format!("{} rows; it starts with:", steps + 1),
+                format!("{} rows; the start of the path:", steps + 1),
             ];
             lines.extend(start.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
             lines.push(format!(
-                "and has:\n  action = {}\n  log_factor = {}",
+                "the whole path:\n  action = {}\n  log_factor = {}",
                 short(found.action()),
                 short(*log_factor)
             ));

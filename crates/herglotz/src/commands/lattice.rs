@@ -47,7 +47,7 @@ impl Run {
     pub(super) fn run_lattice(&self, text: &str) -> Result<(), Failure> {
         if self.resume || !self.scene.changes.is_empty() {
             return Err(Failure::Input(
-                "--resume and --set are not for a scene with [lattice]; run it without them".into(),
+                "--resume and --set do not apply to a scene with [lattice]; run it without them".into(),
             ));
         }
         let scene = LatticeScene::read(text).map_err(|error| self.scene.explain(error))?;
@@ -101,13 +101,17 @@ impl Run {
         } else {
             let sites: usize = scene.sizes.iter().product();
             print(&format!(
-                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the end:\n  t = {}\n  z = {}",
+                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n  \
+                 z = {}",
                 short(*t),
                 short(z)
             ))?;
         }
         match outcome.status {
-            _ if interrupted => Err(Failure::Run(format!("interrupted at t = {t}; the rows up to there are written"))),
+            _ if interrupted => Err(Failure::Run(format!(
+                "interrupted at t = {t}; the rows up to this time have been \
+                                                          written"
+            ))),
             Status::Completed => Ok(()),
             status => Err(Failure::Run(status.to_string())),
         }

@@ -26,11 +26,11 @@ enum What {
 /// A short description of an integrator.
 fn kind(integrator: AnyIntegrator) -> &'static str {
     match integrator {
-        AnyIntegrator::Discrete(_) => "a discrete Lagrangian, each step by Newton's method",
+        AnyIntegrator::Discrete(_) => "a discrete Lagrangian whose steps are solved by Newton's method",
         AnyIntegrator::Gauss { .. } => "contact Gauss collocation",
         AnyIntegrator::Divided(_) => "contact Gauss collocation, in steps that are divided where the motion is fast",
-        AnyIntegrator::TransformedGauss { .. } => "contact Gauss collocation, in equal steps of a time transformation",
-        AnyIntegrator::Splitting(_) => "a splitting with exact rate, for v.Mv/2 - V(t, q) + f(z)",
+        AnyIntegrator::TransformedGauss { .. } => "contact Gauss collocation, in equal steps of transformed time",
+        AnyIntegrator::Splitting(_) => "a splitting with the exact conformal factor, for v.Mv/2 - V(t, q) + f(z)",
         AnyIntegrator::Composition(..) => "a composition of a symmetric discrete Lagrangian",
         _ => "",
     }

@@ -33,13 +33,13 @@ pub(crate) fn momentum(scene: &Scene, symmetry: &FormulaSymmetry) -> String {
 fn proved(scene: &Scene) -> Vec<(&'static str, bool, &'static str)> {
     let structure = scene.system.structure();
     vec![
-        ("smooth", scene.system.is_smooth(), "neither kinks nor jumps"),
+        ("smooth", scene.system.is_smooth(), "L has neither kinks nor jumps"),
         ("autonomous", structure.autonomous, "L does not depend on t"),
         ("z_free", structure.z_free, "L does not depend on z: no dissipation"),
         ("z_affine", structure.z_affine, "L = L0(t, q, v) + gamma(t) z"),
-        ("constant_rate", structure.has_constant_rate(), "L_z is one number"),
+        ("constant_rate", structure.has_constant_rate(), "L_z is constant"),
         ("separable", structure.separable, "L = v.Mv/2 - V(t, q) + f(t, z), M constant"),
-        ("quadratic", structure.quadratic, "the motion is linear"),
+        ("quadratic", structure.quadratic, "the equation of motion is linear"),
         ("constant_mass", structure.constant_mass, "W = L_vv is constant"),
     ]
 }
@@ -68,12 +68,12 @@ impl Plan {
                 "members": scene.members().count(),
             }));
         }
-        let mut lines = vec![plan.text.trim_end().to_owned(), "proved of the formula:".to_owned()];
+        let mut lines = vec![plan.text.trim_end().to_owned(), "proved from the formula:".to_owned()];
         let holding = proved.iter().filter(|(_, holds, _)| *holds);
         lines.extend(holding.map(|(name, _, meaning)| format!("  {name}: {meaning}")));
         lines.extend(momenta.iter().map(|momentum| format!("  {momentum} decays as the conformal factor")));
         if !scene.swept.is_empty() {
-            lines.push(format!("a sweep has {} members", scene.members().count()));
+            lines.push(format!("the sweep has {} members", scene.members().count()));
         }
         print(&lines.join("\n"))
     }

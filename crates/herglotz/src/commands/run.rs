@@ -146,7 +146,7 @@ pub(crate) fn interrupt_flag() -> Arc<AtomicBool> {
     };
     // Without a handler Ctrl-C ends the program at once.
     if let Err(error) = ctrlc::set_handler(handler) {
-        eprintln!("warning: Ctrl-C will leave no checkpoint: {error}");
+        eprintln!("warning: a run that Ctrl-C interrupts will have no checkpoint: {error}");
     }
     flag
 }
@@ -322,7 +322,7 @@ impl Run {
                 integrator.name
             )];
             let crossings = if scene.events.is_empty() { String::new() } else { format!(", {events} events") };
-            lines.push(format!("{rows} rows{crossings}; the end:"));
+            lines.push(format!("{rows} rows{crossings}; the final state:"));
             lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
             print(&lines.join("\n"))?;
         }
@@ -330,9 +330,9 @@ impl Run {
             eprintln!("warning: {unresolved}");
         }
         match outcome.status {
-            _ if interrupted => {
-                Err(Failure::Run(format!("interrupted at t = {t}; the same command with --resume goes on from there")))
-            }
+            _ if interrupted => Err(Failure::Run(format!(
+                "interrupted at t = {t}; the same command with --resume continues from there"
+            ))),
             Status::Completed | Status::Stopped { .. } => Ok(()),
             status => Err(Failure::Run(status.to_string())),
         }

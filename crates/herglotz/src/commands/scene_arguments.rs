@@ -25,8 +25,9 @@ impl SceneArguments {
     /// The text of the file.
     pub fn text(&self) -> Result<String, Failure> {
         let text = std::fs::read(&self.file).map_err(Failure::of_file(&self.file))?;
-        String::from_utf8(text)
-            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))
+        String::from_utf8(text).map_err(|_| {
+            Failure::Input(format!("{} is not encoded in UTF-8; save it in this encoding", self.file.display()))
+        })
     }
 
     /// An error with the name of the file.

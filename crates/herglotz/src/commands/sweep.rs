@@ -119,14 +119,16 @@ impl Sweep {
         let refuse = |why: &str| Failure::Input(format!("{}: {why}", self.scene.file.display()));
         if scene.swept.is_empty() {
             return Err(refuse(
-                "there is nothing to sweep; add [sweep] with a parameter, as in gamma = { from = -1.0, to = 0.0, count = 11 }",
+                "the scene has no swept values; add [sweep] with a parameter, as in gamma = { from = -1.0, to = 0.0, \
+                 count = 11 }",
             ));
         }
         let factor = scene.columns.iter().find(|(_, column)| column.has_conformal_factor());
         let terminal = scene.events.iter().find(|(_, event)| event.terminal);
         if let (Some((column, _)), Some((event, _))) = (factor, terminal) {
             return Err(refuse(&format!(
-                "the column `{column}` of a sweep is known at the ends of steps, where the terminal event `{event}` is not; leave one of them out"
+                "the column `{column}` of a sweep is known only at the ends of steps, but the terminal event \
+                 `{event}` ends a motion within a step; remove one of them"
             )));
         }
         // The time is a column of its own.

@@ -26,7 +26,7 @@ pub enum RuntimeError {
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// A step of a map that is checked could not be taken.
-    #[error("a step could not be taken: {0}")]
+    #[error("a step fails: {0}")]
     Step(#[from] StepError),
     /// An error of a checkpoint.
     #[error(transparent)]
@@ -35,7 +35,7 @@ pub enum RuntimeError {
     #[error("a thread could not be started: {0}; end other programs and try again")]
     Thread(#[from] std::io::Error),
     /// The length of a vector differs from the number of coordinates.
-    #[error("`{what}` has {found} numbers, where the system has {expected} coordinates")]
+    #[error("`{what}` has {found} numbers, but the system has {expected} coordinates")]
     Length {
         /// Which vector.
         what: &'static str,
@@ -45,7 +45,7 @@ pub enum RuntimeError {
         expected: usize,
     },
     /// A vector or number is not finite.
-    #[error("`{what}` is {value}, where a finite number is needed")]
+    #[error("`{what}` is {value}; it must be a finite number")]
     NotFinite {
         /// The name of the vector component or number.
         what: String,
@@ -54,7 +54,8 @@ pub enum RuntimeError {
     },
     /// L is linear in some velocities, so that it is not regular.
     #[error(
-        "the Lagrangian is not regular at the start: it is linear in {velocities}, so that no acceleration follows; add a kinetic term"
+        "the Lagrangian is not regular at the start: it is linear in {velocities}, so that it does not determine the \
+         acceleration; add a kinetic term"
     )]
     NotRegular {
         /// The velocities, by name.
@@ -62,11 +63,12 @@ pub enum RuntimeError {
     },
     /// An event, or a column of one, contains the conformal factor, and the rate `L_z` of the motion is not constant.
     #[error(
-        "an event or one of its columns has `sigma` or `log_factor`, which are known between the ends of steps where L_z is constant alone; take a column of rows, or an event of time and state"
+        "an event or one of its columns contains `sigma` or `log_factor`, which are known within a step only if L_z \
+         is constant; use them in a column of rows, or use an event of time and state"
     )]
     FactorInEvent,
     /// A parameter is used in no formula.
-    #[error("the parameter `{name}` is not in the Lagrangian, nor in an event or a column: {hint}")]
+    #[error("the parameter `{name}` is not used in the Lagrangian, an event or a column: {hint}")]
     UnusedParameter {
         /// The parameter.
         name: String,
@@ -93,7 +95,7 @@ pub enum RuntimeError {
         why: String,
     },
     /// There is no system of this name in the catalogue.
-    #[error("there is no system {name:?} in the catalogue{}; there are {known}", nearest.as_ref().map(|n| format!(", did you mean {n:?}?")).unwrap_or_default())]
+    #[error("the catalogue has no system {name:?}{}; its systems are {known}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default())]
     UnknownSystem {
         /// The name.
         name: String,
@@ -117,24 +119,32 @@ pub fn in_words(error: &InputError) -> String {
     match error {
         InputError::Unclaimed { claim } => {
             let claim = match *claim {
-                "separable" => "separable (a kinetic part of the velocities and a potential of the positions, with no product of both)",
-                "quadratic" => "quadratic (so that its equation is linear)",
-                "z_affine" => "affine in z (with the drag that it says proportional to z)",
-                "constant_rate" => "of constant rate (with a derivative by z that is a number)",
-                "constant_mass" => "of constant mass (with kinetic energy whose coefficients are numbers)",
-                "autonomous" => "autonomous (without t)",
+                "separable" => {
+                    "separable (the sum of a kinetic energy of the velocities and a potential of the \
+                                positions)"
+                }
+                "quadratic" => "quadratic (with a linear equation of motion)",
+                "z_affine" => "affine in z (with a drag that is proportional to z)",
+                "constant_rate" => "of constant rate (with a constant derivative with respect to z)",
+                "constant_mass" => "of constant mass (with constant coefficients of the kinetic energy)",
+                "autonomous" => "autonomous (independent of t)",
                 "z_free" => "free of z",
                 other => other,
             };
-            format!("the Lagrangian is not {claim}, as this integrator needs; take another integrator")
+            format!("the Lagrangian is not {claim}, which this integrator requires; choose another integrator")
         }
         InputError::NoTimeTransformation => {
-            "the integrator needs a time transformation, which Lagrangians by a formula or a function do not have; take another integrator".to_owned()
+            "the integrator requires a time transformation, which is not available for a formula or a function; \
+             choose another integrator"
+                .to_owned()
         }
-        InputError::Hypothesis { hypothesis } => format!("the integrator needs {hypothesis}; take another integrator"),
-        InputError::Unsaved => "this integrator's motion cannot be saved on the way; take another integrator".to_owned(),
-        InputError::NoIntegrator => "steps are given without an integrator; name one".to_owned(),
-        InputError::NoSteps => "neither steps nor an accuracy are given; give one".to_owned(),
+        InputError::Hypothesis { hypothesis } => format!(
+            "the integrator requires {hypothesis}; choose another \
+                                                          integrator"
+        ),
+        InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
+        InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),
+        InputError::NoSteps => "neither steps nor an accuracy is given; give one of them".to_owned(),
         error => error.to_string(),
     }
 }

@@ -25,8 +25,8 @@ pub fn check_parameters(formula: &Formula, texts: &[&str]) -> Result<(), Runtime
     let known = || used.iter().copied();
     let hint = match nearest_name(name, known()) {
         Some(near) => format!("did you mean `{near}`?"),
-        None if used.is_empty() => "there are none that are used".to_owned(),
-        None => format!("there are {}", known().collect::<Vec<_>>().join(", ")),
+        None if used.is_empty() => "the formulas use no parameters".to_owned(),
+        None => format!("the formulas use {}", known().collect::<Vec<_>>().join(", ")),
     };
     Err(RuntimeError::UnusedParameter { name: (*name).to_owned(), hint })
 }

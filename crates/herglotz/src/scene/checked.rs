@@ -17,8 +17,8 @@ pub(super) fn check_version(text: &str) -> Result<(), SceneError> {
         return Ok(());
     }
     let found = *version;
-    let what = if found > VERSION { "is of a later program; take that" } else { "is not known" };
-    let message = format!("the version {found} of scene files {what}, or write the scene for version {VERSION}");
+    let what = if found > VERSION { "requires a newer program; update it, or" } else { "is not known" };
+    let message = format!("version {found} of scene files {what} write the scene for version {VERSION}");
     Err(SceneError::at(text, version.span(), message))
 }
 
@@ -27,7 +27,7 @@ pub(super) fn finite(text: &str, x: &Location<f64>, name: &str) -> Result<f64, S
     if x.is_finite() {
         return Ok(**x);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a finite number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}; it must be a finite number", **x)))
 }
 
 /// Checks that a number is positive and finite.
@@ -35,5 +35,5 @@ pub(super) fn positive(text: &str, x: &Location<f64>, name: &str) -> Result<f64,
     if **x > 0.0 {
         return finite(text, x, name);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a positive number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}; it must be a positive number", **x)))
 }

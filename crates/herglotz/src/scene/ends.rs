@@ -106,12 +106,12 @@ impl EndsScene {
         };
         let integrator_at = run.integrator.as_ref().map_or(run.span(), Location::span);
         if *run.steps < 2 {
-            let message = format!("`steps` is {}, where at least 2 are needed", *run.steps);
+            let message = format!("`steps` is {}; it must be at least 2", *run.steps);
             return Err(SceneError::at(text, run.steps.span(), message));
         }
         let [t0, t1] = given.t;
         if t0 == t1 {
-            let message = format!("the path ends at {t1}, at which it starts; give a later `t`, or an earlier one");
+            let message = format!("the path starts and ends at t = {t1}; give a later or an earlier `t` for its end");
             return Err(SceneError::at(text, ends.get("t").map_or(ends.span(), Location::span), message));
         }
         system.check_integrator(by).map_err(|error| SceneError::at(text, integrator_at, in_words(&error)))?;

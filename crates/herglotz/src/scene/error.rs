@@ -88,7 +88,7 @@ fn remedy(text: &str, (start, _): Span, message: &str) -> &'static str {
     match message {
         _ if message.starts_with("missing field") => "; add it",
         _ if of_number && (message.starts_with("unexpected key") || message.starts_with("string values")) => {
-            "; a number has a point before its fraction, and neither comma nor unit"
+            "; write a number with a decimal point and without a unit"
         }
         _ => "",
     }
@@ -106,7 +106,7 @@ fn plain(message: &str) -> String {
         ("expected f64", "expected a number"),
         ("expected i64", "expected a whole number"),
         ("expected usize", "expected a whole number, 0 or more"),
-        ("expected a string", "expected a text in quotes"),
+        ("expected a string", "expected a string in quotes"),
         ("expected a sequence", "expected a list"),
         ("expected a boolean", "expected true or false"),
         ("floating point", "number"),

@@ -201,7 +201,7 @@ impl LatticeScene {
             return Err(SceneError::at(
                 text,
                 columns.span(),
-                "rows of a lattice have the whole state; leave `columns` out",
+                "the rows of a lattice contain the whole state; remove `columns`",
             ));
         }
         let motion = SiteMotion { rows, ..SiteMotion::new(start, end, by, steps) };
@@ -257,17 +257,17 @@ fn explain(text: &str, spans: &[(&'static str, Span)], otherwise: Span, error: &
 /// The integrator and its steps.
 fn steps(text: &str, run: &Location<RunTable>) -> Result<(AnyIntegrator, Steps), SceneError> {
     if let Some(scales) = &run.scales {
-        let message =
-            "`scales` are for an accuracy, or an estimate of the error, and a lattice has neither; remove them";
+        let message = "`scales` are for an accuracy or an error estimate, and a lattice has neither; remove them";
         return Err(SceneError::at(text, scales.span(), message));
     }
     if let Some(accuracy) = &run.accuracy {
-        let message = "a lattice is run by given steps; name an `integrator` and a `step` instead of an accuracy";
+        let message = "a lattice is integrated with given steps; give an `integrator` and a `step` instead of an \
+                       accuracy";
         return Err(SceneError::at(text, accuracy.span(), message));
     }
     if run.step.is_none() && run.steps.is_none() || run.integrator.is_none() {
         let message =
-            "the run of a lattice needs an `integrator` and a `step`, as integrator = \"strang\" and step = 0.1";
+            "the run of a lattice needs an `integrator` and a `step`, as in integrator = \"strang\" and step = 0.1";
         return Err(SceneError::at(text, run.span(), message));
     }
     match step_control(text, run)? {
@@ -295,7 +295,7 @@ fn read_start(
                 *into = finite(text, &Location::new(*x, profile.span()), name)?;
                 Ok(())
             }
-            _ => Err(SceneError::at(text, profile.span(), format!("`{}` is one number", **name))),
+            _ => Err(SceneError::at(text, profile.span(), format!("`{}` must be a single number", **name))),
         };
         let place = |of: &dyn Fn(&str) -> String| coordinates.iter().position(|x| of(x) == **name);
         let found = if let Some(i) = place(&|x| x.to_owned()) {
@@ -313,7 +313,8 @@ fn read_start(
                 let known: Vec<String> =
                     coordinates.iter().flat_map(|x| [x.clone(), velocity_name(x), format!("p_{x}")]).collect();
                 let known: Vec<&str> = known.iter().map(String::as_str).chain(["z", "t"]).collect();
-                let message = format!("there is no `{}` in a start; there are {}", **name, known.join(", "));
+                let message =
+                    format!("unknown name `{}` in the start; the known names are {}", **name, known.join(", "));
                 return Err(SceneError::unknown(text, name.span(), name, known, message));
             }
         }
@@ -323,13 +324,15 @@ fn read_start(
         return Err(SceneError::at(
             text,
             table.span(),
-            "the start has velocities and momenta; give one kind for all coordinates",
+            "the start has both velocities and momenta; give one kind for all coordinates",
         ));
     }
     if let Some(place) = q.iter().position(Option::is_none) {
         let name = &coordinates[place];
-        let message =
-            format!("the coordinate `{name}` has no start; add `{name} = 0.0` to [start], or a formula in `i`");
+        let message = format!(
+            "the coordinate `{name}` has no value at the start; add `{name} = 0.0` to [start], or a formula \
+                     in `i`"
+        );
         return Err(SceneError::at(text, table.span(), message));
     }
     // The components of one site are contiguous.
@@ -353,13 +356,18 @@ fn values(
         Profile::One(x) => vec![*x; sites],
         Profile::Many(all) if all.len() == sites => all.clone(),
         Profile::Many(all) => {
-            let message = format!("`{name}` is a list of {}, where there are {sites} sites", all.len());
+            let message = format!("`{name}` is a list of {} numbers, but there are {sites} sites", all.len());
             return Err(SceneError::at(text, profile.span(), message));
         }
         Profile::Formula(formula) => {
             const INDICES: [&str; 3] = ["i", "j", "k"];
             let Some(indices) = INDICES.get(..sizes.len()) else {
-                return Err(SceneError::at(text, profile.span(), "formulas of a start are for up to three directions"));
+                return Err(SceneError::at(
+                    text,
+                    profile.span(),
+                    "the start can be given by formulas for up to three \
+                                                                 directions",
+                ));
             };
             let mut known: Vec<(&str, f64)> = parameters.iter().map(|(name, x)| (name.as_str(), *x)).collect();
             if !known.iter().any(|(name, _)| *name == "n") {
@@ -368,7 +376,12 @@ fn values(
             let read = Formula::parse("0", indices, &known).and_then(|names| names.expression(formula));
             let read = read.map_err(|error| of_formula(text, profile.span(), &error.into()))?;
             if read.has_velocity() || read.has_action() {
-                return Err(SceneError::at(text, profile.span(), "a start is a formula in the index of a site alone"));
+                return Err(SceneError::at(
+                    text,
+                    profile.span(),
+                    "the formula of a start can depend only on the index \
+                                                                 of a site",
+                ));
             }
             let at = |site: usize| {
                 let mut rest = sites;
@@ -388,7 +401,7 @@ fn values(
         Some((i, x)) => Err(SceneError::at(
             text,
             profile.span(),
-            format!("`{name}` is {x} at site {i}, where a finite number is needed"),
+            format!("`{name}` is {x} at site {i}; it must be a finite number"),
         )),
         None => Ok(all),
     }

@@ -88,11 +88,13 @@ impl Scene {
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
         if let Some(lattice) = file::span_of_table(text, "lattice") {
-            let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
+            let message = "a lattice works only with `herglotz run`; the other commands are for systems of up to 16 \
+                           coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
         if let Some(ends) = file::span_of_table(text, "ends") {
-            let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
+            let message = "a path between ends works only with `herglotz run`; the other commands are for motions \
+                           from a start";
             return Err(SceneError::at(text, ends, message));
         }
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;

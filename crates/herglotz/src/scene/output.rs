@@ -63,11 +63,11 @@ impl RowTimes {
             }
             (None, Some(times), None) => Self::at(text, times, (t0, end)),
             (None, None, Some(steps)) if **steps == 0 => {
-                Err(SceneError::at(text, steps.span(), "`every_step` is 0, where at least 1 is needed"))
+                Err(SceneError::at(text, steps.span(), "`every_step` is 0; it must be at least 1"))
             }
             (None, None, Some(steps)) => Ok(RowTimes::EveryStep(**steps)),
             (None, None, None) => Ok(RowTimes::Parts(DEFAULT_ROWS)),
-            _ => Err(SceneError::at(text, rows.span(), "give one of `every`, `at` and `every_step`")),
+            _ => Err(SceneError::at(text, rows.span(), "give only one of `every`, `at` and `every_step`")),
         }
     }
 
@@ -76,8 +76,10 @@ impl RowTimes {
         for time in times.iter() {
             let t = within(text, time, "a time", (t0, end))?;
             if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
-                let message =
-                    format!("the time {t} is not after the one before it, in the sense of the motion; sort them");
+                let message = format!(
+                    "the time {t} does not follow the previous time in the direction of the motion; sort the \
+                             times"
+                );
                 return Err(SceneError::at(text, time.span(), message));
             }
             last = Some(t);
@@ -90,7 +92,10 @@ impl RowTimes {
 fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
     let t = finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
-        let message = format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
+        let message = format!(
+            "the time {t} is outside of the motion, which runs from {t0} to {end}; give a time \
+                               within it"
+        );
         return Err(SceneError::at(text, time.span(), message));
     }
     Ok(t)
@@ -107,7 +112,7 @@ pub(crate) fn columns(
         return Err(SceneError::at(
             text,
             columns.span(),
-            "no columns; name some, or leave `columns` out for the whole state",
+            "`columns` is empty; give some columns, or remove `columns` for the whole state",
         ));
     }
     let of = |name: &Location<String>| match Column::parse(name, formula) {
@@ -133,7 +138,7 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
             ["energy", "sigma", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
         error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
         if error.error.nearest.is_none() {
-            error.error.message += "; beside the names of the formula there are ";
+            error.error.message += "; the known names are those of the formula and ";
             error.error.message += &known.join(", ");
         }
     }
@@ -177,8 +182,8 @@ impl Events {
             let refused = |error: FormulaError| with_nearest(of_formula(text, source.span(), &error.into()), formula);
             let read = read.map_err(refused)?;
             if read.has_conformal_factor() && !constant_rate {
-                let message =
-                    "`sigma` and `log_factor` are known at events where L_z is constant alone; take a column of rows";
+                let message = "`sigma` and `log_factor` are known at events only if L_z is constant; use them in a column of \
+                     rows";
                 return Err(SceneError::at(text, source.span(), message));
             }
             Ok(read)
@@ -192,7 +197,7 @@ impl Events {
                 DirectionName::Both => Direction::Both,
             };
             if let (Some(from), true) = (from, terminal) {
-                let message = "a terminal event counts from the start; leave out `from` or `terminal`";
+                let message = "a terminal event is detected from the start; remove `from` or `terminal`";
                 return Err(SceneError::at(text, from.span(), message));
             }
             let own = columns.iter().map(|column| expression(column, true)).collect::<Result<Vec<Expression>, _>>()?;
@@ -219,11 +224,14 @@ impl EventColumns {
             let name = name_of(column);
             let refuse = |message: String| Err(SceneError::at(text, column.span(), message));
             if name == "event" || of_state.iter().any(|known| known == name) {
-                return refuse(format!("every event has `{name}` already; leave it out, or name it otherwise"));
+                return refuse(format!(
+                    "every event already has the column `{name}`; remove it, or give it another \
+                                       name"
+                ));
             }
             let index = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
             if own.contains(&index) {
-                return refuse(format!("the event has two columns `{name}`; name one of them otherwise"));
+                return refuse(format!("the event has two columns `{name}`; give one of them another name"));
             }
             if index == self.names.len() {
                 self.names.push(name.to_owned());
@@ -247,7 +255,7 @@ pub(crate) fn angles(text: &str, wrapped: &[Location<String>], known: &[&str]) -
                 all.push(name)
             }
         });
-        let message = format!("there is no column `{}` to be folded; there are {}", **name, all.join(", "));
+        let message = format!("unknown column `{}` in `wrap`; the columns are {}", **name, all.join(", "));
         Err(SceneError::unknown(text, name.span(), name, known.iter().copied(), message))
     };
     wrapped.iter().map(of).collect()

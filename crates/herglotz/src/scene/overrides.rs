@@ -25,7 +25,7 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
     }
     let parsed = pair.and_then(|(name, value)| Some((name, value.parse::<f64>().ok()?)));
     let Some((name, value)) = parsed.filter(|(_, value)| value.is_finite()) else {
-        return refuse("a change is a name, `=` and a finite number, as in gamma=-0.2");
+        return refuse("an override must be a name, `=` and a finite number, as in gamma=-0.2");
     };
     // Later errors of the value are reported at the position of the value in the file.
     let put = |place: &mut Option<Location<f64>>, at| {
@@ -44,7 +44,7 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
         }
         "run.steps" => {
             if value.fract() != 0.0 || !(0.0..=2f64.powi(53)).contains(&value) {
-                return refuse("`run.steps` is a whole number, as in run.steps=100");
+                return refuse("`run.steps` must be a whole number, as in run.steps=100");
             }
             let at = run.steps.as_ref().map_or(at_run, Location::span);
             (run.accuracy, run.step, run.steps) = (None, None, Some(Location::new(value as usize, at)));
@@ -64,7 +64,7 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
                     let known = known.iter().map(String::as_str);
                     let all = known.clone().chain(["start.NAME"]).chain(OF_RUN);
                     let message = format!(
-                        "there is no `{name}` that can be set; there are {}",
+                        "unknown name `{name}`; the names that can be set are {}",
                         all.collect::<Vec<_>>().join(", ")
                     );
                     let near = known.chain(OF_RUN);

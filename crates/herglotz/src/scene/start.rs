@@ -126,7 +126,12 @@ impl Ends {
         })?;
         let q1 = all(text, &names, of_end.q, None, ["coordinate", "end"], end_at, &|x| x.to_owned())?;
         let Some(t1) = of_end.t else {
-            return Err(SceneError::at(text, end_at, "the end has no time; add `t = 1.0` to [ends], or another value"));
+            return Err(SceneError::at(
+                text,
+                end_at,
+                "the end of the path has no time; add `t = 1.0` to [ends], or \
+                                                     another value",
+            ));
         };
         let t0 = of_start.t.or(entry.map(|entry| entry.t)).unwrap_or(0.0);
         Ok(Ends { t: [t0, t1], q: [q0, q1], z0: of_start.z.unwrap_or(0.0) })
@@ -148,7 +153,7 @@ fn given(text: &str, keys: Vec<Key>, what: &str, table: Option<&Named<Numbers>>)
         let wrong_count = |found: &str| {
             let expected = match key.entries.len() {
                 _ if !key.is_list => "a number".to_owned(),
-                count => format!("a list of {count} numbers, or one number for all,"),
+                count => format!("a list of {count} numbers, or one number for all"),
             };
             SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {expected} is needed", **name))
         };
@@ -205,7 +210,7 @@ fn complete(
     let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
     let by_momentum = given.p.iter().any(Option::is_some);
     if by_momentum && given.v.iter().any(Option::is_some) {
-        let message = "the start has velocities and momenta; give one kind for all coordinates";
+        let message = "the start has both velocities and momenta; give one kind for all coordinates";
         return Err(SceneError::at(text, at, message));
     }
     let velocity = if by_momentum {

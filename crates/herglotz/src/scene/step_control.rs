@@ -14,12 +14,12 @@ pub(super) fn step_control(text: &str, run: &Location<RunTable>) -> Result<StepC
             return Err(SceneError::at(
                 text,
                 steps.span(),
-                "give the length of a step or the number of steps, not both",
+                "give the length `step` or the number `steps` of the steps, not both",
             ));
         }
         (Some(step), None) => Some(Steps::Size(positive(text, step, "step")?)),
         (None, Some(steps)) if **steps == 0 => {
-            return Err(SceneError::at(text, steps.span(), "`steps` is 0, where at least 1 is needed"));
+            return Err(SceneError::at(text, steps.span(), "`steps` is 0; it must be at least 1"));
         }
         (None, Some(steps)) => Some(Steps::Count(**steps)),
         (None, None) => None,
@@ -29,11 +29,11 @@ pub(super) fn step_control(text: &str, run: &Location<RunTable>) -> Result<StepC
         (Some(accuracy), by, None) => Ok(StepControl::Accuracy { error: positive(text, accuracy, "accuracy")?, by }),
         (None, Some(by), Some(steps)) => Ok(StepControl::Steps { by, steps }),
         (Some(accuracy), _, Some(_)) => {
-            refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the step is chosen for the accuracy")
+            refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the accuracy determines the step")
         }
         (None, None, Some(_)) => refuse(
             run.span(),
-            "the run has steps and no `integrator`; name one, or give an `accuracy` instead of the steps",
+            "the run has steps but no `integrator`; add one, or give an `accuracy` instead of the steps",
         ),
         (None, Some(_), None) => refuse(run.span(), "the run has neither a `step` nor an `accuracy`; add one of them"),
         (None, None, None) => refuse(
@@ -47,7 +47,7 @@ pub(super) fn step_control(text: &str, run: &Location<RunTable>) -> Result<StepC
 pub(super) fn integrator(text: &str, name: &Location<String>) -> Result<AnyIntegrator, SceneError> {
     name.parse().map_err(|_| {
         let all: Vec<String> = AnyIntegrator::all().iter().map(ToString::to_string).collect();
-        let message = format!("there is no integrator `{}`; `herglotz list integrators` lists them", **name);
+        let message = format!("unknown integrator `{}`; `herglotz list integrators` prints the names", **name);
         SceneError::unknown(text, name.span(), name, all.iter().map(String::as_str), message)
     })
 }

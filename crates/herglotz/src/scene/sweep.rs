@@ -79,21 +79,21 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -
         let starts: Vec<String> = single_names(formula).iter().map(|name| format!("start.{name}")).collect();
         let all = known.iter().chain(&starts).map(String::as_str);
         let listed = all.clone().collect::<Vec<_>>().join(", ");
-        let message = format!("there is no `{}` to be swept; there are {listed}", **name);
+        let message = format!("unknown name `{}` in [sweep]; the names that can be swept are {listed}", **name);
         return Err(SceneError::unknown(text, name.span(), name, all, message));
     };
     match (entry_of(formula, of_start), &start.velocity) {
-        (Some((Part::Time, _)), _) => refuse("all members start at one time; sweep another value"),
+        (Some((Part::Time, _)), _) => refuse("all members start at the same time; sweep another value"),
         (Some((Part::Velocity, _)), InitialVelocity::Momentum(_) | InitialVelocity::MomentumNear { .. }) => {
-            refuse("the start has momenta; sweep one of them")
+            refuse("the start is given by momenta; sweep one of them")
         }
         (Some((Part::Momentum, _)), InitialVelocity::Velocity(_)) => {
-            refuse("the start has velocities; sweep one of them")
+            refuse("the start is given by velocities; sweep one of them")
         }
         (Some((part, entry)), _) => Ok(Slot::Start(part, entry)),
         (None, _) => {
             let names = single_names(formula);
-            let message = format!("there is no `{of_start}` in a start; there are {}", names.join(", "));
+            let message = format!("unknown name `{of_start}` in the start; the known names are {}", names.join(", "));
             Err(SceneError::unknown(text, name.span(), of_start, names.iter().map(String::as_str), message))
         }
     }
@@ -102,14 +102,14 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -
 fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneError> {
     let refuse = |message: &str| Err(SceneError::at(text, values.span(), message));
     let RangeTable { from, to, count, spacing } = match &**values {
-        Values::List(list) if list.is_empty() => return refuse("no values; give at least one"),
+        Values::List(list) if list.is_empty() => return refuse("the list of values is empty; give at least one value"),
         Values::List(list) => return list.iter().map(|x| finite(text, x, "a value")).collect(),
         Values::Range(range) => range,
     };
     let (a, b) = (finite(text, from, "from")?, finite(text, to, "to")?);
     let count_at = count.span();
     let count = match **count {
-        0 => return Err(SceneError::at(text, count.span(), "no values; give a `count` of at least 1")),
+        0 => return Err(SceneError::at(text, count.span(), "`count` is 0; it must be at least 1")),
         count if count > MAX_VALUES => {
             let message = format!("these are more than {MAX_VALUES} values; take fewer");
             return Err(SceneError::at(text, count_at, message));
@@ -117,7 +117,7 @@ fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneErr
         count => count,
     };
     if *spacing == Spacing::Log && (a == 0.0 || b == 0.0 || a.signum() != b.signum()) {
-        return refuse("equal quotients need `from` and `to` of one sign, and not 0; take spacing = \"linear\"");
+        return refuse("spacing = \"log\" requires nonzero `from` and `to` of the same sign; use spacing = \"linear\"");
     }
     let last = count.saturating_sub(1).max(1) as f64;
     let between = |k: usize| {

@@ -16,13 +16,15 @@ pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option
         },
         (Some(name), ..) => refuse(name.span(), "give a `catalogue` or a `lagrangian` with `coordinates`, not both"),
         (None, Some(_), Some(_)) => Ok(None),
-        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a text in quotes"),
+        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a string in quotes"),
         (None, None, Some(_)) => {
             refuse(system.span(), "the system has no `coordinates`; add their names, as in coordinates = [\"x\"]")
         }
-        (None, None, None) => {
-            refuse(system.span(), "the system has no `lagrangian` with `coordinates`, and no `catalogue`; add either")
-        }
+        (None, None, None) => refuse(
+            system.span(),
+            "the system has neither a `lagrangian` with `coordinates` nor a `catalogue`; add \
+                                   one of them",
+        ),
     }
 }
 

@@ -121,7 +121,7 @@ impl Triangles {
                 return Err(SparseError::Parameters {
                     what: "the area of a triangle",
                     value: area,
-                    remedy: "mend the mesh",
+                    remedy: "correct the mesh",
                 });
             }
             // The inner product of the gradients of two hat functions is that of the sides opposite their nodes,

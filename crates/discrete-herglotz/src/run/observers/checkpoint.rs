@@ -23,7 +23,7 @@ impl Checkpoint {
     /// [`InputError::Count`] for 0 steps.
     pub fn every(steps: usize, path: impl Into<PathBuf>) -> Result<Self, InputError> {
         if steps == 0 {
-            return Err(InputError::Count { what: "the steps between two checkpoints", least: 1, found: 0 });
+            return Err(InputError::Count { what: "the number of steps between two checkpoints", least: 1, found: 0 });
         }
         Ok(Checkpoint { path: path.into(), every: steps, error: None })
     }
@@ -47,7 +47,7 @@ impl<const N: usize> Observer<N> for Checkpoint {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
                 self.error = Some(error);
-                ControlFlow::Break(Stop::here("a checkpoint that could not be written"))
+                ControlFlow::Break(Stop::here("a failure to write a checkpoint"))
             }
         }
     }

@@ -42,7 +42,7 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
     fn written(&mut self, flow: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if let Err(error) = self.write(at.k, at.last || flow.is_break()) {
             self.error = Some(error);
-            return ControlFlow::Break(Stop::here("a row that could not be written"));
+            return ControlFlow::Break(Stop::here("a failure to write a row"));
         }
         flow
     }
@@ -117,7 +117,7 @@ mod tests {
         }
         let mut csv = CsvRows::new(rows(), Full);
         let status = run(&mut csv);
-        assert!(matches!(status, Status::Stopped { by: "a row that could not be written", .. }), "{status:?}");
+        assert!(matches!(status, Status::Stopped { by: "a failure to write a row", .. }), "{status:?}");
         assert!(csv.error.is_some());
     }
 }

@@ -72,7 +72,7 @@ impl<'f, const N: usize> Rows<'f, N> {
     /// [`InputError::Count`] for a stride of 0.
     pub fn every(stride: usize) -> Result<Self, InputError> {
         if stride == 0 {
-            return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
+            return Err(InputError::Count { what: "the number of steps between two rows", least: 1, found: 0 });
         }
         Ok(Self::when(RowTimes::Every(stride)))
     }
@@ -238,7 +238,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.rows.len() >= MAX_ROWS {
-            return ControlFlow::Break(Stop::here("the rows, which are too many"));
+            return ControlFlow::Break(Stop::here("the limit on the number of rows"));
         }
         match self.record_up_to(at) {
             Ok(()) => ControlFlow::Continue(()),

@@ -53,7 +53,7 @@ where
         let mut items = self.base.stepper().work_summary();
         items.push(PlanEntry::computed(
             "switching functions",
-            "L has kinks or jumps: steps end on those that the motion meets",
+            "L has kinks or jumps: steps end where the motion crosses them",
         ));
         items
     }

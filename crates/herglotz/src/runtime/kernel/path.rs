@@ -22,7 +22,7 @@ pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<Fou
         5..=8 => within::<8>(formula, problem),
         n => Err(RuntimeError::argument(
             "coordinates",
-            format!("are {n}, where paths between two ends are compiled for 1 to 8; write the system in Rust"),
+            format!("are {n}, but paths between two ends are compiled for 1 to 8; write the system in Rust"),
         )),
     }
 }
@@ -58,8 +58,8 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
         other => Err(RuntimeError::argument(
             "integrator",
             format!(
-                "is \"{other}\", which has no discrete Lagrangian that is known from both ends of a step: take \"gauss_4\", another of \
-                 Gauss', or \"midpoint\""
+                "is \"{other}\", which has no discrete Lagrangian as a function of both ends of a step; choose a \
+                 Gauss method such as \"gauss_4\", or \"midpoint\""
             ),
         )),
     }

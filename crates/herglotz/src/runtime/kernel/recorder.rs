@@ -151,7 +151,8 @@ pub(super) fn check_events<const N: usize>(
 ) -> Result<(), RuntimeError> {
     let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
     if of_terminal {
-        let why = "is given for a terminal event, which counts from the start of the motion; leave one of them out";
+        let why = "is given for a terminal event, which is detected from the start of the motion; remove one of the \
+                   two";
         return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
     }
     let has_factor = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_conformal_factor);

@@ -39,13 +39,13 @@ impl Bodies {
         if masses.len() < 2 {
             return Err(RuntimeError::argument(
                 "masses",
-                format!("has {} bodies, where at least 2 are needed", masses.len()),
+                format!("has {} bodies; at least 2 are required", masses.len()),
             ));
         }
         if let Some((i, m)) = masses.iter().enumerate().find(|(_, m)| !(**m > 0.0 && m.is_finite())) {
             return Err(RuntimeError::argument(
                 "masses",
-                format!("has {m} for body {i}, where a positive finite number is needed"),
+                format!("has {m} for body {i}; it must be a positive finite number"),
             ));
         }
         for (what, value) in [("G", *g), ("gamma", *gamma)] {
@@ -63,7 +63,7 @@ impl Bodies {
             other => {
                 return Err(RuntimeError::argument(
                     "q0",
-                    format!("has {other} components for each body, where 2 or 3 are possible"),
+                    format!("has {other} components for each body; it must have 2 or 3"),
                 ));
             }
         };

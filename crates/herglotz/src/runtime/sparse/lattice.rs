@@ -30,7 +30,7 @@ impl FromStr for Boundary {
             "free" => Ok(Boundary::Free),
             _ => Err(RuntimeError::argument(
                 "boundary",
-                format!("is {name:?}, where \"periodic\", \"fixed\" or \"free\" is needed"),
+                format!("is {name:?}; it must be \"periodic\", \"fixed\" or \"free\""),
             )),
         }
     }
@@ -83,10 +83,7 @@ impl Lattice {
             1 => self.of::<1, 2>(),
             2 => self.of::<2, 4>(),
             3 => self.of::<3, 6>(),
-            found => Err(RuntimeError::argument(
-                "coordinates",
-                format!("has {found} names, where a site has 1 to 3 components"),
-            )),
+            found => Err(RuntimeError::argument("coordinates", format!("has {found} names; it must have 1 to 3"))),
         }
     }
 
@@ -96,13 +93,13 @@ impl Lattice {
         if let Some(size) = self.sizes.iter().find(|size| **size < least) {
             return Err(RuntimeError::argument(
                 "sites",
-                format!("has {size} along a direction, where at least {least} are needed"),
+                format!("has {size} along a direction; at least {least} are required"),
             ));
         }
         match self.sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size)) {
             Some(sites) if !self.sizes.is_empty() => Ok(sites),
-            Some(_) => Err(RuntimeError::argument("sites", "has no direction, where at least one is needed")),
-            None => Err(RuntimeError::argument("sites", "are more than can be counted")),
+            Some(_) => Err(RuntimeError::argument("sites", "has no direction; at least one is required")),
+            None => Err(RuntimeError::argument("sites", "exceeds the largest possible number of sites")),
         }
     }
 
@@ -117,7 +114,12 @@ impl Lattice {
         for (name, _) in &self.parameters {
             let mut used = [Some(&site), bond.as_ref()].into_iter().flatten().flat_map(Formula::used_parameters);
             if !used.any(|known| known == name) {
-                let where_to = if bond.is_some() { "neither in `site` nor in `bond`" } else { "not in `site`" };
+                let where_to = if bond.is_some() {
+                    "used neither in `site` nor in `bond`"
+                } else {
+                    "not used in \
+                                                                                                    `site`"
+                };
                 return Err(RuntimeError::argument("parameters", format!("has `{name}`, which is {where_to}")));
             }
         }
@@ -193,21 +195,20 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
     if !proved.is_affine_in_z() {
         return Err(RuntimeError::argument(
             "site",
-            "depends on z by more than `gamma*z` with a rate that is a number or a function of t",
+            "depends on z in another form than `gamma*z` with a gamma that is a number or a function of t",
         ));
     }
     let matrix = site.closed_mass_matrix(0.0, &origin()).filter(|_| proved.separable);
     let diagonal = matrix.filter(|m| (0..N * N).all(|k| k % N == k / N || m[(k % N, k / N)] == 0.0));
     let Some(m) = diagonal else {
-        let what =
-            "is not of the form m*x'^2/2 - V(t, x) + gamma*z with a number for m, and a square of each velocity alone";
+        let what = "is not of the form m*x'^2/2 - V(t, x) + gamma*z with a constant mass m for each coordinate";
         return Err(RuntimeError::argument("site", what));
     };
     let masses = std::array::from_fn(|i| m[(i, i)]);
     match masses.iter().find(|m| !(**m > 0.0 && m.is_finite())) {
         Some(m) => Err(RuntimeError::argument(
             "site",
-            format!("has the mass {m}, where each component needs a positive one: m*x'^2/2"),
+            format!("has the mass {m}; each coordinate needs a positive mass m, as in m*x'^2/2"),
         )),
         None => Ok(masses),
     }
@@ -226,7 +227,7 @@ fn check_bond<const N: usize>(bond: &FormulaLagrangian<N>) -> Result<(), Runtime
     if masses.is_none_or(|m| m.iter().any(|m| *m != 0.0)) {
         return Err(RuntimeError::argument(
             "bond",
-            "depends on velocities; a bond is minus a potential energy of its two ends",
+            "depends on velocities; a bond must be minus the potential energy of its two ends",
         ));
     }
     Ok(())

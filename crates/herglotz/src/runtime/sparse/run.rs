@@ -43,7 +43,7 @@ impl SiteMotion {
         let span = self.end - self.start.t;
         if !(span != 0.0 && span.is_finite()) {
             let why = format!(
-                "ends at {}, where the motion starts at {}; give a later or earlier end",
+                "ends at {}, and the motion starts at {}; give a finite end that is later or earlier than the start",
                 self.end, self.start.t
             );
             return Err(RuntimeError::argument("t", why));
@@ -55,7 +55,7 @@ impl SiteMotion {
                 if !(h > 0.0 && h.is_finite()) {
                     return Err(RuntimeError::argument(
                         "step",
-                        format!("is {h}, where a positive number is needed; the end says the direction"),
+                        format!("is {h}; it must be a positive number, since the end gives the direction"),
                     ));
                 }
                 // As for small systems: a quotient that differs from an integer by rounding only is taken for that
@@ -68,7 +68,7 @@ impl SiteMotion {
         if count > LARGEST {
             return Err(RuntimeError::argument(
                 "step",
-                format!("gives {count:.1e} steps, more than can be counted; take a longer one"),
+                format!("gives {count:.1e} steps, which exceeds the largest possible number; take a longer step"),
             ));
         }
         Ok((span / count, count as usize))
@@ -167,7 +167,7 @@ fn run(of: &SiteSystem, motion: &SiteMotion, monitor: &mut dyn RunMonitor) -> Re
 /// Checks the times of the rows.
 fn check_rows(motion: &SiteMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
-        OutputTimes::Every(0) => return Err(RuntimeError::argument("every", "is 0, where at least 1 is needed")),
+        OutputTimes::Every(0) => return Err(RuntimeError::argument("every", "is 0; it must be at least 1")),
         OutputTimes::Every(_) => return Ok(()),
         OutputTimes::At(times) => times,
     };

@@ -47,8 +47,8 @@ impl<'a> Stepper<'a> {
             }
             other => {
                 let why = format!(
-                    "is {:?}, which is for up to 16 coordinates; take a splitting as \"strang\" or \"blanes_moan_6\", \"midpoint\", \
-                     \"gauss_1\" or \"gauss_2\"",
+                    "is {:?}, which is for up to 16 coordinates; choose a splitting such as \"strang\" or \
+                     \"blanes_moan_6\", or \"midpoint\", \"gauss_1\" or \"gauss_2\"",
                     other.to_string()
                 );
                 return Err(RuntimeError::argument("integrator", why));
