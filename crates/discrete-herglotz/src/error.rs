@@ -64,8 +64,8 @@ pub enum InputError {
     NoSteps,
     /// A run with given steps has no integrator.
     #[error(
-        "the run has no integrator; set it with `by`, or request an `accuracy` without steps, for which an integrator \
-         is selected"
+        "the run has no integrator; set it with `by`, or request an `accuracy` without steps, for which an \
+         integrator is selected"
     )]
     NoIntegrator,
     /// The trial runs of a plan were interrupted.
@@ -134,8 +134,8 @@ pub enum InputError {
     Geometry(#[from] GeometryError),
     /// The conformal factor is not positive at the start.
     #[error(
-        "sigma_d = {sigma} at the start, but it must be positive (h L_z > -1 for rules explicit in z); take a smaller \
-         step"
+        "sigma_d = {sigma} at the start, but it must be positive (h L_z > -1 for rules explicit in z); take a \
+         smaller step"
     )]
     Sigma {
         /// The value of sigma_d.
@@ -181,7 +181,7 @@ pub enum InputError {
     },
     /// The method needs a time transformation, which the Lagrangian does not state.
     #[error(
-        "the method needs a Lagrangian that states a time transformation (`Hints::time_transformation`, `dt_dtau`); take another method or another Lagrangian"
+        "the method requires a Lagrangian that declares a time transformation (`Hints::time_transformation`, `dt_dtau`); choose another integrator or another Lagrangian"
     )]
     NoTimeTransformation,
     /// The first step fails.
@@ -339,9 +339,9 @@ pub enum SelectionFailure {
     /// Runs agree where they are compared, but between the nodes of their steps the motion does not satisfy the
     /// equations.
     #[error(
-        "between the nodes of the steps the equation of motion has a relative defect of {defect:.1e}, which decreases \
-         only with order {order:.1} for shorter steps, because of a kink, a jump or a narrow pulse of the Lagrangian; \
-         request a larger error, or smooth the Lagrangian"
+        "between the nodes of the steps the equation of motion has a relative defect of {defect:.1e}, which \
+         decreases only with order {order:.1} for shorter steps, because of a kink, a jump or a narrow pulse of the \
+         Lagrangian; request a larger error, or smooth the Lagrangian"
     )]
     DefectBetweenNodes {
         /// The largest defect of the finer run, relative to the largest momentum.
@@ -362,8 +362,8 @@ pub enum SelectionFailure {
     },
     /// A step fails however short it is.
     #[error(
-        "the motion cannot be computed beyond t = {t} even with very short steps; end the span before this time (last \
-         failure: {cause})"
+        "the motion cannot be computed beyond t = {t} even with very short steps; end the span before this time \
+         (last failure: {cause})"
     )]
     StepFailed {
         /// The time that is reached.
@@ -373,8 +373,8 @@ pub enum SelectionFailure {
     },
     /// Near a certain time the motion is too fast, or the force too narrow, for the steps that can be tried.
     #[error(
-        "near t = {t} none of the tried steps resolves the motion, which is too fast there or has too narrow a force; \
-         take a shorter span"
+        "near t = {t} none of the tried steps resolves the motion, which is too fast there or has too narrow a \
+         force; take a shorter span"
     )]
     Unresolved {
         /// The time.
@@ -408,86 +408,10 @@ fn how_runs_converge(order: f64) -> String {
              is smooth"
         )
     } else {
-        "the trial runs do not converge as their steps get shorter: the Lagrangian is not smooth along the motion, or \
-         the motion amplifies its round-off; request a larger error, or end the run earlier"
+        "the trial runs do not converge as their steps get shorter: the Lagrangian is not smooth along the motion, \
+         or the motion amplifies its round-off; request a larger error, or end the run earlier"
             .to_owned()
     }
-}
-
-/// A step whose defect is far larger than that of any step that resolves the motion. It may have crossed a pole, a wall
-/// or a centre of force without evaluating the force there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UnresolvedStep {
-    /// The first such step, counted from 0.
-    pub step: usize,
-    /// The defect, in units of the largest defect of a step that resolves the motion; larger than one.
-    pub defect: f64,
-}
-
-impl std::fmt::Display for UnresolvedStep {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let UnresolvedStep { step, defect } = self;
-        write!(
-            f,
-            "step {step} does not resolve the motion (defect {defect:.1e}), and later results may be wrong; take a \
-             smaller step"
-        )
-    }
-}
-
-/// How a run ended. The output recorded before the end is kept.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Status {
-    /// All steps were taken.
-    Completed,
-    /// An observer ended the run.
-    Stopped {
-        /// The number of steps taken.
-        step: usize,
-        /// The time, within the last step or at its end.
-        t: f64,
-        /// The observer that ended the run.
-        by: &'static str,
-    },
-    /// A claim on the structure of the Lagrangian is false at a state of the run; all results may be wrong.
-    FalseClaim {
-        /// The number of steps taken.
-        step: usize,
-        /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
-        claim: &'static str,
-        /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
-        size: f64,
-    },
-    /// A step failed; the state is that before it.
-    Failed {
-        /// The number of the step that failed, counted from 0.
-        step: usize,
-        /// The time that was reached.
-        t: f64,
-        /// The cause.
-        cause: StepError,
-    },
-}
-
-impl std::fmt::Display for Status {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Status::Completed => write!(f, "completed"),
-            Status::Stopped { step, t, by } => write!(f, "stopped by {by} at t = {t}, in step {step}"),
-            Status::FalseClaim { step, claim, size } => write!(
-                f,
-                "unreliable: after step {step} the Lagrangian violates the property `{claim}` that it claims (by the \
-                 relative size {size:e}); correct its `structure` and run again"
-            ),
-            Status::Failed { step, t, cause } => write!(f, "failed in step {step} at t = {t}: {cause}"),
-        }
-    }
-}
-
-/// The earlier of two unresolved steps.
-pub(crate) fn first(a: Option<UnresolvedStep>, b: Option<UnresolvedStep>) -> Option<UnresolvedStep> {
-    a.into_iter().chain(b).min_by_key(|s| s.step)
 }
 
 /// The step error for a stepper that cannot be constructed.

@@ -38,6 +38,7 @@ pub mod rules;
 mod run;
 pub mod solve;
 pub mod splitting;
+mod status;
 mod switching;
 pub mod theory;
 
@@ -56,7 +57,8 @@ pub mod support {
 }
 
 pub use ensemble::builder::Ensemble;
-pub use error::{InputError, SelectionFailure, Status, StepError, UnresolvedStep};
+pub use error::{InputError, SelectionFailure, StepError};
+
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
     DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, PlanEntry, Problem, SplittingScheme, Start,
@@ -70,6 +72,7 @@ pub use run::{
     Observer, Outcome, OutputRequest, Plan, Progress, Quotient, ResumeState, Row, Rows, Run, RunInfo, StepView, Steps,
     Stop, Terminal, UnknownIntegrator, Until,
 };
+pub use status::{Status, UnresolvedStep};
 pub use switching::DividedGauss;
 pub use theory::discrete_lagrangian::{DiscreteLagrangian, DiscreteStep};
 

@@ -30,8 +30,8 @@ pub enum MpiError {
     /// No result of a rank has arrived for longer than [`Options::patience`](crate::Options::patience). Collective
     /// calls are no longer possible: end the job with [`abort`](mpi::topology::Communicator::abort).
     #[error(
-        "rank {rank} has sent no message for {seconds} s, and {open} of its shards are incomplete; run again from the \
-         checkpoint, or set a patience that is longer than the time of a shard"
+        "rank {rank} has sent no message for {seconds} s, and {open} of its shards are incomplete; run again from \
+         the checkpoint, or set a patience that is longer than the time of a shard"
     )]
     RankLost {
         /// The rank.

@@ -159,10 +159,8 @@ impl<'a> Parser<'a> {
         self.at = (self.at + 1).min(self.words.len());
         self.read += 1;
         if self.read > MOST_WORDS || self.graph.len() > MOST_NODES {
-            let message = format!(
-                "the formula has more than {MOST_NODES} operations after its sums are expanded; \
-                                   simplify it"
-            );
+            let message =
+                format!("the formula has more than {MOST_NODES} operations after its sums are expanded; simplify it");
             return Err(self.error(word, message));
         }
         Ok(word)

@@ -40,8 +40,7 @@ impl<const N: usize> FormulaLagrangian<N> {
         if !letters || KEYWORDS.contains(&name) {
             return Err(FormulaError::Name {
                 name: name.to_owned(),
-                why: "is not a valid name of a Rust type, such as \
-                                                                         `MySystem`",
+                why: "is not a valid name of a Rust type, such as `MySystem`",
             });
         }
         let mut text = String::new();

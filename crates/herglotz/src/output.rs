@@ -122,8 +122,7 @@ impl Table {
             let file = OpenOptions::new().append(true).open(&path)?;
             if file.metadata()?.len() < bytes {
                 return Err(std::io::Error::other(
-                    "the file is shorter than when the run was interrupted; run without \
-                                                  --resume",
+                    "the file is shorter than when the run was interrupted; run without --resume",
                 ));
             }
             file.set_len(bytes)?;

@@ -17,8 +17,8 @@ pub enum SparseError {
     },
     /// An element refers to an unknown that does not exist.
     #[error(
-        "element {element} of list {list} refers to the unknown {unknown}; the unknowns of the system are 0 to {last} \
-         (and FIXED)"
+        "element {element} of list {list} refers to the unknown {unknown}; the unknowns of the system are 0 to \
+         {last} (and FIXED)"
     )]
     OutOfRange {
         /// The list of elements, counted from 0 in the order in which they were added.
@@ -88,7 +88,7 @@ pub enum SparseError {
     },
     /// A method for separable systems was applied to a system with general local terms.
     #[error(
-        "the system has general local terms; splittings and `SparseMidpoint` take potentials only: use `SparseGauss`"
+        "the system has general local terms, but splittings and `SparseMidpoint` accept only potentials; use `SparseGauss`"
     )]
     NotSeparable,
     /// An operation needs the action, which the state does not have.
@@ -99,8 +99,8 @@ pub enum SparseError {
     SingularMass,
     /// The factors of the step's matrix need more memory than the limit.
     #[error(
-        "the factors of the matrix of a step need {needed} bytes, but the limit is {limit}; raise the limit if it was \
-         set, or use an explicit method"
+        "the factors of the matrix of a step need {needed} bytes, but the limit is {limit}; raise the limit if it \
+         was set, or use an explicit method"
     )]
     Memory {
         /// The estimate from the symbolic analysis.

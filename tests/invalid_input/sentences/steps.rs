@@ -123,7 +123,7 @@ fn step_errors() {
             }
         }, ["the function of an event", "not finite at t = 0.15", "defined along the motion"];
         StepError::Undivided { .. } => {
-            let divided = DividedGauss { stages: 2, most_misfit: f64::MIN_POSITIVE };
+            let divided = DividedGauss { stages: 2, max_defect: f64::MIN_POSITIVE };
             let pendulum = Pendulum { gamma: -0.1 };
             let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
             match problem.by(divided).steps(Steps::Count(1)).run(Until::Time(1.0)).unwrap().status {
@@ -149,7 +149,7 @@ fn statuses() {
     let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
     let run = || problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let blows_up = Problem::new(&explosive, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
-    every!(Status, "discrete-herglotz/src/error.rs" {
+    every!(Status, "discrete-herglotz/src/status.rs" {
         Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
         Status::Stopped { .. } => {
             let mut fourth = |at: &StepView<'_, 1>| match at.k {

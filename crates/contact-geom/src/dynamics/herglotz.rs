@@ -187,8 +187,8 @@ fn rates_of_many<T: Scalar, const N: usize>(
 fn irregular(singular: SingularMatrix) -> GeometryError {
     singular.of(
         "W = L_vv",
-        "L is not regular here, so that Herglotz' equation does not determine the acceleration; \
-                             choose a regular Lagrangian",
+        "L is not regular here, so that Herglotz' equation does not determine the acceleration; choose a regular \
+         Lagrangian",
     )
 }
 

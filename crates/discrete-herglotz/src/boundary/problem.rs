@@ -278,11 +278,8 @@ fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), Inpu
     }
     let most = available_memory() / bytes;
     if steps >= most || Vec::<u8>::new().try_reserve_exact(steps.saturating_mul(bytes)).is_err() {
-        let (what, remedy) = (
-            "the number of steps of the path",
-            "take longer steps, or use a machine with more \
-                                                                  memory",
-        );
+        let (what, remedy) =
+            ("the number of steps of the path", "take longer steps, or use a machine with more memory");
         return Err(InputError::TooMany { what, found: steps as f64, most: most.min(steps - 1) as f64, remedy });
     }
     Ok(())

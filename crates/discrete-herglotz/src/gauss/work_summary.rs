@@ -31,22 +31,14 @@ fn action(structure: &Structure) -> PlanEntry {
     let drives = !structure.is_affine_in_z();
     PlanEntry::computed(
         "action z",
-        if drives {
-            "the motion depends on it"
-        } else {
-            "the stage equations of this \
-                                                                                     route include it"
-        },
+        if drives { "the motion depends on it" } else { "the stage equations of this route include it" },
     )
 }
 
 /// The summary for steps that are equal in physical time.
 pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
-    let newton = PlanEntry::skipped(
-        "Newton's method",
-        "used only in steps whose fixed-point iteration does not \
-                                                        contract",
-    );
+    let newton =
+        PlanEntry::skipped("Newton's method", "used only in steps whose fixed-point iteration does not contract");
     let gradients = PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients");
     match route {
         GaussRoute::Linear => vec![
@@ -68,8 +60,7 @@ pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<Plan
         GaussRoute::ConstantMass | GaussRoute::General => vec![
             PlanEntry::computed(
                 "iteration",
-                "determines the velocities, actions and integrating factors of the \
-                                              stages to round-off",
+                "determines the velocities, actions and integrating factors of the stages to round-off",
             ),
             mass_matrix(route == GaussRoute::ConstantMass),
             gradients,
@@ -88,8 +79,7 @@ pub(crate) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<Pla
         ),
         PlanEntry::computed(
             "iteration",
-            "determines the velocities, actions, integrating factors and rates dt/dtau \
-                                          of the stages to round-off",
+            "determines the velocities, actions, integrating factors and rates dt/dtau of the stages to round-off",
         ),
         mass_matrix(structure.constant_mass),
         PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients"),

@@ -150,7 +150,7 @@ impl FromStr for AnyIntegrator {
         };
         let divided = || {
             let (stages, defect) = name.strip_prefix("divided_gauss_")?.split_once('_')?;
-            let divided = DividedGauss { stages: stages.parse().ok()?, most_misfit: defect.parse().ok()? };
+            let divided = DividedGauss { stages: stages.parse().ok()?, max_defect: defect.parse().ok()? };
             Some(AnyIntegrator::Divided(divided))
         };
         named.or_else(composed).or_else(divided).ok_or_else(|| UnknownIntegrator { name: name.into() })

@@ -204,7 +204,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
         let Findings { log_factor, unresolved, .. } = checks.findings;
         Outcome {
             status: status.unwrap_or(Status::Completed),
-            unresolved: crate::error::first(unresolved, checks.unresolved_by(&*stepper)),
+            unresolved: crate::status::first(unresolved, checks.unresolved_by(&*stepper)),
             steps: taken,
             t,
             q: state.q,

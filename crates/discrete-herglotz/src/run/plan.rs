@@ -138,8 +138,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             (false, true) => PlanEntry::skipped(what, "not requested; sigma_d is the same in every step"),
             (true, true) => PlanEntry::computed(
                 what,
-                "requested; sigma_d is the same in every step, and its power is computed at \
-                                           the end",
+                "requested; sigma_d is the same in every step, and its power is computed at the end",
             ),
             (true, false) => {
                 PlanEntry::computed(what, "requested; sigma_d varies, and its product is computed along the run")

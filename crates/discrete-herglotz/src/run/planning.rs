@@ -128,8 +128,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
 pub(crate) const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
 
 /// The hypothesis of integrators in transformed time on the steps.
-const SIZED: &str = "steps of a given size in transformed time, or a requested accuracy, since the number of steps depends on the \
-     motion";
+const SIZED: &str = "steps of a given size in transformed time, or a requested accuracy, since the number of steps \
+                     depends on the motion";
 
 fn check_count(count: f64) -> Result<(), InputError> {
     if count <= MAX_STEPS {

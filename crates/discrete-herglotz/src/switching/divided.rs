@@ -19,7 +19,7 @@ use contact_geom::Lagrangian;
 /// let (kepler, e) = (Kepler::<2> { gamma: 0.0, mu: 1.0 }, 0.9999);
 /// let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
 /// let problem = Problem::new(&kepler, 0.0, start)?;
-/// let divided = DividedGauss { stages: 8, most_misfit: 1e-6 };
+/// let divided = DividedGauss { stages: 8, max_defect: 1e-6 };
 /// let outcome = problem.by(divided).steps(Steps::Count(64)).run(Until::Time(std::f64::consts::TAU))?;
 /// assert!((outcome.q[0] - 1.9999).abs() < 1e-6);
 /// # Ok::<(), discrete_herglotz::InputError>(())
@@ -29,14 +29,14 @@ pub struct DividedGauss {
     /// The number of stages.
     pub stages: usize,
     /// The bound for the defect of a part, relative to its momenta.
-    pub most_misfit: f64,
+    pub max_defect: f64,
 }
 
 impl DividedGauss {
     /// The name in tables, which can also be parsed.
     pub(crate) fn name(&self) -> String {
-        let DividedGauss { stages, most_misfit } = self;
-        format!("divided_gauss_{stages}_{most_misfit:e}")
+        let DividedGauss { stages, max_defect } = self;
+        format!("divided_gauss_{stages}_{max_defect:e}")
     }
 
     /// The stepper, whose parts also end on kinks and jumps.
@@ -48,7 +48,7 @@ impl DividedGauss {
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
         let make =
             move |problem: &Problem<'a, L, N>, h: f64, _: bool| GaussStepper::new(problem, self.stages, h, options);
-        Ok(SwitchingStepper::new(problem, h, EvaluationRange::Within, make)?.dividing(self.most_misfit))
+        Ok(SwitchingStepper::new(problem, h, EvaluationRange::Within, make)?.dividing(self.max_defect))
     }
 }
 
@@ -59,12 +59,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-        let DividedGauss { stages, most_misfit } = *self;
+        let DividedGauss { stages, max_defect } = *self;
         Integrator::<'a, L, N>::check(&GaussCollocation { stages }, lagrangian)?;
-        if most_misfit > 0.0 && most_misfit.is_finite() {
+        if max_defect > 0.0 && max_defect.is_finite() {
             return Ok(());
         }
-        Err(InputError::Hypothesis { hypothesis: "a positive and finite `most_misfit`" })
+        Err(InputError::Hypothesis { hypothesis: "a positive and finite `max_defect`" })
     }
 
     fn stepper(

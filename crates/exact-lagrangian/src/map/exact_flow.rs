@@ -117,8 +117,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
         vec![
             PlanEntry::computed(
                 "panels",
-                "their number in a step is chosen for an error of round-off, with a check \
-                                           of the defect between their nodes",
+                "their number in a step is chosen for an error of round-off, with a check of the defect between \
+                 their nodes",
             ),
             PlanEntry::skipped("Newton's method", "each panel is solved by fixed-point iteration"),
             PlanEntry::computed("action z", "it is a component of the Herglotz field"),

@@ -16,8 +16,8 @@ impl<'a> Parser<'a> {
     pub(super) fn expression(&mut self, weakest: u8) -> Parsed<Id> {
         if self.depth >= DEEPEST_NESTING {
             let message = format!(
-                "the formula is nested more than {DEEPEST_NESTING} levels deep; define a part of it \
-                                   beforehand, as `name = ...`"
+                "the formula is nested more than {DEEPEST_NESTING} levels deep; define a part of it beforehand, as \
+                 `name = ...`"
             );
             return Err(self.error(self.word(0), message));
         }

@@ -21,13 +21,8 @@ impl<'a> Parser<'a> {
         let has_prime = prime.token == Token::Sign('\'');
         if let Some((_, value)) = self.locals.iter().rev().find(|(local, _)| *local == name) {
             if has_prime {
-                return Err(self.error(
-                    prime,
-                    format!(
-                        "`{name}` is a definition and has no velocity; write its \
-                                                      derivative out"
-                    ),
-                ));
+                return Err(self
+                    .error(prime, format!("`{name}` is a definition and has no velocity; write its derivative out")));
             }
             return Ok(*value);
         }

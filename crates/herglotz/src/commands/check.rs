@@ -91,7 +91,7 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     let (defect, herglotz::runtime::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
     let mut parts = vec![
         format!(
-            "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {MAX_CONTACT_DEFECT:.0e}",
+            "{verdict}: the pullback of dz - p dq by a step of {} with {integrator} is sigma_d (dz - p dq) with a defect of {defect:.1e}, of which {MAX_CONTACT_DEFECT:.0e} is allowed",
             short(*step_size)
         ),
         table(&samples),

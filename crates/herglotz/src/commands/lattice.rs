@@ -101,17 +101,16 @@ impl Run {
         } else {
             let sites: usize = scene.sizes.iter().product();
             print(&format!(
-                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n  \
-                 z = {}",
+                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n \
+                  z = {}",
                 short(*t),
                 short(z)
             ))?;
         }
         match outcome.status {
-            _ if interrupted => Err(Failure::Run(format!(
-                "interrupted at t = {t}; the rows up to this time have been \
-                                                          written"
-            ))),
+            _ if interrupted => {
+                Err(Failure::Run(format!("interrupted at t = {t}; the rows up to this time have been written")))
+            }
             Status::Completed => Ok(()),
             status => Err(Failure::Run(status.to_string())),
         }

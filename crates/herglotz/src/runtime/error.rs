@@ -120,15 +120,14 @@ pub fn in_words(error: &InputError) -> String {
         InputError::Unclaimed { claim } => {
             let claim = match *claim {
                 "separable" => {
-                    "separable (the sum of a kinetic energy of the velocities and a potential of the \
-                                positions)"
+                    "separable (the sum of a kinetic energy of the velocities and a potential of the positions)"
                 }
                 "quadratic" => "quadratic (with a linear equation of motion)",
                 "z_affine" => "affine in z (with a drag that is proportional to z)",
                 "constant_rate" => "of constant rate (with a constant derivative with respect to z)",
                 "constant_mass" => "of constant mass (with constant coefficients of the kinetic energy)",
                 "autonomous" => "autonomous (independent of t)",
-                "z_free" => "free of z",
+                "z_free" => "independent of z",
                 other => other,
             };
             format!("the Lagrangian is not {claim}, which this integrator requires; choose another integrator")
@@ -138,10 +137,9 @@ pub fn in_words(error: &InputError) -> String {
              choose another integrator"
                 .to_owned()
         }
-        InputError::Hypothesis { hypothesis } => format!(
-            "the integrator requires {hypothesis}; choose another \
-                                                          integrator"
-        ),
+        InputError::Hypothesis { hypothesis } => {
+            format!("the integrator requires {hypothesis}; choose another integrator")
+        }
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
         InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),
         InputError::NoSteps => "neither steps nor an accuracy is given; give one of them".to_owned(),

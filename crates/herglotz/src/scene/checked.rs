@@ -17,7 +17,7 @@ pub(super) fn check_version(text: &str) -> Result<(), SceneError> {
         return Ok(());
     }
     let found = *version;
-    let what = if found > VERSION { "requires a newer program; update it, or" } else { "is not known" };
+    let what = if found > VERSION { "requires a newer program; update it, or" } else { "does not exist;" };
     let message = format!("version {found} of scene files {what} write the scene for version {VERSION}");
     Err(SceneError::at(text, version.span(), message))
 }

@@ -163,8 +163,9 @@ impl LatticeScene {
         };
         let count = sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
         if count.is_none_or(|count| count > MAX_SITES) {
-            let message =
-                format!("the sites are more than {MAX_SITES}, each a column of rows.csv; take the library for so many");
+            let message = format!(
+                "the lattice has more than {MAX_SITES} sites, each of which is a column of rows.csv; use the library for larger lattices"
+            );
             return Err(SceneError::at(text, table.sites.span(), message));
         }
         let parameters: Vec<(String, f64)> =
@@ -330,8 +331,7 @@ fn read_start(
     if let Some(place) = q.iter().position(Option::is_none) {
         let name = &coordinates[place];
         let message = format!(
-            "the coordinate `{name}` has no value at the start; add `{name} = 0.0` to [start], or a formula \
-                     in `i`"
+            "the coordinate `{name}` has no value at the start; add `{name} = 0.0` to [start], or a formula in `i`"
         );
         return Err(SceneError::at(text, table.span(), message));
     }
@@ -365,8 +365,7 @@ fn values(
                 return Err(SceneError::at(
                     text,
                     profile.span(),
-                    "the start can be given by formulas for up to three \
-                                                                 directions",
+                    "the start can be given by formulas for up to three directions",
                 ));
             };
             let mut known: Vec<(&str, f64)> = parameters.iter().map(|(name, x)| (name.as_str(), *x)).collect();
@@ -379,8 +378,7 @@ fn values(
                 return Err(SceneError::at(
                     text,
                     profile.span(),
-                    "the formula of a start can depend only on the index \
-                                                                 of a site",
+                    "the formula of a start can depend only on the index of a site",
                 ));
             }
             let at = |site: usize| {

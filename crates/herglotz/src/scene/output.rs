@@ -56,7 +56,8 @@ impl RowTimes {
             (Some(every), None, None) => {
                 let value = positive(text, every, "every")?;
                 if (end - t0).abs() / value > MAX_ROWS {
-                    let message = format!("these are more than {MAX_ROWS:e} rows; take a longer time between them");
+                    let message =
+                        format!("this gives more than {MAX_ROWS:e} rows; take a longer time between the rows");
                     return Err(SceneError::at(text, every.span(), message));
                 }
                 Ok(RowTimes::Every(value))
@@ -74,11 +75,10 @@ impl RowTimes {
     fn at(text: &str, times: &Location<Vec<Location<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
         let mut last: Option<f64> = None;
         for time in times.iter() {
-            let t = within(text, time, "a time", (t0, end))?;
+            let t = within(text, time, "at", (t0, end))?;
             if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
                 let message = format!(
-                    "the time {t} does not follow the previous time in the direction of the motion; sort the \
-                             times"
+                    "the time {t} does not follow the previous time in the direction of the motion; sort the times"
                 );
                 return Err(SceneError::at(text, time.span(), message));
             }
@@ -92,10 +92,8 @@ impl RowTimes {
 fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
     let t = finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
-        let message = format!(
-            "the time {t} is outside of the motion, which runs from {t0} to {end}; give a time \
-                               within it"
-        );
+        let message =
+            format!("the time {t} is outside of the motion, which runs from {t0} to {end}; give a time within it");
         return Err(SceneError::at(text, time.span(), message));
     }
     Ok(t)
@@ -182,8 +180,8 @@ impl Events {
             let refused = |error: FormulaError| with_nearest(of_formula(text, source.span(), &error.into()), formula);
             let read = read.map_err(refused)?;
             if read.has_conformal_factor() && !constant_rate {
-                let message = "`sigma` and `log_factor` are known at events only if L_z is constant; use them in a column of \
-                     rows";
+                let message = "`sigma` and `log_factor` are known at events only if L_z is constant; use them in a \
+                               column of rows";
                 return Err(SceneError::at(text, source.span(), message));
             }
             Ok(read)
@@ -225,8 +223,7 @@ impl EventColumns {
             let refuse = |message: String| Err(SceneError::at(text, column.span(), message));
             if name == "event" || of_state.iter().any(|known| known == name) {
                 return refuse(format!(
-                    "every event already has the column `{name}`; remove it, or give it another \
-                                       name"
+                    "every event already has the column `{name}`; remove it, or give it another name"
                 ));
             }
             let index = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());

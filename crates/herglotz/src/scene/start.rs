@@ -129,8 +129,7 @@ impl Ends {
             return Err(SceneError::at(
                 text,
                 end_at,
-                "the end of the path has no time; add `t = 1.0` to [ends], or \
-                                                     another value",
+                "the end of the path has no time; add `t = 1.0` to [ends], or another value",
             ));
         };
         let t0 = of_start.t.or(entry.map(|entry| entry.t)).unwrap_or(0.0);
@@ -147,7 +146,7 @@ fn given(text: &str, keys: Vec<Key>, what: &str, table: Option<&Named<Numbers>>)
         let Some(key) = keys.iter().find(|key| key.name == **name) else {
             let known = || keys.iter().map(|key| key.name.as_str());
             let all = known().collect::<Vec<_>>().join(", ");
-            let message = format!("there is no `{}` in {what}; there are {all}", **name);
+            let message = format!("unknown name `{}` in {what}; the known names are {all}", **name);
             return Err(SceneError::unknown(text, name.span(), name, known(), message));
         };
         let wrong_count = |found: &str| {
@@ -155,13 +154,13 @@ fn given(text: &str, keys: Vec<Key>, what: &str, table: Option<&Named<Numbers>>)
                 _ if !key.is_list => "a number".to_owned(),
                 count => format!("a list of {count} numbers, or one number for all"),
             };
-            SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {expected} is needed", **name))
+            SceneError::at(text, numbers.span(), format!("`{}` is {found}; it must be {expected}", **name))
         };
         let values: Vec<Location<f64>> = match &**numbers {
             // For an array, the number is the value of all its entries.
             Numbers::One(x) => vec![Location::new(*x, numbers.span()); key.entries.len()],
             Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
-            Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
+            Numbers::Many(list) => return Err(wrong_count(&format!("a list of length {}", list.len()))),
         };
         for (i, x) in key.entries.clone().zip(&values) {
             given.set(key.part, i, finite(text, x, name)?);

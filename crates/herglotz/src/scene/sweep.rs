@@ -111,7 +111,7 @@ fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneErr
     let count = match **count {
         0 => return Err(SceneError::at(text, count.span(), "`count` is 0; it must be at least 1")),
         count if count > MAX_VALUES => {
-            let message = format!("these are more than {MAX_VALUES} values; take fewer");
+            let message = format!("`count` exceeds {MAX_VALUES}; take fewer values");
             return Err(SceneError::at(text, count_at, message));
         }
         count => count,

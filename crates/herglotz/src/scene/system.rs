@@ -22,8 +22,7 @@ pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option
         }
         (None, None, None) => refuse(
             system.span(),
-            "the system has neither a `lagrangian` with `coordinates` nor a `catalogue`; add \
-                                   one of them",
+            "the system has neither a `lagrangian` with `coordinates` nor a `catalogue`; add one of them",
         ),
     }
 }

@@ -30,9 +30,9 @@ pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
     let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, SelectionFailure::Budget);
     let mut coarse: Option<Track<N>> = None;
     for _ in 0..MAX_DIVISIONS {
-        let integrator = DividedGauss { stages: DIVIDED_STAGES, most_misfit: max_defect };
+        let integrator = DividedGauss { stages: DIVIDED_STAGES, max_defect: max_defect };
         let mut track = |max_defect: f64| match trials.divided(
-            DividedGauss { most_misfit: max_defect, ..integrator },
+            DividedGauss { max_defect: max_defect, ..integrator },
             count,
             &grid,
         )? {

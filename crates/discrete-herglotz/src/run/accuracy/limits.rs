@@ -243,7 +243,7 @@ pub(crate) const CERTAIN_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// The integrator of the search for the time at which an observer ends the run: steps that resolve the motion, with an
 /// error of about the square of this defect.
-pub(crate) const EVENT_SEARCH: DividedGauss = DividedGauss { stages: 8, most_misfit: 1e-5 };
+pub(crate) const EVENT_SEARCH: DividedGauss = DividedGauss { stages: 8, max_defect: 1e-5 };
 
 /// The smallest number of steps of that search.
 pub(crate) const MIN_EVENT_SEARCH_STEPS: usize = 64;

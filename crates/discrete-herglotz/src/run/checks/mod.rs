@@ -9,10 +9,10 @@ pub(crate) mod energy_drift;
 pub(crate) mod half_steps;
 pub(crate) mod rest;
 
-use crate::error::first;
 use crate::integration::check_claims::violated_claim;
 use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
+use crate::status::first;
 use crate::{Status, Stepper, UnresolvedStep, integration::SuspectInterval};
 use claims::ClaimMonitor;
 use contact_geom::{Defect, Lagrangian, PhasePoint};

@@ -6,8 +6,9 @@ pub(crate) mod of_integrator;
 mod parts;
 mod run;
 
-use crate::error::{first, step_error};
+use crate::error::step_error;
 use crate::gauss::StepStart;
+use crate::status::first;
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};

@@ -108,7 +108,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
         }
         if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && interrupted() {
-            ControlFlow::Break(Stop::here("its check"))
+            ControlFlow::Break(Stop::here("the check"))
         } else {
             ControlFlow::Continue(())
         }

@@ -67,7 +67,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
             self.numbers.clear();
             self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
             if self.monitor.row(&self.numbers).is_break() {
-                return ControlFlow::Break(Stop::here("its watch"));
+                return ControlFlow::Break(Stop::here("the monitor"));
             }
         }
         ControlFlow::Continue(())
@@ -87,14 +87,14 @@ impl<'r, const N: usize> Recorder<'r, N> {
             if let Some(interrupted) = at.resume_state() {
                 self.monitor.interrupted(interrupted);
             }
-            return ControlFlow::Break(Stop::here("its watch"));
+            return ControlFlow::Break(Stop::here("the monitor"));
         }
         if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
             && self.monitor.wants_checkpoint()
             && let Some(saved) = at.resume_state()
             && self.monitor.checkpoint(at.k, saved).is_break()
         {
-            return ControlFlow::Break(Stop::here("its watch"));
+            return ControlFlow::Break(Stop::here("the monitor"));
         }
         ControlFlow::Continue(())
     }
@@ -275,7 +275,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
             let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
             let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
             if pass_on_rows(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
-                return ControlFlow::Break(Stop::here("its watch"));
+                return ControlFlow::Break(Stop::here("the monitor"));
             }
         }
         ended

@@ -114,12 +114,8 @@ impl Lattice {
         for (name, _) in &self.parameters {
             let mut used = [Some(&site), bond.as_ref()].into_iter().flatten().flat_map(Formula::used_parameters);
             if !used.any(|known| known == name) {
-                let where_to = if bond.is_some() {
-                    "used neither in `site` nor in `bond`"
-                } else {
-                    "not used in \
-                                                                                                    `site`"
-                };
+                let where_to =
+                    if bond.is_some() { "used neither in `site` nor in `bond`" } else { "not used in `site`" };
                 return Err(RuntimeError::argument("parameters", format!("has `{name}`, which is {where_to}")));
             }
         }

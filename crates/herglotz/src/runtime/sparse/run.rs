@@ -157,7 +157,7 @@ fn run(of: &SiteSystem, motion: &SiteMotion, monitor: &mut dyn RunMonitor) -> Re
     };
     let status = match run.run() {
         Ok(()) => Status::Completed,
-        Err(Ended::Stopped) => Status::Stopped { step: run.taken, t: run.time(run.taken), by: "the watch" },
+        Err(Ended::Stopped) => Status::Stopped { step: run.taken, t: run.time(run.taken), by: "the monitor" },
         Err(Ended::Failed(cause)) => Status::Failed { step: run.taken, t: run.time(run.taken), cause },
         Err(Ended::Refused(error)) => return Err(error),
     };
