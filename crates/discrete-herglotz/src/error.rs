@@ -184,6 +184,15 @@ pub enum InputError {
         "the method requires a Lagrangian that declares a time transformation (`Hints::time_transformation`, `dt_dtau`); choose another integrator or another Lagrangian"
     )]
     NoTimeTransformation,
+    /// The problem has an applied force, which the method does not take.
+    #[error(
+        "the problem has a force, and {method} takes none; choose contact Gauss collocation (`GaussCollocation`), or \
+         write the force into the Lagrangian"
+    )]
+    Forced {
+        /// The method.
+        method: &'static str,
+    },
     /// The first step fails.
     #[error("the first step fails: {0}")]
     FirstStep(StepError),

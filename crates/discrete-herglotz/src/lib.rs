@@ -45,7 +45,7 @@ pub mod theory;
 /// Checks of a motion for programs that advance a stepper themselves: the claimed structure of L, the energy drift,
 /// suspect intervals, and jumps of L.
 pub mod checks {
-    pub use crate::integration::{SuspectInterval, check_claims};
+    pub use crate::integration::{SuspectInterval, check_claims, check_unforced};
     pub use crate::run::{EnergyDrift, EnergySample};
     pub use crate::switching::jumps_between;
 }

@@ -9,7 +9,7 @@ use crate::map::exponential::singular_values;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::support::linear::solve;
 use contact_geom::{Derivatives, DiscretePoint, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
+use discrete_herglotz::{DiscreteLagrangian, InputError, StepError, checks::check_unforced};
 use evolution::Evolution;
 
 /// The exact discrete Lagrangian of `L = L2(q, v) + gamma z`, where L2 is an autonomous polynomial of degree two. L2
@@ -90,6 +90,7 @@ impl<const N: usize> QuadraticExact<N> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
+        check_unforced(lagrangian, "the exact discrete Lagrangian")?;
         check_claims(lagrangian)?;
         let Equations { gamma, unit, rate, form, size } = Equations::of(lagrangian, h)?;
         let n = 2 * N;

@@ -25,6 +25,10 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     /// The value with the partial derivatives `(L_q, L_v, L_z)`, for kernels.
     fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>);
 
+    /// The value with `(L_q + f, L_v, L_z)`, where f is the [applied force](Lagrangian::applied_force): all that the
+    /// equations of motion `(L_v)' = L_q + f + L_z L_v` contain of first derivatives. For kernels.
+    fn with_gradient_and_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>);
+
     /// The value with the partial derivatives `L_q` alone, for kernels that need only the force.
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
 
@@ -81,6 +85,18 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         z.d.z = T::one();
         let l = self.value(KernelDual::constant(t), &q, &v, z);
         (l.re, l.d)
+    }
+
+    #[inline(always)]
+    fn with_gradient_and_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>) {
+        let (l, mut gradient) = self.with_gradient(t, x);
+        if const { Self::HINTS.forced } {
+            let force = self.applied_force(t, x);
+            for i in 0..N {
+                gradient.x[i] += force[i];
+            }
+        }
+        (l, gradient)
     }
 
     #[inline(always)]

@@ -101,7 +101,8 @@ impl<const N: usize, L: Lagrangian<N>> Smooth<N> for Legendre<'_, L> {
 }
 
 /// The Herglotz vector field `xi_L = (v, a, L)` on TQ x R: Herglotz' equations
-/// `d/dt L_v = L_q + L_v L_z`, `zdot = L` solved for the acceleration `a`; paper, section 2.2.
+/// `d/dt L_v = L_q + L_v L_z`, `zdot = L` solved for the acceleration `a`; paper, section 2.2. With an
+/// [applied force](Lagrangian::applied_force) f, `d/dt L_v = L_q + L_v L_z + f`.
 ///
 /// For any regular L: `W a = L_q + L_v L_z - (L_vq v + L_vz L + L_vt)`. A first evaluation, on duals along q and z,
 /// gives L, `L_q` and `L_z`; a second, on nested duals along the `N` velocities and along the drift `(v, 0, L, 1)`,
@@ -158,6 +159,7 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     }
     let p = lagrangian.along(Dual { re: t, d: AugmentedVector { x: TangentVector::null(), z: T::one() } }, &y).d;
     let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d.z);
+    add_applied_force(lagrangian, t, x, &mut a);
     let mut w = SMatrix::<T, N, N>::from_fn(|i, j| p[i].d.x[j]);
     solve(&mut w, &mut a).map_err(irregular)?;
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
@@ -179,8 +181,25 @@ fn rates_of_many<T: Scalar, const N: usize>(
     };
     let p = lagrangian.gradient(drifting(t, T::one()), &y).y;
     let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d[0]);
+    add_applied_force(lagrangian, t, x, &mut a);
     solve(&mut lagrangian.mass_matrix(t, x), &mut a).map_err(irregular)?;
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
+}
+
+/// Adds the applied force, if there is one.
+#[inline(always)]
+fn add_applied_force<L: Lagrangian<N>, T: Scalar, const N: usize>(
+    lagrangian: &L,
+    t: T,
+    x: &VelocityPoint<N, T>,
+    to: &mut SVector<T, N>,
+) {
+    if const { L::HINTS.forced } {
+        let force = lagrangian.applied_force(t, x);
+        for i in 0..N {
+            to[i] += force[i];
+        }
+    }
 }
 
 /// The error for a singular W.

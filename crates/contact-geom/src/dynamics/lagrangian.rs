@@ -21,12 +21,19 @@ pub struct Hints {
     pub proved: bool,
     /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
     pub interpreted: bool,
+    /// Whether there is an [applied force](Lagrangian::applied_force), as in [`Forced`](crate::Forced).
+    pub forced: bool,
 }
 
 impl Hints {
     /// Nothing to rely on.
-    pub const NONE: Hints =
-        Hints { time_transformation: false, switching_functions: false, proved: false, interpreted: false };
+    pub const NONE: Hints = Hints {
+        time_transformation: false,
+        switching_functions: false,
+        proved: false,
+        interpreted: false,
+        forced: false,
+    };
 }
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
@@ -114,6 +121,14 @@ pub trait Lagrangian<const N: usize> {
         self.closed_hessian(t, x).map(|hessian| hessian.vv)
     }
 
+    /// The force `f(t, q, v, z)` of the Lagrange-d'Alembert-Herglotz equations `d/dt L_v - L_q - L_z L_v = f`; see
+    /// [`Force`](crate::Force) and [`Forced`](crate::Forced), which provides it and sets [`Hints::forced`]. By default
+    /// there is none.
+    #[inline(always)]
+    fn applied_force<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        SVector::from_fn(|_, _| T::zero())
+    }
+
     /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a
     /// point, always in the same number and order. A run ends a step at each zero that its motion crosses, so that
     /// integrators keep their order; where L itself jumps across a surface in the positions, the motion is refracted or
@@ -146,6 +161,10 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivative
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         self.0.value(t, q, v, z)
     }
+    #[inline(always)]
+    fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        self.0.applied_force(t, x)
+    }
     fn structure(&self) -> Structure {
         self.0.structure()
     }
@@ -164,6 +183,10 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         (**self).value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        (**self).applied_force(t, x)
     }
     #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {

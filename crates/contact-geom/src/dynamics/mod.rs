@@ -4,6 +4,7 @@
 mod action;
 pub(crate) mod blocks;
 mod derivatives;
+mod force;
 mod hamiltonian;
 mod herglotz;
 mod lagrangian;
@@ -14,6 +15,7 @@ mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
+pub use force::{Force, Forced};
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
     dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,

@@ -19,6 +19,7 @@ pub use routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
 pub use work_summary::GaussRoute;
 
+use crate::integration::check_unforced;
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
@@ -73,6 +74,7 @@ impl<L> Gauss<L> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        check_unforced(&lagrangian, "a discrete Lagrangian")?;
         Ok(Gauss { lagrangian, forward: Products::new(stages, h), backward: Products::new(stages, -h) })
     }
 

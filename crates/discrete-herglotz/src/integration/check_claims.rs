@@ -4,6 +4,17 @@ use crate::{InputError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
+/// Refuses a Lagrangian with an applied force, for a method that takes none.
+///
+/// # Errors
+/// [`InputError::Forced`].
+pub fn check_unforced<L: Lagrangian<N>, const N: usize>(
+    _lagrangian: &L,
+    method: &'static str,
+) -> Result<(), InputError> {
+    if const { L::HINTS.forced } { Err(InputError::Forced { method }) } else { Ok(()) }
+}
+
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
 /// of round-off, since the constants of a Lagrangian are rounded.
 pub(crate) const MAX_CLAIM_DEFECT: f64 = 1e-12;

@@ -12,7 +12,7 @@ pub(crate) mod problem;
 pub(crate) mod scheme;
 pub(crate) mod stepper;
 
-pub use check_claims::check_claims;
+pub use check_claims::{check_claims, check_unforced};
 pub use dense_step::DenseStep;
 pub use integrator::{BatchKernel, Integrator, MethodInfo, StepperOptions};
 pub use interrupt::{INTERRUPTION, Interrupt};

@@ -1,5 +1,6 @@
 //! Discrete Lagrangians by quadrature of the action: the common part of the rules of [`crate::rules`].
 
+use crate::integration::check_unforced;
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
@@ -77,6 +78,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
+        check_unforced(&lagrangian, "a quadrature rule")?;
         Ok(Quadrature { lagrangian, h, rule: PhantomData })
     }
 

@@ -162,14 +162,15 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
 
     fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError> {
         let v = self.velocity(t, state, near)?;
-        let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
+        let (value, g) =
+            self.problem.lagrangian.with_gradient_and_force(t, &VelocityPoint { q: state.q, v, z: state.z });
         Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
     }
 
     /// A digest of the start, of L there, of the steps, and of the requests.
     fn fingerprint(&self) -> u64 {
         let Problem { lagrangian, t0, start, state, .. } = self.problem;
-        let (value, slope) = lagrangian.with_gradient(*t0, start);
+        let (value, slope) = lagrangian.with_gradient_and_force(*t0, start);
         let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
         let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
         let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());

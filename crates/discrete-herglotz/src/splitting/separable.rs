@@ -1,6 +1,7 @@
 //! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
 use crate::integration::check_claims::MAX_CLAIM_DEFECT;
+use crate::integration::check_unforced;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -37,6 +38,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        check_unforced(&lagrangian, "a splitting")?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }

@@ -11,6 +11,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     DiscreteLagrangian, DiscreteStep, InputError, StepError,
+    checks::check_unforced,
     solve::{ITERATION_LIMIT, Solver, last_correction},
 };
 
@@ -38,6 +39,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        check_unforced(&lagrangian, "the exact discrete Lagrangian")?;
         Ok(ExactLagrangian { exponential: ContactExponential::new(lagrangian, h)?, near: None })
     }
 

@@ -293,11 +293,11 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
                         v: vector(|d| Two::of(&v[d], r)),
                         z: Two::of(&z, r),
                     };
-                    let (l, g) = lagrangian.with_gradient(Two::of(&between.points, r) * h + t, &pair);
+                    let (l, g) = lagrangian.with_gradient_and_force(Two::of(&between.points, r) * h + t, &pair);
                     other = Some((l.1, ChartVector { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
                     (l.0, ChartVector { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
                 }
-                None => lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x),
+                None => lagrangian.with_gradient_and_force(between.points.block::<S>(r) * h + t, &x),
             };
             let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
             let mut work = zero;

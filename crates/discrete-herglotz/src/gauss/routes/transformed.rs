@@ -9,6 +9,7 @@ use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::parametrization::{Extension, Fictitious, Values};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
+use crate::integration::check_unforced;
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
@@ -67,6 +68,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
     /// [`InputError::FirstStep`] if the mass matrix or the energy at the start is not regular or not finite.
     pub fn new(problem: &Problem<'a, L, N>, stages: usize, h: f64, transformation: C) -> Result<Self, InputError> {
         check_step(stages, h)?;
+        check_unforced(problem.lagrangian, "collocation in transformed time")?;
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         let InitialMass { inverse, .. } = InitialMass::of(problem)?;
         if !structure.autonomous {

@@ -9,7 +9,7 @@ use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::solve::mass_matrix::BLOCK;
 use crate::{StepError, solve::ITERATION_LIMIT};
-use contact_geom::nalgebra::{DMatrix, DVector, SVector};
+use contact_geom::nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use contact_geom::{
     ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan,
     support::seed,
@@ -103,12 +103,19 @@ pub(crate) struct StepEnd<const N: usize, T> {
     pub rho: T,
 }
 
+/// L with its gradient at a stage, and `L_q + f` with the applied force f.
+#[derive(Clone, Copy)]
+pub(crate) struct StageValue<const N: usize, T> {
+    pub l: Dual<T, ChartVector<N, T>>,
+    pub force: SVector<T, N>,
+}
+
 /// The workspace of Newton's method; made once for a run, so that steps do not allocate.
 pub(crate) struct Workspace<const N: usize> {
     /// The guess, then the solution.
     pub x: StageUnknowns<N, f64>,
     /// L and its gradient at the stages of the solution.
-    pub l: Vec<Dual<f64, ChartVector<N>>>,
+    pub l: Vec<StageValue<N, f64>>,
     /// The last accepted iterate.
     from: StageUnknowns<N, f64>,
     jacobian: DMatrix<f64>,
@@ -139,17 +146,26 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// Evaluates L and its gradient at the stages.
-    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<Dual<T, ChartVector<N, T>>>) {
+    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<StageValue<N, T>>) {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
             let t = T::from(self.t + self.products.c[i]);
             // Dual numbers with many directions would not fit on the stack.
-            if const { N > BLOCK } {
+            let l = if const { N > BLOCK } {
                 let (re, d) = self.lagrangian.with_gradient(t, &y);
-                return Dual { re, d };
+                Dual { re, d }
+            } else {
+                self.lagrangian.along(t, &seed(&ChartVector::from(y)).into())
+            };
+            let mut force = l.d.x;
+            if const { L::HINTS.forced } {
+                let applied = self.lagrangian.applied_force(t, &y);
+                for d in 0..N {
+                    force[d] += applied[d];
+                }
             }
-            self.lagrangian.along(t, &seed(&ChartVector::from(y)).into())
+            StageValue { l, force }
         }));
     }
 
@@ -176,7 +192,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         &self,
         given: &Given<N, T>,
         x: &StageUnknowns<N, T>,
-        l: &[Dual<T, ChartVector<N, T>>],
+        l: &[StageValue<N, T>],
         out: &mut DVector<T>,
     ) {
         let Products { s, a, b, .. } = self.products;
@@ -185,14 +201,14 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             Given::Ends { z0, .. } => (x.p0, *z0),
         };
         for i in 0..*s {
-            let mut momentum = SVector::<T, N>::from_fn(|d, _| x.rho[i] * l[i].d.y[d] - p0[d]);
+            let mut momentum = SVector::<T, N>::from_fn(|d, _| x.rho[i] * l[i].l.d.y[d] - p0[d]);
             let (mut action, mut factor) = (x.z[i] - z0, x.rho[i] - 1.0);
             for j in 0..*s {
                 for d in 0..N {
-                    momentum[d] -= x.rho[j] * l[j].d.x[d] * a[i][j];
+                    momentum[d] -= x.rho[j] * l[j].force[d] * a[i][j];
                 }
-                action -= l[j].re * a[i][j];
-                factor += x.rho[j] * l[j].d.z * a[i][j];
+                action -= l[j].l.re * a[i][j];
+                factor += x.rho[j] * l[j].l.d.z * a[i][j];
             }
             for d in 0..N {
                 out[i * N + d] = momentum[d];
@@ -208,12 +224,35 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
+    /// The derivatives of `L_q + f` in q, v and z, from those of `L_q`.
+    #[inline(always)]
+    fn force_derivatives(
+        &self,
+        t: f64,
+        y: &VelocityPoint<N>,
+        (qq, qv, qz): (&SMatrix<f64, N, N>, &SMatrix<f64, N, N>, &SVector<f64, N>),
+    ) -> (SMatrix<f64, N, N>, SMatrix<f64, N, N>, SVector<f64, N>) {
+        let (mut of_q, mut of_v, mut of_z) = (*qq, *qv, *qz);
+        if const { L::HINTS.forced } {
+            let y: VelocityPoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*y)).into();
+            let force = self.lagrangian.applied_force(Dual::constant(t), &y);
+            for d in 0..N {
+                for e in 0..N {
+                    of_q[(d, e)] += force[d].d.x[e];
+                    of_v[(d, e)] += force[d].d.y[e];
+                }
+                of_z[d] += force[d].d.z;
+            }
+        }
+        (of_q, of_v, of_z)
+    }
+
     /// The Jacobian of the residuals.
     pub fn jacobian(
         &self,
         given: &Given<N, f64>,
         x: &StageUnknowns<N, f64>,
-        l: &[Dual<f64, ChartVector<N>>],
+        l: &[StageValue<N, f64>],
         out: &mut DMatrix<f64>,
     ) {
         let Products { s, a, b, c, .. } = self.products;
@@ -223,17 +262,18 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         for k in 0..s {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
             let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
-            let (rho, g) = (x.rho[k], &l[k].d);
+            let (rho, g, force) = (x.rho[k], &l[k].l.d, &l[k].force);
+            let (force_q, force_v, force_z) = self.force_derivatives(self.t + c[k], &y, (qq, qv, qz));
             let weights: [f64; MAX_STAGES] = from_fn(|i| a[i][k]);
             // The contribution of stage k to the equations of stage i through its velocity, action and factor.
             for i in 0..s {
                 let (own, w) = (if i == k { 1.0 } else { 0.0 }, a[i][k]);
                 for d in 0..N {
                     for e in 0..N {
-                        out[(i * N + d, k * N + e)] += rho * (own * vv[(d, e)] - w * qv[(d, e)]);
+                        out[(i * N + d, k * N + e)] += rho * (own * vv[(d, e)] - w * force_v[(d, e)]);
                     }
-                    out[(i * N + d, row_z + k)] += rho * (own * vz[d] - w * qz[d]);
-                    out[(i * N + d, row_r + k)] += own * g.y[d] - w * g.x[d];
+                    out[(i * N + d, row_z + k)] += rho * (own * vz[d] - w * force_z[d]);
+                    out[(i * N + d, row_r + k)] += own * g.y[d] - w * force[d];
                     out[(row_z + i, k * N + d)] -= w * g.y[d];
                     out[(row_r + i, k * N + d)] += w * rho * vz[d];
                 }
@@ -252,7 +292,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                         momenta[k * N + d] += rho * qv[(e, d)] * moved;
                     }
                     let (force, of_action, of_factor) =
-                        (qq.column(e) * (rho * moved), g.x[e] * moved, rho * qz[e] * moved);
+                        (force_q.column(e) * (rho * moved), g.x[e] * moved, rho * qz[e] * moved);
                     for (momentum, w) in momenta.chunks_exact_mut(N).zip(&weights) {
                         for (entry, force) in momentum.iter_mut().zip(force.iter()) {
                             *entry -= w * force;
@@ -294,7 +334,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     /// The size of a correction: the largest component, each kind relative to the largest unknown of that kind. The
     /// momentum at the start is compared with the momenta `L_v` of the stages too, since it vanishes if the motion
     /// starts at rest.
-    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[Dual<T, ChartVector<N, T>>], change: &DVector<T>) -> f64 {
+    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[StageValue<N, T>], change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
         let mut see = |change: f64, size: f64| {
@@ -310,7 +350,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         see(of(0..s * N), x.v.iter().flatten().fold(0.0, |m, v| max_or_nan(m, v.extent())));
         see(of(s * N..s * (N + 1)), x.z.iter().fold(0.0, |m, z| max_or_nan(m, z.extent())));
         see(of(s * (N + 1)..s * (N + 2)), x.rho.iter().fold(1.0, |m, r| max_or_nan(m, r.extent())));
-        let momenta = l.iter().flat_map(|l| l.d.y.iter()).chain(x.p0.iter());
+        let momenta = l.iter().flat_map(|l| l.l.d.y.iter()).chain(x.p0.iter());
         see(of(s * (N + 2)..change.len()), momenta.fold(0.0, |m, p| max_or_nan(m, p.extent())));
         worst
     }
@@ -382,7 +422,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         &self,
         given: &Given<N, T>,
         x: &StageUnknowns<N, T>,
-        l: &[Dual<T, ChartVector<N, T>>],
+        l: &[StageValue<N, T>],
     ) -> StepEnd<N, T> {
         let Products { b, .. } = self.products;
         let (q0, p0) = match given {
@@ -390,12 +430,12 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             Given::Ends { q0, .. } => (*q0, x.p0),
         };
         let sum = |f: &dyn Fn(usize) -> T| (0..self.products.s).fold(T::zero(), |sum, j| sum + f(j) * b[j]);
-        let rho = -sum(&|j| x.rho[j] * l[j].d.z) + 1.0;
+        let rho = -sum(&|j| x.rho[j] * l[j].l.d.z) + 1.0;
         StepEnd {
             p0,
             q: SVector::from_fn(|d, _| q0[d] + sum(&|j| x.v[j][d])),
-            p: SVector::from_fn(|d, _| (p0[d] + sum(&|j| x.rho[j] * l[j].d.x[d])) / rho),
-            action: sum(&|j| l[j].re),
+            p: SVector::from_fn(|d, _| (p0[d] + sum(&|j| x.rho[j] * l[j].force[d])) / rho),
+            action: sum(&|j| l[j].l.re),
             rho,
         }
     }

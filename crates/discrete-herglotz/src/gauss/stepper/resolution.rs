@@ -92,7 +92,10 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     pub(crate) fn is_at_rest(&self, t: f64) -> bool {
         let state = self.state();
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
-        let (force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
+        let (mut force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
+        if const { L::HINTS.forced } {
+            force.x += self.lagrangian.applied_force(t, &x);
+        }
         size(&x.v) * self.h.abs() <= self.monitor.floor
             && size(&(force.x + state.p * force.z)) <= COLLOCATION_ROUNDINGS * size(&rounding.x)
     }

@@ -77,7 +77,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             v: vector(|d| T::of(&self.v[d], r)),
             z: T::of(&self.z_stages, r),
         };
-        let (l, d) = self.lagrangian.with_gradient(T::of(&self.table.times, r) + t, &point);
+        let (l, d) = self.lagrangian.with_gradient_and_force(T::of(&self.table.times, r) + t, &point);
         for i in 0..T::COUNT {
             let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
             self.weigh(r + i, l.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });

@@ -91,7 +91,7 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for General<'_, L, Physical
             .and_then(|VelocityPoint { v, .. }| equations.solve(&Given::Start(from), &v, &from.p, work));
         if solved.is_ok() {
             let Workspace { x, l, .. } = &*work;
-            self.accept((0..products.s).map(|i| (x.v[i], l[i].re, x.rho[i])));
+            self.accept((0..products.s).map(|i| (x.v[i], l[i].l.re, x.rho[i])));
         }
         self.by_newton = Some(by_newton);
         solved.map(|_| ())
