@@ -135,7 +135,7 @@ impl Dense {
         let times: Vec<f64> = times.into_iter().map(nearest).collect();
         let inside = |t: f64| sign * first <= sign * t && sign * t <= sign * last;
         if let Some(t) = times.iter().find(|t| !inside(**t)) {
-            return Err(value_error(format!("`t` has {t}, where the motion is from {first} to {last}")));
+            return Err(value_error(format!("`t` contains {t}, but the motion runs from {first} to {last}")));
         }
         let mut all = columns(n, false);
         let own = all.len();
