@@ -88,7 +88,12 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         return Err(raised);
     }
     let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
-    let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
+    let by = by.ok_or_else(|| {
+        value_error(
+            "the integrator of the plan does not support dense output: name another \
+                                           `integrator`",
+        )
+    })?;
     Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, until })
 }
 

@@ -160,7 +160,11 @@ fn fall(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         table.add("fall", integrator, count as f64, end.verdict(&exact, 0.0, ORDER_ONE), f64::NAN);
     }
     let through = u32::from(problem.exact().is_ok()) + u32::from(matches!(problem.to(1e-6), RunEnd::Completed(_)));
-    report.at_most("a fall into the centre by the exact flow and to an accuracy: that go on", f64::from(through), 0.0)
+    report.at_most(
+        "a fall into the centre by the exact flow and to an accuracy: runs that continue",
+        f64::from(through),
+        0.0,
+    )
 }
 
 /// Past a pole of the chart of the sphere: a great circle, on which the longitude changes abruptly.

@@ -103,7 +103,7 @@ fn configuration(record: &csv::StringRecord, peers: Peers) -> Result<Option<Conf
     let z = match field("variant")? {
         "z" => Action::On,
         "noz" => Action::Off,
-        other => return Err(format!("variant is {other:?}, not z or noz")),
+        other => return Err(format!("variant is {other:?}; it must be z or noz")),
     };
     let (peer, error) = (field("peer")?, number("err_qv")?);
     let problem = field("problem")?;
