@@ -202,7 +202,11 @@ fn plans_in_words() {
     assert_eq!(titles(&plan, true), ["iteration", "checks of the structure"]);
     let text = plan.to_string();
     assert!(text.starts_with("10 steps of 1 by gauss_8, t = 0 .. 10\ncomputed:\n  iteration: "), "{text}");
-    assert!(text.contains("and is not requested\n") && text.contains("the product is not requested\n"), "{text}");
+    assert!(
+        text.contains("and z is not requested\n")
+            && text.contains("conformal factor: not requested; sigma_d is the same"),
+        "{text}"
+    );
     let back = ten_steps(&of_pendulum, gauss(8)).plan(Until::Time(-10.0)).unwrap().to_string();
     assert!(back.starts_with("10 steps of -1 by gauss_8, t = 0 .. -10\n"), "{back}");
 

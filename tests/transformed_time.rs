@@ -338,7 +338,7 @@ fn invalid_time_transformations_are_refused() {
     assert!(matches!(refused(1e-300, true, Steps::Size(0.1)), Some(InputError::TooMany { .. })));
     assert_eq!(refused(1.0, true, Steps::Size(-0.1)), Some(InputError::Step { h: -0.1 }));
     let sentence = refused(1.0, true, Steps::Count(10)).map(|error| error.to_string()).unwrap_or_default();
-    assert!(sentence.contains("steps of a given size in its transformed time"), "{sentence}");
+    assert!(sentence.contains("steps of a given size in transformed time"), "{sentence}");
     // A time transformation without a gain is not chosen, whatever its rate.
     for rate in [1.0, 1e-3, -1.0, f64::NAN] {
         let system = Transformed { rate, autonomous: true };
@@ -355,7 +355,7 @@ fn invalid_time_transformations_are_refused() {
     // Thirteen steps of 0.15, and one of a third of that; the span of 2 ends exactly in spite of rounding.
     assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
     assert!(
-        plan.to_string().contains("14 steps of 0.3 of the transformed time by transformed_gauss_4, t = 0 .. 2"),
+        plan.to_string().contains("14 steps of 0.3 in transformed time by transformed_gauss_4, t = 0 .. 2"),
         "{plan}"
     );
     // The same number of steps backward, each of the same length.

@@ -94,7 +94,7 @@ fn exact_errors() {
         }, ["only until t = ", "smaller h", "another start"];
         ExactError::Unfinished { .. } => {
             herglotz_flow(&oscillator, 0.0, &VelocityPoint::new([1.0], [0.0], 0.0), 1e9).unwrap_err()
-        }, ["t = ", "go on from there"];
+        }, ["t = ", "continue from there"];
         ExactError::NotConverged { .. } => {
             let exp = ContactExponential::new(Bratu { lambda: 6.0, drag: 0.01 }, 0.8).unwrap();
             exp.retract(0.0, &DiscretePoint::new([0.0], [0.1], 0.0)).unwrap_err()

@@ -445,11 +445,11 @@ mod tests {
             |reached: f64, cause: SelectionFailure| InputError::Accuracy { wanted: 1e-9, reached, cause }.to_string();
         let defect = SelectionFailure::DefectBetweenNodes { defect: 3e-4, order: 0.5 };
         let table = [
-            (said(1e-16, defect), "1e-9 is not certain, though trial runs agree to 1.0e-16: between the nodes"),
-            (said(1e-16, defect), "misses its equations by 3.0e-4 of its size"),
+            (said(1e-16, defect), "1e-9 is not guaranteed, although trial runs agree to 1.0e-16: between the nodes"),
+            (said(1e-16, defect), "has a relative defect of 3.0e-4, which"),
             (
                 said(1e-16, SelectionFailure::FeatureAtNodes { distance: 2e-3 }),
-                "with one step more ends 2.0e-3 away from them: a kink",
+                "with one more step ends 2.0e-3 away from the others: a kink",
             ),
             (
                 said(1e-7, SelectionFailure::Budget),
@@ -457,7 +457,7 @@ mod tests {
             ),
             (
                 said(f64::INFINITY, SelectionFailure::Budget),
-                "1e-9 is not reached, and no two trial runs could be compared: ",
+                "1e-9 is not reached, since no two trial runs could be compared: ",
             ),
             (said(1e-7, SelectionFailure::Order { order: 1.9 }), "runs converge only with order 1.9: "),
             (said(1e-7, SelectionFailure::Order { order: 0.0 }), "runs do not converge as their steps get shorter: "),

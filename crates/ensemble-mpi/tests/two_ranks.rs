@@ -149,12 +149,12 @@ fn a_rank_that_is_killed_costs_its_open_shards_only() {
     let kept = shards_of(Path::new(&checkpoint));
     assert!((5..79).contains(&kept), "{kept} shards are kept: not killed in mid-run");
     let said = completed(2, &resumed);
-    assert!(said.contains(&format!("{kept} shards from the checkpoint")), "{said}");
+    assert!(said.contains(&format!("{kept} shards read from the checkpoint")), "{said}");
     assert!(fs::read(&again).unwrap() == fs::read(&plain).unwrap());
     assert_eq!(shards_of(Path::new(&checkpoint)), 79);
     // One process reads the shards of two, in any order.
     let said = completed(1, &resumed);
-    assert!(said.contains("79 shards from the checkpoint"), "{said}");
+    assert!(said.contains("79 shards read from the checkpoint"), "{said}");
     assert!(fs::read(&again).unwrap() == fs::read(&plain).unwrap());
 }
 
@@ -167,7 +167,7 @@ fn a_rank_that_is_silent_for_too_long_is_lost() {
     let output = finish(job);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("nothing was heard of rank 1 for 2 s"), "{said}");
+    assert!(said.contains("rank 1 has sent no message for 2 s"), "{said}");
     assert!(shards_of(Path::new(&checkpoint)) >= 5 && !Path::new(&out).exists());
 }
 
@@ -189,20 +189,20 @@ fn what_is_refused_ends_all_ranks() {
     refused(&[(2, "--time NaN")], "member 0: ");
     refused(&[(2, "--patience=-1")], "--patience: ");
     // Ranks that disagree, and a rank other than 0 that has nothing to run.
-    refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has another ensemble than rank 0");
-    refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has another ensemble than rank 0");
+    refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has a different ensemble from rank 0");
+    refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has a different ensemble from rank 0");
     refused(&[(1, ""), (1, "--members 0")], "rank 1: the ensemble has no members");
     // Checkpoints.
     let with = |more: &str| format!("--members 2000 --checkpoint {checkpoint} {more}");
     completed(2, &format!("{} --steps 10 --out {out}", with("")));
     fs::remove_file(&out).unwrap();
-    refused(&[(2, &with("--seed 1"))], "has the shards of another ensemble");
+    refused(&[(2, &with("--seed 1"))], "contains the shards of another ensemble");
     let mut bytes = fs::read(&checkpoint).unwrap();
     bytes[1000] ^= 1;
     fs::write(&checkpoint, &bytes).unwrap();
     refused(&[(2, &with(""))], "the checkpoint is damaged");
     fs::write(&checkpoint, "a letter to a friend, of no use here").unwrap();
-    refused(&[(2, &with(""))], "the file is no checkpoint");
+    refused(&[(2, &with(""))], "the file is not a checkpoint");
     let nowhere = format!("--checkpoint {}", folder.0.join("missing").join("shards").display());
     refused(&[(2, &nowhere)], "the checkpoint cannot be read");
 }

@@ -13,7 +13,7 @@ use thiserror::Error;
 pub enum Failure {
     /// The output cannot be written. Invalid input: exit code 2.
     #[error(
-        "cannot write to {}: {cause}; --out takes a directory that exists or can be created, and in which files can \
+        "cannot write to {}: {cause}; --out must be a directory that exists or can be created, and in which files can \
          be written", .path.display()
     )]
     Output {
@@ -23,7 +23,7 @@ pub enum Failure {
         cause: io::Error,
     },
     /// A name is not among those that are known. Invalid input: exit code 2.
-    #[error("there is no {what} {name:?}; known are all, {known}")]
+    #[error("unknown {what} {name:?}; the known names are all, {known}")]
     Unknown {
         /// The kind of thing that has the name.
         what: &'static str,
@@ -33,7 +33,7 @@ pub enum Failure {
         known: String,
     },
     /// A table cannot be read, or its content is invalid. Invalid input: exit code 2.
-    #[error("cannot take the rows of {}: {cause}; {expected}", .path.display())]
+    #[error("cannot read the rows of {}: {cause}; {expected}", .path.display())]
     Table {
         /// The file.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum Failure {
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// A run ended early; its results up to then are written. Exit code 1.
-    #[error("the run of {what} {status}")]
+    #[error("the run of {what} ended early: {status}")]
     Run {
         /// The system.
         what: &'static str,
@@ -60,11 +60,11 @@ pub enum Failure {
         status: Status,
     },
     /// A single step could not be taken: exit code 1.
-    #[error("no step: {0}")]
+    #[error("a step fails: {0}")]
     Step(#[from] StepError),
     /// An exact motion, or the motion between two points, was not found. The text is that of the error, whose type
     /// depends on the dimension. Exit code 1.
-    #[error("no exact motion: {0}")]
+    #[error("the exact motion cannot be computed: {0}")]
     Exact(String),
     /// Statements of the paper, which are theorems, are violated: exit code 1.
     #[error("{count} of {total} checks of the paper's statements fail:\n{list}")]

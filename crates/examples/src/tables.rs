@@ -81,6 +81,6 @@ fn part(name: &str) -> &'static str {
 #[test]
 fn the_guide_has_the_tables_of_the_code() {
     for (name, table) in [("integrators", integrators()), ("systems", systems())] {
-        assert!(part(name) == table, "docs/guide.md is to have, between the marks of {name}:\n{table}");
+        assert!(part(name) == table, "docs/guide.md must contain, between the comments <!-- {name} -->:\n{table}");
     }
 }

@@ -15,7 +15,7 @@
 //! let pendulum = formula.lagrangian::<1>()?;
 //! let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
 //! let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.5));
-//! println!("{}", run.plan(Until::Time(50.0))?); // probes of the structure: it is proved from the formula of L
+//! println!("{}", run.plan(Until::Time(50.0))?); // checks of the structure: the structure is proved from the formula of L
 //! println!("theta = {}", run.run(Until::Time(50.0))?.q[0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

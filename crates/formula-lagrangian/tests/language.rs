@@ -121,35 +121,35 @@ fn errors_show_the_place_and_the_remedy() {
         ("x'^2 +\n  sine(x)", 2, 3, "unknown function `sine`"),
         ("2 x", 1, 3, "a product is written with `*`"),
         ("2(x)", 1, 2, "a product is written with `*`"),
-        ("x(y)", 1, 2, "`(` where an operator is expected"),
+        ("x(y)", 1, 2, "expected an operator, found `(`"),
         ("0,5*x", 1, 2, "numbers have a point, not a comma"),
-        ("x +", 1, 4, "the end where a value is expected"),
-        ("(x + y", 1, 7, "the end where `)` is expected"),
-        ("x)", 1, 2, "`)` where an operator is expected"),
-        ("", 1, 1, "the end where a value is expected"),
+        ("x +", 1, 4, "expected a value, found the end"),
+        ("(x + y", 1, 7, "expected `)`, found the end"),
+        ("x)", 1, 2, "expected an operator, found `)`"),
+        ("", 1, 1, "expected a value, found the end"),
         ("x''", 1, 1, "a second derivative"),
-        ("x[0]", 1, 2, "`x` is one number"),
-        ("q[2]", 1, 3, "entry 2 of `q`, which has the entries 0 to 1"),
-        ("q[-1]", 1, 3, "entry -1 of `q`"),
-        ("q[0.5]", 1, 3, "0.5 where an integer is expected"),
+        ("x[0]", 1, 2, "`x` is a single number"),
+        ("q[2]", 1, 3, "`q` has no entry 2; its entries are 0 to 1"),
+        ("q[-1]", 1, 3, "`q` has no entry -1"),
+        ("q[0.5]", 1, 3, "expected an integer, found 0.5"),
         ("q[a]", 1, 3, "does not depend on parameters"),
         ("v", 1, 1, "unknown name `v`"),
         ("sin", 1, 1, "`sin` is a function"),
-        ("sin(x, y)", 1, 1, "`sin` has one argument, not 2"),
-        ("atan2(x)", 1, 1, "`atan2` has two arguments, not 1"),
-        ("1/0 + x", 1, 2, "this is inf"),
-        ("ln(0)", 1, 1, "this is -inf"),
+        ("sin(x, y)", 1, 1, "`sin` takes one argument, not 2"),
+        ("atan2(x)", 1, 1, "`atan2` takes two arguments, not 1"),
+        ("1/0 + x", 1, 2, "the value is inf"),
+        ("ln(0)", 1, 1, "the value is -inf"),
         ("1e999", 1, 1, "too large"),
-        ("1.2.3", 1, 4, "the number 0.3 where an operator is expected"),
+        ("1.2.3", 1, 4, "expected an operator, found the number 0.3"),
         ("x $ y", 1, 3, "'$' has no meaning"),
-        ("r = x", 1, 6, "after the definition of `r` a value is expected"),
-        ("x = 3; y", 1, 1, "the name `x` is taken"),
-        ("r = 1; r = 2; r", 1, 8, "the name `r` is taken"),
-        ("x\ny", 2, 1, "only one value is possible"),
-        ("sum(x, 0, 1, x)", 1, 5, "the name `x` is taken"),
+        ("r = x", 1, 6, "expected a value after the definition of `r`"),
+        ("x = 3; y", 1, 1, "the name `x` is in use"),
+        ("r = 1; r = 2; r", 1, 8, "the name `r` is in use"),
+        ("x\ny", 2, 1, "a formula has a single value"),
+        ("sum(x, 0, 1, x)", 1, 5, "the name `x` is in use"),
         ("sum(2, 0, 1, x)", 1, 5, "the name of an index"),
-        ("sum(i, 0, 1e8, i)", 1, 16, "more than 20000 parts"),
-        ("if(x, y, 1)", 1, 5, "`<` or `>` is expected"),
+        ("sum(i, 0, 1e8, i)", 1, 16, "more than 20000 operations"),
+        ("if(x, y, 1)", 1, 5, "expected `<` or `>`"),
     ];
     for (text, line, column, message) in table {
         let found = error(text);
@@ -183,9 +183,9 @@ fn errors_say_what_to_write_instead() {
         ("x'^2/2 + t'", "the rate of `t` is 1"),
         ("x'^2/2 + a'", "`a` is a parameter, which is constant"),
         ("r = x^2; x'^2/2 + r'", "`r` is a definition"),
-        ("x'^2/2 + x*x''", "write L of `x` and `x'` alone"),
+        ("x'^2/2 + x*x''", "write L in terms of `x` and `x'`"),
         ("x'^2/2 + diff(x, t)", "write `x'` for the velocity of `x`"),
-        ("x(t)^2", "a coordinate, which is a function of time, by its name alone"),
+        ("x(t)^2", "a coordinate as its name"),
         ("v@v/2", "written `sum(i, 0, n-1, q[i]*v[i])`"),
         ("np.sin(x)", "write `sin(x)` for `np.sin(x)`"),
         ("x + math.pi", "`pi` for `math.pi`"),
@@ -198,7 +198,7 @@ fn errors_say_what_to_write_instead() {
         ("if(x > 0 and y > 0, x, y)", "write `if(a < b, then, otherwise)`"),
         ("x > 0", "a condition is `if(a < b, then, otherwise)`"),
         ("x*if", "write `if(a < b, then, otherwise)`"),
-        ("interp(x, 1, 2)", "write its pieces by `if(a < b, then, otherwise)`"),
+        ("interp(x, 1, 2)", "write its pieces with `if(a < b, then, otherwise)`"),
         ("polyval(x, 1)", "`c0 + x*(c1 + x*c2)`"),
         ("log10(x)", "write `ln(x)/ln(10)`"),
         ("norm(x)", "`hypot(x, y)`"),
@@ -263,9 +263,9 @@ fn texts_without_measure() {
     let long = format!("x'^2 + y'^2 {}", "+ x*y'".repeat(5000));
     Formula::parse(&long, &["x", "y"], &[]).unwrap().lagrangian::<2>().unwrap();
     let nested = "sum(i, 1, 1000, sum(j, 1, 1000, sum(k, 1, 1000, x*i*j*k)))";
-    assert!(error(nested).message.contains("more than 20000 parts"));
+    assert!(error(nested).message.contains("more than 20000 operations"));
     // Very many words, and only a few nodes.
-    assert!(error("sum(i, 1, 100000000, sum(j, 1, 100000000, 0))").message.contains("more than 20000 parts"));
+    assert!(error("sum(i, 1, 100000000, sum(j, 1, 100000000, 0))").message.contains("more than 20000 operations"));
     // Exponentially many paths in a small graph.
     let doubled: String = (0..300).map(|i| format!("a{} = sin(a{i}) * (a{i} + 1)\n", i + 1)).collect();
     Formula::parse(&format!("a0 = x\n{doubled}x'^2 + y'^2 + a300"), &["x", "y"], &[])
@@ -282,7 +282,7 @@ fn values_with_names() {
     assert_eq!(energy.at(0.0, &[1.0], &[2.0], 0.0), 3.0);
     for taken in ["x = 1", "k = x", "t = x", "sin = x", "a = x; a = 2*a"] {
         let error = formula.named_expression(taken).unwrap_err().to_string();
-        assert!(error.contains("is taken"), "{taken}: {error}");
+        assert!(error.contains("is in use"), "{taken}: {error}");
     }
     assert!(formula.expression("x = 1").is_err() && formula.expression("y = x").is_err());
 }

@@ -173,7 +173,7 @@ fn a_plan_says_that_the_structure_is_proved() {
     let l = lagrangian("(x'^2 + y'^2)/2 + cos(x) - a*z");
     let problem = Problem::new(&l, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 1.0], 0.0)).unwrap();
     let plan = problem.steps(Steps::Size(0.1)).plan(Until::Time(1.0)).unwrap().to_string();
-    assert!(plan.contains("probes of the structure: it is proved from the formula of L"), "{plan}");
+    assert!(plan.contains("checks of the structure: the structure is proved from the formula of L"), "{plan}");
     assert_eq!(*problem.structure(), l.structure());
 }
 

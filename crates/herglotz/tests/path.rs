@@ -79,7 +79,7 @@ fn what_cannot_be_searched_for_is_refused() {
         (BoundaryProblem { ends: [vec![0.0], vec![1.0, 2.0]], ..good.clone() }, "`the end` has 2 numbers"),
         (BoundaryProblem { span: (0.0, f64::NAN), ..good.clone() }, "`t` is NaN"),
         (BoundaryProblem { span: (0.0, 0.0), ..good.clone() }, "step"),
-        (BoundaryProblem { by: "strang".parse().unwrap(), ..good.clone() }, "take \"gauss_4\""),
+        (BoundaryProblem { by: "strang".parse().unwrap(), ..good.clone() }, "such as \"gauss_4\""),
         (BoundaryProblem { guess: Some(vec![0.0; 3]), ..good.clone() }, "points"),
     ] {
         assert!(said(&problem).contains(why), "{problem:?}: {}", said(&problem));

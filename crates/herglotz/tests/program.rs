@@ -97,7 +97,7 @@ fn resumed_runs_are_those_that_were_not_interrupted() {
     let file = at.path("0.toml");
     fail(&["run", &file, "--out", &at.path("parts_0"), "--interrupt-at", "0.3"]);
     let (code, told) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
-    assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
+    assert!(code == Some(2) && told.contains("the scene differs from that of the interrupted run"), "{told}");
 }
 
 /// A killed run that is resumed from its last checkpoint gives the same bytes.
@@ -224,7 +224,7 @@ fn endings_are_told_by_the_code() {
 #[test]
 fn plans_and_checks_say_what_holds() {
     let said = succeed(&["plan", &scene("kepler")]);
-    for part in ["proved of the formula", "separable", "x*p_y - y*p_x decays as the conformal factor"] {
+    for part in ["proved from the formula", "separable", "x*p_y - y*p_x decays as the conformal factor"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     let told: serde_json::Value = serde_json::from_str(&succeed(&["plan", &scene("nonlinear"), "--json"])).unwrap();
@@ -295,7 +295,7 @@ fn comparisons_name_the_best() {
     let at = Directory::new("compare");
     let file = at.write("scene.toml", &OSCILLATOR.replace("time = 400.0", "time = 20.0"));
     let said = succeed(&["compare", &file, "--out", &at.path("out")]);
-    let best = said.lines().find(|line| line.starts_with("the best for 1e-3: ")).unwrap();
+    let best = said.lines().find(|line| line.starts_with("fastest integrator for an error of 1e-3: ")).unwrap();
     assert!(["1e-6: ", "1e-9: ", "1e-12: "].iter().all(|error| best.contains(error)), "{said}");
     let table = at.read("out/compare.csv");
     let of = |name: &str| {
@@ -313,7 +313,10 @@ fn comparisons_name_the_best() {
         picture.contains(">dop853<") && errors.len() > 5 && errors[0] > 1e3 * errors[errors.len() - 1],
         "{errors:?}"
     );
-    let beside = said.lines().find(|line| line.starts_with("beside them for 1e-3: dop853 by ")).unwrap();
+    let beside = said
+        .lines()
+        .find(|line| line.starts_with("fastest method of another library for an error of 1e-3: dop853 with "))
+        .unwrap();
     assert!(beside.contains("1e-9: dop853") && !best.contains("dop853"), "{said}");
     let told = succeed(&["compare", &file, "--out", &at.path("out"), "--json"]);
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
@@ -345,7 +348,7 @@ fn a_lattice_runs() {
     let (scene, out) = (at.write("lattice.toml", LATTICE), at.path("out"));
     let said = succeed(&["run", &scene, "--out", &out, "--plot"]);
     assert!(
-        said.starts_with("completed: 60 steps of 40 sites by blanes_moan_6\n4 rows; the end:\n  t = 3\n"),
+        said.starts_with("completed: 60 steps of 40 sites by blanes_moan_6\n4 rows; the final state:\n  t = 3\n"),
         "{said}"
     );
     let rows = at.read("out/rows.csv");
@@ -368,7 +371,7 @@ fn a_lattice_runs() {
     assert!(succeed(&["run", &scene, "--out", &out, "--json"]).contains("\"rows\": 4"));
     for command in ["plan", "check", "compare"] {
         let (code, said) = fail(&[command, &scene]);
-        assert!(code == Some(2) && said.contains("a lattice is run by `herglotz run`"), "{command}: {said}");
+        assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{command}: {said}");
     }
     let (code, said) = fail(&["run", &scene, "--out", &out, "--set", "k=2"]);
     assert!(code == Some(2) && said.contains("--set"), "{said}");
@@ -383,14 +386,14 @@ fn wrong_lattices_are_refused() {
         ("-k*(xr - xl)^2/2", "-k*(xr' - xl')^2/2", "line 6, column 8: `bond` depends on velocities"),
         ("k = 1.0", "k = 1.0, c = 2.0", "line 7, column 16: `parameters` has `c`"),
         ("[2, 20]", "[0, 20]", "line 3, column 9: `sites` has 0 along a direction"),
-        ("[2, 20]", "[2000000, 20000]", "line 3, column 9: the sites are more than 1000000"),
+        ("[2, 20]", "[2000000, 20000]", "line 3, column 9: the lattice has more than 1000000 sites"),
         ("\"fixed\"", "\"open\"", "line 4, column 12: unknown word `open`"),
-        ("x = \"sin", "y = \"sin", "line 9, column 1: there is no `y` in a start"),
+        ("x = \"sin", "y = \"sin", "line 9, column 1: unknown name `y` in the start"),
         ("(j + 1)/21", "(k + l)/21", "line 9, column"),
         (
             "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
             "x = [1.0, 2.0]",
-            "line 9, column 5: `x` is a list of 2, where there are 40 sites",
+            "line 9, column 5: `x` is a list of 2 numbers, but there are 40 sites",
         ),
         (
             "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
@@ -399,8 +402,8 @@ fn wrong_lattices_are_refused() {
         ),
         ("\"blanes_moan_6\"", "\"gauss_8\"", "line 12, column 14: `integrator` is \"gauss_8\""),
         ("step = 0.05", "", "line 10, column 1: the run of a lattice needs"),
-        ("step = 0.05", "accuracy = 1e-9", "line 13, column 12: a lattice is run by given steps"),
-        ("every = 1.0", "columns = [\"t\"]", "line 15, column 11: rows of a lattice have the whole state"),
+        ("step = 0.05", "accuracy = 1e-9", "line 13, column 12: a lattice is integrated with given steps"),
+        ("every = 1.0", "columns = [\"t\"]", "line 15, column 11: the rows of a lattice contain the whole state"),
     ];
     refuses_each(LATTICE, &changes, |text| match herglotz::LatticeScene::read(text) {
         Err(error) => Some(error.to_string()),

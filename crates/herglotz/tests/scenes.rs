@@ -242,9 +242,9 @@ fn changes_of_the_run() {
     for (change, why) in [
         ("run.steps=1.5", "whole number"),
         ("run.steps=-1", "whole number"),
-        ("run.integrator=gaus_8", "there is no integrator `gaus_8`"),
+        ("run.integrator=gaus_8", "unknown integrator `gaus_8`"),
         ("run.acuracy=1", "did you mean `run.accuracy`"),
-        ("run.step=0.1", "name one"),
+        ("run.step=0.1", "no `integrator`"),
     ] {
         assert!(refused(change).contains(why), "{change}: {}", refused(change));
     }

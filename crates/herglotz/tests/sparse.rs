@@ -255,7 +255,7 @@ fn what_is_wrong_is_said_with_the_argument() {
     let cases = [
         (of("x'^2/2 - cos(y)", "xl*xr"), "`site`: line 1, column 14: unknown name `y`"),
         (of(good, "xl*x"), "`bond`: line 1, column 4: unknown name `x`"),
-        (of("x'^2/2 - z^2", "xl*xr"), "`site` depends on z by more than `gamma*z`"),
+        (of("x'^2/2 - z^2", "xl*xr"), "`site` depends on z in another form than `gamma*z`"),
         (of("x*x'^2/2", "xl*xr"), "`site` is not of the form m*x'^2/2 - V(t, x) + gamma*z"),
         (of("x'", "xl*xr"), "`site` is not of the form"),
         (of("-x'^2/2", "xl*xr"), "`site` has the mass -1"),
@@ -263,10 +263,10 @@ fn what_is_wrong_is_said_with_the_argument() {
         (of(good, "-(xr' - xl')^2/2"), "`bond` depends on velocities"),
         (of(good, "xl*xr'"), "`bond` depends on velocities"),
         (Lattice { sizes: vec![], ..of(good, "xl*xr") }, "`sites` has no direction"),
-        (Lattice { sizes: vec![1], ..of(good, "xl*xr") }, "`sites` has 1 along a direction, where at least 2"),
+        (Lattice { sizes: vec![1], ..of(good, "xl*xr") }, "`sites` has 1 along a direction; at least 2"),
         (
             Lattice { parameters: vec![("gama".into(), 1.0)], ..of(good, "xl*xr") },
-            "`parameters` has `gama`, which is neither",
+            "`parameters` has `gama`, which is used neither",
         ),
         (Lattice { coordinates: vec![], ..of(good, "xl*xr") }, "`coordinates` has 0 names"),
     ];
@@ -294,13 +294,13 @@ fn what_is_wrong_is_said_with_the_argument() {
     };
     for (found, expected) in [
         (ask(&|m| m.by = by("gauss_8")), "`integrator` is \"gauss_8\", which is for up to 16 coordinates"),
-        (ask(&|m| m.end = 0.0), "`t` ends at 0, where the motion starts at 0"),
+        (ask(&|m| m.end = 0.0), "`t` ends at 0, and the motion starts at 0"),
         (ask(&|m| m.steps = Steps::Size(-0.1)), "`step` is -0.1"),
         (ask(&|m| m.steps = Steps::Size(1e-300)), "`step` gives 1.0e300 steps"),
         (ask(&|m| m.rows = OutputTimes::Every(0)), "`every` is 0"),
         (ask(&|m| m.rows = OutputTimes::At(vec![0.5, 0.2])), "the time t = 0.2 of row 1 is out of order"),
         (ask(&|m| m.rows = OutputTimes::At(vec![f64::NAN])), "the time t = NaN of row 0"),
-        (ask(&|m| m.start.q = vec![0.0; 3]), "`q` has 3 numbers, where the system has 20"),
+        (ask(&|m| m.start.q = vec![0.0; 3]), "`q` has 3 numbers, but the system has 20"),
         (ask(&|m| m.start.q[7] = f64::NAN), "`q[7]` is NaN"),
         (ask(&|m| m.start.z = f64::INFINITY), "`z` is inf"),
     ] {

@@ -114,7 +114,7 @@ def warm():
         for level, bound in problem["levels"].items():
             their, our = cheapest(theirs, reference, level), cheapest(ours, reference, level)
             if their is None or our is None:
-                print(f"{name} warm, {level:.0e}: nothing reaches it, of", "heyoka" if their is None else "herglotz")
+                print(f"{name} warm, {level:.0e}: no run reaches it, for", "heyoka" if their is None else "herglotz")
                 continue
             of_theirs, of_ours, ratio = beside(their[2], our[2])
             print(

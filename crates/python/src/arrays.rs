@@ -13,7 +13,7 @@ pub fn value_error(error: impl Display) -> PyErr {
 
 /// The number of an argument.
 pub fn number(name: &str, from: &Bound<'_, PyAny>) -> PyResult<f64> {
-    let wrong = || value_error(format!("`{name}` is {}, where a finite number is needed", shown(from)));
+    let wrong = || value_error(format!("`{name}` is {}; it must be a finite number", shown(from)));
     if from.is_instance_of::<PyBool>() {
         return Err(wrong());
     }
@@ -25,7 +25,7 @@ pub fn number(name: &str, from: &Bound<'_, PyAny>) -> PyResult<f64> {
 /// write it.
 pub fn whole(name: &str, from: &Bound<'_, PyAny>, least: usize) -> PyResult<usize> {
     let wrong = |instead: String| {
-        value_error(format!("`{name}` is {}, where an integer of at least {least} is needed{instead}", shown(from)))
+        value_error(format!("`{name}` is {}; it must be an integer of at least {least}{instead}", shown(from)))
     };
     let is_boolean = from.is_instance_of::<PyBool>() || from.get_type().name().is_ok_and(|name| name == "bool");
     if is_boolean {
@@ -44,7 +44,7 @@ pub fn whole(name: &str, from: &Bound<'_, PyAny>, least: usize) -> PyResult<usiz
 /// The string of an argument.
 pub fn word(name: &str, from: &Bound<'_, PyAny>, example: &str) -> PyResult<String> {
     from.extract()
-        .map_err(|_| value_error(format!("`{name}` is {}, where a text is needed, as {example}", shown(from))))
+        .map_err(|_| value_error(format!("`{name}` is {}; it must be a string such as {example}", shown(from))))
 }
 
 /// The representation of an object for an error message, truncated where it is long.
@@ -84,7 +84,7 @@ pub fn numbers(name: &str, from: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         None => {
             let (shape, found) = array(name, from)?;
             if shape.len() > 1 {
-                return Err(value_error(format!("`{name}` has the shape {shape:?}, where one dimension is needed")));
+                return Err(value_error(format!("`{name}` has the shape {shape:?}; it must have one dimension")));
             }
             found
         }
@@ -96,7 +96,7 @@ pub fn numbers(name: &str, from: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 /// Checks that all numbers are finite.
 fn finite(name: &str, numbers: &[f64]) -> PyResult<()> {
     match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
-        Some((i, x)) => Err(value_error(format!("`{name}[{i}]` is {x}, where a finite number is needed"))),
+        Some((i, x)) => Err(value_error(format!("`{name}[{i}]` is {x}; it must be a finite number"))),
         None => Ok(()),
     }
 }
@@ -108,13 +108,13 @@ fn array(name: &str, from: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)
         return Ok((shape, array.as_array().iter().copied().collect()));
     }
     let numpy = from.py().import("numpy")?;
-    let wrong = |what: String| value_error(format!("`{name}` {what}, where an array of real numbers is needed"));
+    let wrong = |what: String| value_error(format!("`{name}` {what}; it must be an array of real numbers"));
     let ragged = |_| wrong(format!("is {}", shown(from)));
     let any = numpy.call_method1("asarray", (from,)).map_err(ragged)?;
     let dtype = any.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
-        return Err(wrong(format!("has the dtype {dtype}: {}", shown(from))));
+        return Err(wrong(format!("has the dtype {dtype} ({})", shown(from))));
     }
     let any = any.call_method1("astype", ("float64",))?;
     let array: PyReadonlyArrayDyn<'_, f64> = any.extract().map_err(|_| PyTypeError::new_err(name.to_owned()))?;
@@ -130,7 +130,7 @@ pub fn table(name: &str, from: &Bound<'_, PyAny>, columns: usize) -> PyResult<(u
             Ok((*rows, found))
         }
         _ => Err(value_error(format!(
-            "`{name}` has the shape {shape:?}, where [M, {columns}] is needed: a row for each member"
+            "`{name}` has the shape {shape:?}; it must have the shape [M, {columns}], with a row for each member"
         ))),
     }
 }

@@ -85,7 +85,9 @@ impl Condition {
     fn choose(&self, then: &Bound<'_, PyAny>, otherwise: &Bound<'_, PyAny>) -> PyResult<Symbol> {
         let node = |x: &Bound<'_, PyAny>| match self.of.operand(x)? {
             Operand::Node(id) => Ok(id),
-            Operand::Other => Err(PyTypeError::new_err(format!("np.where of a traced value with {x:?}"))),
+            Operand::Other => Err(PyTypeError::new_err(format!(
+                "np.where of a traced value does not accept {x:?}: give numbers or traced values"
+            ))),
         };
         let id = choose(&self.of, &self.kind, node(then)?, node(otherwise)?)?;
         Ok(Symbol { shared: self.of.shared.clone(), id })

@@ -21,7 +21,7 @@ pub fn conformality(
     let (q, p, z) = (numbers("q", &at.0)?, numbers("p", &at.1)?, number("z", &at.2)?);
     let n = q.len();
     if p.len() != n {
-        return Err(value_error(format!("`p` has {} numbers, where `q` has {n}", p.len())));
+        return Err(value_error(format!("`p` has {} numbers, but `q` has {n}", p.len())));
     }
     let names = format!("q[{n}]");
     let formula = Formula::parse("0", &[names.as_str()], &[]).map_err(value_error)?;
@@ -52,7 +52,7 @@ pub fn conformality(
                         .map(|found| (found.sigma, found.defect))
                         .map_err(value_error)?
                 })*
-                _ => return Err(value_error(format!("{n} coordinates, where 1 to 16 are possible"))),
+                _ => return Err(value_error(format!("the map has {n} coordinates; it can have from 1 to 16"))),
             }
         };
     }

@@ -88,7 +88,12 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         return Err(raised);
     }
     let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
-    let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
+    let by = by.ok_or_else(|| {
+        value_error(
+            "the integrator of the plan does not support dense output: name another \
+                                           `integrator`",
+        )
+    })?;
     Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, until })
 }
 
@@ -135,7 +140,7 @@ impl Dense {
         let times: Vec<f64> = times.into_iter().map(nearest).collect();
         let inside = |t: f64| sign * first <= sign * t && sign * t <= sign * last;
         if let Some(t) = times.iter().find(|t| !inside(**t)) {
-            return Err(value_error(format!("`t` has {t}, where the motion is from {first} to {last}")));
+            return Err(value_error(format!("`t` contains {t}, but the motion runs from {first} to {last}")));
         }
         let mut all = columns(n, false);
         let own = all.len();

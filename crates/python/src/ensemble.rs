@@ -48,7 +48,7 @@ impl RowStore {
         while self.success.len() < count {
             let index = self.success.len();
             self.success.push(false);
-            self.troubles.push((index, "interrupted before it began".to_owned()));
+            self.troubles.push((index, "interrupted before its start".to_owned()));
             self.t.push(f64::NAN);
             self.steps.push(0);
             for _ in 0..self.rows.unwrap_or(1) {
@@ -159,7 +159,7 @@ pub fn run_ensemble(
         match found.len() {
             1 if of.len().is_err() => Ok(vec![number(name, of)?; count]),
             length if length == count => Ok(found),
-            length => Err(value_error(format!("`{name}` has {length} numbers, where there are {count} members"))),
+            length => Err(value_error(format!("`{name}` has {length} numbers, but there are {count} members"))),
         }
     };
     let z = members("z0", &z)?;

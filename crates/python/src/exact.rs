@@ -67,7 +67,7 @@ fn of_system(
     let n = system.inner.dimension();
     for (name, x) in names.iter().zip([&at.first, &at.second]) {
         if x.len() != n {
-            return Err(value_error(format!("`{name}` has {} numbers, where the system has {n} coordinates", x.len())));
+            return Err(value_error(format!("`{name}` has {} numbers, but the system has {n} coordinates", x.len())));
         }
     }
     let formula = system.inner.formula().clone();
@@ -77,7 +77,7 @@ fn of_system(
         3 => found::<3>(&formula, what, &at),
         4..=8 => found::<8>(&formula, what, &at),
         _ => Err(value_error(format!(
-            "the system has {n} coordinates, where the exact Lagrangian is compiled for 1 to 8: write the system in Rust"
+            "the system has {n} coordinates, but the exact Lagrangian is compiled for 1 to 8: write the system in Rust"
         ))),
     })?
 }

@@ -42,9 +42,11 @@ pub fn step_control([accuracy, integrator, step, steps]: &GivenStepControl<'_>) 
     };
     match (given, by, accuracy) {
         (Some(_), _, Some(_)) => {
-            Err(value_error("`accuracy` is given beside a step: give the accuracy, or the step with an integrator"))
+            Err(value_error("`accuracy` and a step are both given: give the accuracy, or the step with an integrator"))
         }
-        (Some(_), None, None) => Err(value_error("a step is given without `integrator`: name one, as \"gauss_8\"")),
+        (Some(_), None, None) => {
+            Err(value_error("a step is given without `integrator`: give one, such as \"gauss_8\""))
+        }
         (Some(steps), Some(by), None) => Ok(StepControl::Steps { by, steps }),
         (None, by, None) => Ok(StepControl::Accuracy { error: ACCURACY, by }),
         (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { error: number("accuracy", accuracy)?, by }),
@@ -77,7 +79,8 @@ pub fn times(t: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 
 fn no_times() -> PyErr {
     value_error(
-        "`t` must be the time of the end, for a motion that starts at 0, or at least two times of which the first is that of the start",
+        "`t` must be the final time of a motion that starts at 0, or at least two times, the first of which is the \
+         initial time",
     )
 }
 
@@ -107,7 +110,7 @@ pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Eve
                     Err(_) => "",
                 };
                 return Err(value_error(format!(
-                    "the direction {shown} of the event {text:?} is none of \"rising\", \"falling\", \"both\"{instead}"
+                    "the direction {shown} of the event {text:?} must be \"rising\", \"falling\" or \"both\"{instead}"
                 )));
             }
         };

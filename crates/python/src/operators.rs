@@ -209,7 +209,7 @@ impl Symbol {
     #[pyo3(name = "apply")]
     fn apply_named(&self, name: &str) -> PyResult<Symbol> {
         self.named(name).unwrap_or_else(|| {
-            Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value: write it out")))
+            Err(PyTypeError::new_err(format!("np.{name} is not supported for traced values: write it out")))
         })
     }
 
@@ -221,7 +221,9 @@ impl Symbol {
             "maximum" => Operation::Max,
             "arctan2" => Operation::Atan2,
             "hypot" => Operation::Hypot,
-            _ => return Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value: write it out"))),
+            _ => {
+                return Err(PyTypeError::new_err(format!("np.{name} is not supported for traced values: write it out")));
+            }
         };
         self.binary(operation, other, reversed)
     }

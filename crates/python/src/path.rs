@@ -41,7 +41,7 @@ pub fn search_path(
     let ends = [numbers("q0", &q0)?, numbers("q1", &q1)?];
     for (name, x) in ["q0", "q1"].iter().zip(&ends) {
         if x.len() != n {
-            return Err(value_error(format!("`{name}` has {} numbers, where the system has {n} coordinates", x.len())));
+            return Err(value_error(format!("`{name}` has {} numbers, but the system has {n} coordinates", x.len())));
         }
     }
     let guess = guess.map(|guess| table("guess", &guess, n)).transpose()?.map(|(_, points)| points);

@@ -103,9 +103,7 @@ pub fn leaving_at_signals<T: Send + 'static>(py: Python<'_>, work: impl FnOnce()
                 Ok(found) => return Ok(found),
                 Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(pyo3::exceptions::PyRuntimeError::new_err(
-                        "the computation has ended without a result",
-                    ));
+                    return Err(pyo3::exceptions::PyRuntimeError::new_err("the computation ended without a result"));
                 }
             }
         }

@@ -72,9 +72,7 @@ fn run(
         (Some(step), None) => Steps::Size(number("step", &step)?),
         (None, Some(count)) => Steps::Count(count),
         (None, None) => {
-            return Err(value_error(
-                "neither `step` nor `steps` is given: the length or the number of the integrator's steps",
-            ));
+            return Err(value_error("neither `step` nor `steps` is given: give the length or the number of the steps"));
         }
     };
     let start = Start { t: first, q: numbers("q0", &q)?, velocity, z: number("z0", &z)? };

@@ -41,9 +41,10 @@ pub enum Operand {
 
 pub fn no_number() -> PyErr {
     PyTypeError::new_err(
-        "control flow on a traced value: the function is called once, with symbols in place of numbers, so that `if`, `and`, \
-         `while`, `min`, `float`, the functions of `math` and splines of SciPy cannot see a value; write np.where(a < b, x, y) or \
-         hz.where, np.minimum, np.maximum, and functions of NumPy; a spline as its pieces by hz.where, np.polyval or np.interp",
+        "control flow on a traced value: the function is called once, with symbols in place of numbers, so that `if`, \
+         `and`, `while`, `min`, `float`, the functions of `math` and splines of SciPy have no value to work with; use \
+         np.where(a < b, x, y) or hz.where, np.minimum, np.maximum and functions of NumPy, and write a spline as \
+         pieces with hz.where, np.polyval or np.interp",
     )
 }
 
@@ -54,7 +55,8 @@ impl Symbol {
             let symbol = symbol.get();
             if !Arc::ptr_eq(&symbol.shared.0, &self.shared.0) {
                 return Err(PyValueError::new_err(
-                    "a traced value was kept from another call: make all that a function uses of its own arguments",
+                    "a traced value was kept from another call: a function must compute all its values from its own \
+                     arguments",
                 ));
             }
             return Ok(Operand::Node(symbol.id));
@@ -65,7 +67,9 @@ impl Symbol {
         }
         let x: f64 = other.extract()?;
         if !x.is_finite() {
-            return Err(PyValueError::new_err(format!("a traced function has the number {x}, which is not finite")));
+            return Err(PyValueError::new_err(format!(
+                "a traced function contains the number {x}, which is not finite: use finite numbers"
+            )));
         }
         Ok(Operand::Node(self.shared.graph().number(x)))
     }

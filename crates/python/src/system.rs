@@ -29,7 +29,8 @@ fn texts(of: &[String]) -> Vec<&str> {
 pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
     let Some(of) = of else { return Ok(Vec::new()) };
     let pair = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        let name: String = name.extract().map_err(|_| value_error("a name in `parameters` is no text"))?;
+        let name: String =
+            name.extract().map_err(|_| value_error("a name in `parameters` is not a string: give names as strings"))?;
         let value = crate::arrays::number(&format!("parameters[{name:?}]"), &value)?;
         Ok((name, value))
     };

@@ -103,10 +103,10 @@ def test_what_is_wrong_is_said_with_the_argument():
         (dict(step=None), "neither `step` nor `steps` is given"),
         (dict(steps=3), "`step` and `steps` are both given"),
         (dict(step=-0.1), "`step` is -0.1"),
-        (dict(v0=np.zeros(19)), r"`v0` has the shape \(19,\), where `q0` has \(20,\)"),
-        (dict(v0=None), "give `v0` or `p0`"),
+        (dict(v0=np.zeros(19)), r"`v0` has the shape \(19,\), but `q0` has \(20,\)"),
+        (dict(v0=None), "give either `v0` or `p0`"),
         (dict(q0=np.full(20, np.nan)), r"`q0\[0\]` is NaN"),
-        (dict(q0="abc"), "`q0` is no array of real numbers"),
+        (dict(q0="abc"), "`q0` must be an array of real numbers"),
         (dict(q0=None), "`q0` is not given"),
         (dict(t=None), "`t` is not given"),
         (dict(t=[0.0, 2.0, 1.0]), "the time t = 2 of row 1 is out of order"),
@@ -116,7 +116,7 @@ def test_what_is_wrong_is_said_with_the_argument():
     ]:
         with pytest.raises(ValueError, match=message):
             hz.lattice(**(good | change))
-    with pytest.raises(ValueError, match=r"`q0` has the shape \(2, 3\), where a row for each of the 3 bodies"):
+    with pytest.raises(ValueError, match=r"`q0` has the shape \(2, 3\); it must have a row for each of the 3 bodies"):
         hz.bodies([1, 1, 1], np.zeros((2, 3)), 0.0, 1.0, step=0.1)
     with pytest.raises(ValueError, match="`masses` has 0 for body 1"):
         hz.bodies([1, 0], np.eye(2), 0.0, 1.0, step=0.1)

@@ -72,7 +72,7 @@ def test_maps_and_points_are_checked():
             hz.is_contact(identity, at)
     with pytest.raises(ValueError, match="tuple"):
         hz.is_contact(lambda q, p, z: q, ([1.0], [1.0], 0.0))
-    with pytest.raises(ValueError, match="where there are 1"):
+    with pytest.raises(ValueError, match="but there are 1"):
         hz.is_contact(lambda q, p, z: (np.concatenate([q, q]), p, z), ([1.0], [1.0], 0.0))
 
 

@@ -30,7 +30,7 @@ SAID = {
     "all velocities": (formula("v^2/2"), "the velocities are `x'` and so on"),
     "a velocity by its name elsewhere": (formula("xdot^2/2 - x^2"), "did you mean `x'`?"),
     "the rate of the action": (formula("x'^2/2 - z'"), "the rate of `z` is the Lagrangian itself"),
-    "a second derivative": (formula("x'^2/2 + x*x''"), "write L of `x` and `x'` alone"),
+    "a second derivative": (formula("x'^2/2 + x*x''"), "write L in terms of `x` and `x'`"),
     "a product of vectors": (formula("v@v/2"), r"written `sum\(i, 0, n-1"),
     "a function of NumPy in a text": (formula("x'^2/2 + np.cos(x)"), r"write `sin\(x\)` for `np.sin\(x\)`"),
     "np.interp with a period": (
@@ -55,21 +55,21 @@ SAID = {
     "a direction of SciPy": (GOOD | dict(events=hz.Event("x", -1)), 'the direction -1 of the event "x".*write "falling"'),
     "the other direction of SciPy": (GOOD | dict(events=hz.Event("x", 1)), 'write "rising"'),
     "no direction of SciPy": (GOOD | dict(events=hz.Event("x", 0)), 'write "both"'),
-    "steps as a float": (GOOD | dict(integrator="gauss_4", steps=1e3), "`steps` is 1000.0, where an integer.*write 1000"),
-    "negative steps": (GOOD | dict(integrator="gauss_4", steps=-1), "`steps` is -1, where an integer of at least 1"),
-    "no steps": (GOOD | dict(integrator="gauss_4", steps=0), "`steps` is 0, where an integer of at least 1"),
-    "half a step": (GOOD | dict(integrator="gauss_4", steps=2.5), "`steps` is 2.5, where an integer"),
-    "a text of steps": (GOOD | dict(integrator="gauss_4", steps="10"), "`steps` is '10', where an integer"),
-    "too many steps": (GOOD | dict(integrator="gauss_4", steps=10**30), "`steps` is 1000000.*where an integer"),
+    "steps as a float": (GOOD | dict(integrator="gauss_4", steps=1e3), "`steps` is 1000.0; it must be an integer.*write 1000"),
+    "negative steps": (GOOD | dict(integrator="gauss_4", steps=-1), "`steps` is -1; it must be an integer of at least 1"),
+    "no steps": (GOOD | dict(integrator="gauss_4", steps=0), "`steps` is 0; it must be an integer of at least 1"),
+    "half a step": (GOOD | dict(integrator="gauss_4", steps=2.5), "`steps` is 2.5; it must be an integer"),
+    "a text of steps": (GOOD | dict(integrator="gauss_4", steps="10"), "`steps` is '10'; it must be an integer"),
+    "too many steps": (GOOD | dict(integrator="gauss_4", steps=10**30), "`steps` is 1000000.*must be an integer"),
     "true steps": (GOOD | dict(integrator="gauss_4", steps=True), "`steps` is True"),
     "rows every float": (GOOD | dict(integrator="gauss_4", steps=10, every=2.0), "`every` is 2.0.*write 2"),
-    "rows every -1": (GOOD | dict(integrator="gauss_4", steps=10, every=-1), "`every` is -1, where an integer"),
-    "an integrator by its number": (GOOD | dict(integrator=8), "`integrator` is 8, where a text is needed"),
+    "rows every -1": (GOOD | dict(integrator="gauss_4", steps=10, every=-1), "`every` is -1; it must be an integer"),
+    "an integrator by its number": (GOOD | dict(integrator=8), "`integrator` is 8; it must be a string"),
     "a class for an integrator": (GOOD | dict(integrator="RK45"), '"RK45"'),
     "observers in a list": (GOOD | dict(observe=["x^2"]), r"`observe` is \['x\^2'\].*observe=\{"),
     "an observer alone": (GOOD | dict(observe="x^2"), r"`observe` is 'x\^2'.*observe=\{"),
     "parameters in a list": (GOOD | dict(parameters=[("gamma", -0.1)]), r"`parameters` is \[.*parameters=\{"),
-    "a time transformation": (GOOD | dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
+    "a time transformation": (GOOD | dict(integrator="transformed_gauss_8", step=0.1), "not available for a formula or a function"),
     "a claim": (formula("x'^2/2 + x^2*x'^2", integrator="strang", step=0.1), "not separable"),
     "too exact": (GOOD | dict(accuracy=1e-40), "is not reached.*round-off"),
     "something too fast": (
@@ -93,11 +93,11 @@ def test_an_ensemble_says_the_same():
     many = dict(L=FORMULA, q0=np.ones((3, 1)), v0=np.zeros((3, 1)), t=1.0, coordinates=["x"], parameters={"gamma": -0.1})
     for change, said in [
         (dict(integrator="gauss_4", steps=1e3), "`steps` is 1000.0.*write 1000"),
-        (dict(threads=0), "`threads` is 0, where an integer"),
+        (dict(threads=0), "`threads` is 0; it must be an integer"),
         (dict(threads=2.0), "`threads` is 2.0.*write 2"),
         (dict(events=hz.Event("x", -1)), 'write "falling"'),
         (dict(observe=["x"]), "`observe`"),
-        (dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
+        (dict(integrator="transformed_gauss_8", step=0.1), "not available for a formula or a function"),
     ]:
         with pytest.raises(ValueError, match=said) as caught:
             hz.ensemble(**(many | change))

@@ -65,7 +65,7 @@ def test_bad_arguments_are_named():
     for change, said in [
         (dict(q1=[1.0, 2.0]), "`q1` has 2 numbers"),
         (dict(q0=[0.0, 1.0]), "`q0` has 2 numbers"),
-        (dict(steps=1), "`steps` is 1, where an integer of at least 2"),
+        (dict(steps=1), "`steps` is 1; it must be an integer of at least 2"),
         (dict(steps=4e1), "`steps` is 40.0.*write 40"),
         (dict(integrator="blanes_moan_6"), "no discrete Lagrangian.*gauss_4"),
         (dict(integrator="gauss_99"), "gauss_99"),

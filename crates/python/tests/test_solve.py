@@ -121,7 +121,7 @@ def test_evaluations_are_counted():
 
 def test_a_plan_is_in_words():
     plan = hz.solve(FORMULA, [1.0], [0.0], 5.0, accuracy=1e-8, **OSCILLATOR).plan
-    assert "it is proved from the formula" in str(plan) and plan.integrator in str(plan)
+    assert "the structure is proved from the formula" in str(plan) and plan.integrator in str(plan)
     assert plan.steps > 0 and plan.error < 1e-8
 
 

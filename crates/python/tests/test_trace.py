@@ -127,7 +127,7 @@ def test_what_is_not_traced_says_so():
         hz.solve(lambda t, q, v, z: v @ v - np.floor(q[0]), [1.0], [0.0], 1.0)
     with pytest.raises(ValueError, match=r"shape \(1,\)"):
         hz.solve(lambda t, q, v, z: v * v, [1.0], [0.0], 1.0)
-    with pytest.raises(ValueError, match="does it return"):
+    with pytest.raises(ValueError, match="check its return"):
         hz.solve(lambda t, q, v, z: None, [1.0], [0.0], 1.0)
     with pytest.raises(ValueError, match="parameter 'k'"):
         hz.solve(lambda t, q, v, z, k: k * v @ v, [1.0], [0.0], 1.0)

@@ -118,12 +118,12 @@ fn input_errors() {
     let kepler = Kepler::<2>::default();
     let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
     every!(InputError, "discrete-herglotz/src/error.rs" {
-        InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite number and not 0", "positive where the end of the run tells"];
-        InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(f64::INFINITY)).err().unwrap(), ["is inf;", "finite and not 0", "negative to go back"];
+        InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite nonzero number", "positive if the end of the run gives"];
+        InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(f64::INFINITY)).err().unwrap(), ["is inf;", "finite and nonzero", "negative for a run backward"];
         InputError::Accuracy { .. } => {
             let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).accuracy(1e-17);
             run.plan(Until::Time(5.5)).err().unwrap()
-        }, ["1e-17", "ask for less"];
+        }, ["1e-17", "request a larger error"];
         InputError::Tolerance { .. } => problem.accuracy(-0.5).plan(Until::Time(5.5)).err().unwrap(), ["-0.5", "positive and finite"];
         InputError::Scale { .. } => problem.accuracy(0.5).scales([-2.5]).plan(Until::Time(5.5)).err().unwrap(), ["coordinate 0", "-2.5", "positive and finite"];
         InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
@@ -133,7 +133,7 @@ fn input_errors() {
             let asked = || true;
             let interrupted = problem.with_interrupt(Interrupt::when(&asked));
             interrupted.accuracy(1e-6).plan(Until::Time(5.5)).err().unwrap()
-        }, ["the trial runs were interrupted", "run it again", "give a step"];
+        }, ["the trial runs were interrupted", "run again", "give a step"];
         InputError::AnotherRun => {
             let path = std::env::temp_dir().join(format!("another_run_{}", std::process::id()));
             let mut saved = Checkpoint::every(1, &path).unwrap();
@@ -141,15 +141,15 @@ fn input_errors() {
             let interrupted = ResumeState::read(&path).unwrap();
             std::fs::remove_file(path).unwrap();
             problem.steps(Steps::Count(2)).resume(interrupted).run(Until::Time(5.5)).unwrap_err()
-        }, ["not the one that was interrupted", "same problem"];
+        }, ["differs from the interrupted one", "same problem"];
         InputError::Unsaved => {
             let mut saved = Checkpoint::every(1, std::env::temp_dir().join("never_written")).unwrap();
             problem.by(Minimal).steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap_err()
-        }, ["cannot be saved", "leave the checkpoint out", "`restore`"];
+        }, ["cannot be saved", "remove the checkpoint", "`restore`"];
         InputError::Times { .. } => {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
-        }, ["t = 7.25", "row 1", "outside of the run's span", "in the order of the run"];
+        }, ["t = 7.25", "row 1", "outside of the span of the run", "in the direction of the run"];
         InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
         InputError::TimeTransformation { .. } => {
@@ -157,7 +157,7 @@ fn input_errors() {
             gauss.transformed_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
-        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "= 0", "at least 1"];
+        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "is 0", "at least 1"];
         InputError::PathLength { .. } => {
             let ends = [End::Position([0.0].into()), End::Free];
             let path = DiscretePath::new(vec![[0.0].into(); 3]).unwrap();
@@ -173,7 +173,7 @@ fn input_errors() {
         InputError::Unclaimed { .. } => {
             Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
         }, ["separable", "claim it", "another method"];
-        InputError::FalseClaim { .. } => Problem::new(&FalselyQuadratic, 0.0, start).err().unwrap(), ["quadratic", "is not", "size"];
+        InputError::FalseClaim { .. } => Problem::new(&FalselyQuadratic, 0.0, start).err().unwrap(), ["quadratic", "does not hold", "size"];
         InputError::SwitchingUnstated => {
             let problem = Problem::new(&Unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
             problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
@@ -181,14 +181,14 @@ fn input_errors() {
         InputError::Hypothesis { .. } => {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
-        }, ["needs a composition", "another method"];
+        }, ["requires a composition", "another method"];
         InputError::NoTimeTransformation => {
             AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
-        }, ["states a time transformation", "another method"];
+        }, ["declares a time transformation", "another integrator"];
         InputError::FirstStep(_) => {
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
             Flow::new(&Rectangle::new(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()
-        }, ["no first step", "not finite"];
+        }, ["the first step fails", "not finite"];
     });
 }
 
@@ -247,11 +247,11 @@ fn selection_failures() {
         }
     };
     every!(SelectionFailure, "discrete-herglotz/src/error.rs" {
-        SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
-        SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
-        SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
+        SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
+        SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
+        SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];
         SelectionFailure::DefectBetweenNodes { .. } => failure(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        SelectionFailure::FeatureAtNodes { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
+        SelectionFailure::FeatureAtNodes { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one more step", "with the ends of the steps", "end the span before it"];
         SelectionFailure::StepFailed { .. } => failure(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
         SelectionFailure::Unresolved { .. } => failure(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
         SelectionFailure::Budget => failure(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];

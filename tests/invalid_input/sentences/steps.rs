@@ -99,7 +99,7 @@ fn step_errors() {
         StepError::ConjugatePoint { .. } => {
             let ld = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: 0.0 }, std::f64::consts::PI).unwrap();
             ld.jet(0.0, &DiscretePoint::new([0.3], [0.5], 0.0)).unwrap_err()
-        }, ["conjugate", "singular value", "another step"];
+        }, ["conjugate", "singular value", "another size"];
         StepError::StageFactor { .. } => {
             let gauss = Gauss::new(FreeParticle { gamma: -40.0 }, 3, 1.0).unwrap();
             match gauss.stepper(0.0, pendulum_at(0.5), guess).err() {
@@ -111,7 +111,7 @@ fn step_errors() {
             let gauss = Gauss::new(Branching, 4, 0.5).unwrap();
             let start = PhasePoint::new([0.0], [1.0], 0.0);
             gauss.stepper(0.0, start, [1.0].into()).unwrap().without_newton().advance(3).unwrap_err().cause
-        }, ["lanes that differ", "if_less"];
+        }, ["differs between SIMD lanes", "if_less"];
         StepError::Event { .. } => {
             let pendulum = Pendulum::default();
             let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
@@ -130,10 +130,10 @@ fn step_errors() {
                 Status::Failed { cause, .. } => cause,
                 other => panic!("{other:?}"),
             }
-        }, ["cannot be divided into parts", "near t = ", "allow a larger one"];
+        }, ["cannot be divided into parts", "near t = ", "allow a larger defect"];
         StepError::Switching { .. } => {
             Switching::Restless(std::cell::Cell::new(false)).fails()
-        }, ["without end", "smooth the kink"];
+        }, ["too often", "smooth the kink"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
@@ -163,7 +163,7 @@ fn statuses() {
             // run.
             let problem = Problem::new(&QuadraticAtFirst, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
             problem.steps(Steps::Count(1000)).run(Until::Time(10.0)).unwrap().status
-        }, ["unreliable: after step ", "not quadratic", "correct its structure"];
+        }, ["unreliable: after step ", "`quadratic`", "correct its `structure`"];
         Status::Failed { .. } => {
             let run = blows_up.by(AnyIntegrator::Discrete(Method::LeftMidpoint)).steps(Steps::Size(0.01));
             run.run(Until::Steps(4000)).unwrap().status

@@ -190,7 +190,7 @@ fn main() -> ExitCode {
 
 fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, rates: bool) {
     println!("{} members: {} completed, {} failed", tally.members, tally.completed, tally.failed);
-    println!("{resumed} shards from the checkpoint");
+    println!("{resumed} shards read from the checkpoint");
     if !rates {
         return;
     }
@@ -200,9 +200,6 @@ fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, ra
     let received: usize = traffic.shards.iter().skip(1).sum();
     let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
     println!("bytes of a shard received: {}", traffic.bytes / received.max(1));
-    println!(
-        "microseconds of rank 0 to receive a shard and hand out the next: {:.1}",
-        micro(traffic.messages, received)
-    );
+    println!("microseconds of rank 0 to receive a shard and assign the next: {:.1}", micro(traffic.messages, received));
     println!("microseconds of rank 0 to merge a shard: {:.1}", micro(traffic.merging, all));
 }

@@ -60,7 +60,7 @@ fn forms_and_reeb_fields() -> Result<(), Failure> {
     text += &describe("eta- on Q x Q x R", &EtaMinus(jets), &points.into())?;
     text += &describe("eta+ on Q x Q x R", &EtaPlus(jets), &points.into())?;
     let sigma = ld.jet(t, &points)?.sigma();
-    text += &format!("\n  eta+ = sigma_d eta- with sigma_d = {sigma:.5}: compare the two last rows.\n");
+    text += &format!("\n  The last two rows satisfy eta+ = sigma_d eta- with sigma_d = {sigma:.5}.\n");
     print(&text)
 }
 
@@ -118,8 +118,9 @@ fn which_maps_are_contact() -> Result<(), Failure> {
     let system = Pendulum { gamma: -0.1 };
     let hamiltonian = Hamiltonian(system);
     let start: PhasePoint<1> = legendre(&system, 0.0, &system.initial());
-    let mut text =
-        String::from("\nIs a step of the damped pendulum contact? F* eta = sigma eta up to a relative defect\n\n");
+    let mut text = String::from(
+        "\nConformal factor of a step F of the damped pendulum, and the relative defect of F* eta = sigma eta\n\n",
+    );
     text += &format!(
         "  {:>6} {:>12}   {:>12} {:>9}   {:>12} {:>9}   {:>12} {:>9}   {:>12} {:>9}\n",
         "", "exact flow", "Strang", "", "midpoint", "", "left midpoint", "", "Runge-Kutta 4", ""

@@ -86,7 +86,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         "{steps} steps of h = {h}: {status}\n\
          state at t = {:.2}: q = ({:.6}, {:.6}), p = ({:.6}, {:.6}), z = {:.6}\n\
          smallest conformal factor of a step: {smallest:.9}\n\
-         angular momentum: from {:.6} to {:.6}; at most {defect:.1e} (relative) from the product of the factors\n\
+         angular momentum: from {:.6} to {:.6}; relative deviation from the product of the factors at most \
+         {defect:.1e}\n\
          table and figure are in {}\n",
         end.t,
         end.q[0],

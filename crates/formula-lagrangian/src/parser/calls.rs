@@ -33,9 +33,8 @@ impl<'a> Parser<'a> {
             (_, Some(operation), [a, b]) => self.graph.binary(operation, *a, *b),
             (None, None, [a]) => self.inverse(name == "asin", *a),
             (_, operation, found) => {
-                let wanted = if operation.is_some() { "two" } else { "one" };
-                let message = format!("`{name}` has {wanted} of arguments, not {}", found.len());
-                return Err(self.error(word, message.replace("one of arguments", "one argument").replace(" of ", " ")));
+                let arguments = if operation.is_some() { "two arguments" } else { "one argument" };
+                return Err(self.error(word, format!("`{name}` takes {arguments}, not {}", found.len())));
             }
         };
         self.check_number(value, word)?;

@@ -41,7 +41,7 @@ pub(crate) enum Command {
     /// Run the motion of a scene, or find its path between two ends: writes rows.csv and events.csv, and prints the
     /// final state.
     Run(run::Run),
-    /// Print what will be computed and what is skipped, and what is proved of the formula.
+    /// Print what will be computed and what is skipped, and which properties of the formula are proved.
     Plan(plan::Plan),
     /// Check whether the motion is contact: conformal factors, momenta, Herglotz' equation, and the theorems of the
     /// discrete theory; the exit code is 1 if not.

@@ -58,7 +58,7 @@ fn template(entry: &CatalogueEntry) -> Result<String, Failure> {
     );
     let t = if entry.t == 0.0 { String::new() } else { format!("t = {}\n", number(entry.t)) };
     Ok(format!(
-        r#"# {about}. Run it by `herglotz run FILE`; `herglotz plan FILE` says what will be computed.
+        r#"# {about}. Run it by `herglotz run FILE`; `herglotz plan FILE` prints what will be computed.
 version = 1
 
 [system]
@@ -70,7 +70,7 @@ parameters = {{ {parameters} }}
 [start]
 {q}
 {v}
-{t}# p_{first} instead of a velocity starts from momenta; z and t are 0 if they are not given.
+{t}# p_{first} instead of a velocity starts from momenta; z and t default to 0.
 
 [run]
 time = {time}
@@ -78,12 +78,12 @@ accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integra
 
 [want]
 # Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state.
-# energy is v L_v - L (a drag gamma*z is in it as -gamma*z), p_{first} a momentum, log_factor the integral of L_z, sigma its exponential.
+# energy is v L_v - L (a drag gamma*z contributes -gamma*z), p_{first} a momentum, log_factor the integral of L_z, sigma its exponential.
 rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "energy", "log_factor", "{first}^2"] }}
 # The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
-# columns = ["..."] are recorded at each beside the state, from = TIME leaves out what is before it.
+# columns = ["..."] are recorded at each event in addition to the state; from = TIME skips earlier events.
 events = [{{ when = "{first}", direction = "rising" }}]
-# wrap = ["{first}"] would show an angle from -pi to pi in pictures.
+# wrap = ["{first}"] shows an angle between -pi and pi in figures.
 
 # For `herglotz sweep FILE`.
 [sweep]

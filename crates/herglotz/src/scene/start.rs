@@ -94,7 +94,7 @@ pub(crate) fn read(
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    complete(text, given(text, keys(formula), "a start", table)?, &formula.coordinates(), entry, at)
+    complete(text, given(text, keys(formula), "the start", table)?, &formula.coordinates(), entry, at)
 }
 
 /// The ends of a path: the times, the positions, and the action of the start.

@@ -99,7 +99,7 @@ fn columns_of_events_after_an_interruption() {
     assert_eq!(crate::support::fail(&[&parts[..], &["--interrupt-at", "0.5"]].concat()).0, Some(1));
     let other = at.write("other.toml", &damped.replace("7*a", "8*a"));
     let (code, told) = crate::support::fail(&["run", &other, "--out", &at.path("parts"), "--resume"]);
-    assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
+    assert!(code == Some(2) && told.contains("the scene differs from that of the interrupted run"), "{told}");
     succeed(&[&parts[..], &["--resume"]].concat());
     let events = at.read("whole/events.csv");
     assert_eq!(events, at.read("parts/events.csv"));
@@ -124,34 +124,38 @@ fn events_of_a_motion_that_runs_backward() {
 #[test]
 fn wrong_columns_and_times_of_events_are_refused() {
     let changes = [
-        ("from = 30.0", "from = nan", "line 18, column 8: `from` is NaN, where a finite number is needed"),
-        ("from = 30.0", "from = 300.0", "line 18, column 8: the time 300 is not between 0, at which the motion starts"),
+        ("from = 30.0", "from = nan", "line 18, column 8: `from` is NaN; it must be a finite number"),
+        (
+            "from = 30.0",
+            "from = 300.0",
+            "line 18, column 8: the time 300 is outside of the motion, which runs from 0 to",
+        ),
         (
             "from = 30.0",
             "from = 30.0\nterminal = true",
-            "line 18, column 8: a terminal event counts from the start; leave out `from` or `terminal`",
+            "line 18, column 8: a terminal event is detected from the start; remove `from` or `terminal`",
         ),
         ("\"energy\"", "\"enrgy\"", "line 19, column 13: unknown name `enrgy`; did you mean `energy`?"),
-        ("\"energy\"", "\"theta'\"", "line 19, column 12: every event has `theta'` already"),
-        ("\"energy\"", "\"event = theta\"", "line 19, column 12: every event has `event` already"),
+        ("\"energy\"", "\"theta'\"", "line 19, column 12: every event already has the column `theta'`"),
+        ("\"energy\"", "\"event = theta\"", "line 19, column 12: every event already has the column `event`"),
         ("\"energy\"", "\"turns = t\"", "line 19, column 25: the event has two columns `turns`"),
         (
             "a*cos(theta)\"",
             "a*cos(theta) - 0.1*z^2\"|\"energy\"|\"sigma\"",
-            "line 19, column 12: `sigma` and `log_factor` are known at events where L_z is constant alone",
+            "line 19, column 12: `sigma` and `log_factor` are known at events only if L_z is constant",
         ),
         (
             "a*cos(theta)\"",
             "a*cos(theta) - 0.1*z^2\"|sin(theta - 1)|log_factor + 1",
-            "line 16, column 8: `sigma` and `log_factor` are known at events where L_z is constant alone",
+            "line 16, column 8: `sigma` and `log_factor` are known at events only if L_z is constant",
         ),
         (
             "wrap = [\"theta\", \"phase\"]",
             "wrap = [\"thta\"]",
-            "line 14, column 9: there is no column `thta` to be folded; there are theta, t, theta', p_theta, z, energy, turns, p_theta - theta', phase; \
+            "line 14, column 9: unknown column `thta` in `wrap`; the columns are theta, t, theta', p_theta, z, energy, turns, p_theta - theta', phase; \
              did you mean `theta`?",
         ),
-        ("a = 1.0 }", "a = 1.0, b = 2.0 }", "line 4, column 25: the parameter `b` is not in the Lagrangian"),
+        ("a = 1.0 }", "a = 1.0, b = 2.0 }", "line 4, column 25: the parameter `b` is not used in the Lagrangian"),
     ];
     refuses_each(TURNING, &changes, |text| Scene::read(text).err().map(|error| error.to_string()));
     // A parameter that occurs only in a column counts as used.

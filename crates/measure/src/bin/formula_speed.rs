@@ -185,6 +185,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.5)).run(Until::Steps(1))?;
         times.push(begin.elapsed().as_secs_f64());
     }
-    println!("from the text of the pendulum to the end of the first step: {:.3} ms", median(&mut times) * 1e3);
+    println!("time from the text of the pendulum to the end of its first step: {:.3} ms", median(&mut times) * 1e3);
     Ok(())
 }

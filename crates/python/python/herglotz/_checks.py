@@ -62,8 +62,8 @@ class Contact(NamedTuple):
         if self.is_contact:
             return f"contact: F*(dz - p dq) = sigma (dz - p dq), sigma = {self.sigma!r}, to {self.defect:.1e}"
         if self.sigma == 0.0:
-            return "not contact: sigma is 0, F*(dz - p dq) has lost the form"
-        return f"not contact: F*(dz - p dq) departs from {self.sigma!r} (dz - p dq) by {self.defect:.1e} of its size"
+            return "not contact: sigma is 0, so that F*(dz - p dq) is not a contact form"
+        return f"not contact: F*(dz - p dq) differs from {self.sigma!r} (dz - p dq) by {self.defect:.1e} of its size"
 
 
 def is_contact(map, at, *, tolerance=1e-9):
@@ -93,7 +93,7 @@ def is_contact(map, at, *, tolerance=1e-9):
         raise ValueError("`at` must be a point (q, p, z)") from None
     n = np.size(q)
     if n == 0:
-        raise ValueError("`at` has a q without coordinates")
+        raise ValueError("`at` has an empty q: give at least one coordinate")
     components = _trace.components_of(map, n)
     sigma, defect, image, jacobian = _core.conformality(components, (q, p, z))
     # NaN does not count as contact, and neither does the factor 0, with which the pullback is not a contact form.
@@ -128,10 +128,10 @@ class Check(NamedTuple):
 def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
     L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
     if (v0 is None) == (p0 is None):
-        raise ValueError("give `v0` or `p0`, one of them")
+        raise ValueError("give either `v0` or `p0`")
     start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
     if t is None:
-        raise ValueError("`t` is not given: the end of the motion")
+        raise ValueError("`t` is not given: give the final time")
     return _core.Motion(L, start, t, None, way, [], [], False, False, None)
 
 

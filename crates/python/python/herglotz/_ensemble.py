@@ -63,7 +63,7 @@ def ensemble(
         A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
     if parameters is not None and not hasattr(parameters, "items"):
-        raise ValueError(f"`parameters` is {parameters!r}, where values by name are needed: parameters={{\"gamma\": -0.1}}")
+        raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     parameters = dict(parameters or {})
     varied = {name: value for name, value in parameters.items() if np.ndim(value)}
     # The formula needs some value of each parameter; any of the member's values will do.
@@ -72,12 +72,12 @@ def ensemble(
         for name, value in parameters.items()
     }
     if np.ndim(q0) != 2:
-        raise ValueError(f"`q0` has {np.ndim(q0)} dimensions, where the shape (M, n) is needed: a row for each member")
+        raise ValueError(f"`q0` has {np.ndim(q0)} dimensions; it must have the shape (M, n), with a row for each member")
     system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed)
     if t is None:
-        raise ValueError("`t` is not given: the end, or times")
+        raise ValueError("`t` is not given: give the final time, or several times")
     if (v0 is None) == (p0 is None):
-        raise ValueError("give `v0` or `p0`, one of them")
+        raise ValueError("give either `v0` or `p0`")
     given = events_of(events, system) if events else []
     columns = columns_of(observe, system)
     if parameters:

@@ -93,7 +93,7 @@ def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coord
     """
     L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters)
     if np.ndim(t) > 1 or np.size(t) != 2 and np.ndim(t) == 1:
-        raise ValueError(f"`t` is {t!r}, where the time of the end is needed, or (t0, t1)")
+        raise ValueError(f"`t` is {t!r}; it must be the final time, or (t0, t1)")
     t0, t1 = (0.0, t) if np.ndim(t) == 0 else t
     record = _core.search_path(L, copied(q0), copied(q1), (t0, t1), steps, integrator, z0, guess)
     return Path(L, np.linspace(t0, t1, steps + 1), record)

@@ -121,7 +121,10 @@ class Solution:
                 return array[:, of.index(name)]
         if name in ("t", "z", "energy", "log_factor"):
             return getattr(self, name)
-        raise KeyError(f"{name!r}: give it to `solve` as observe={{{name!r}: ...}}; there are {self._names()}")
+        raise KeyError(
+            f"there is no column {name!r}: add it to `solve` with observe={{{name!r}: ...}}; the columns are "
+            f"{self._names()}"
+        )
 
     def _names(self):
         return [*self.system.coordinates, *_core.velocity_names(self.system.given_coordinates)[1], *self._observed]
@@ -175,13 +178,13 @@ class Solution:
 
         at, q, p, z, v = self._end
         if z is None:
-            raise ValueError("the motion has no action to go on from")
+            raise ValueError("the motion has no action from which it can continue")
         if t is None:
             asked = np.atleast_1d(np.asarray(self._request[1], dtype=float))
             start = asked[0] if len(asked) > 1 else 0.0
             t = asked[asked > at] if asked[-1] > start else asked[asked < at]
             if len(t) == 0:
-                raise ValueError("the motion has reached its end: give `t`, a later one")
+                raise ValueError("the motion has reached its end: give a later `t`")
         times = np.array(t, dtype=float, ndmin=1)
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])

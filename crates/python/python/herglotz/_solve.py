@@ -81,9 +81,9 @@ def solve(
     if type(L) is not _core.System or parameters is not None or q0 is None:
         L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
     if t is None:
-        raise ValueError("`t` is not given: the end, or the times of the rows")
+        raise ValueError("`t` is not given: give the final time, or the times of the rows")
     if (v0 is None) == (p0 is None):
-        raise ValueError("give `v0` or `p0`, one of them")
+        raise ValueError("give either `v0` or `p0`")
     request = (
         (copied(q0), copied(v0), False, z0, None) if p0 is None else (copied(q0), copied(p0), True, z0, None),
         copied(t),
@@ -120,7 +120,7 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters):
         if q0 is None and v0 is None and p0 is None:
             q0, v0 = entry[5], entry[6]
     if q0 is None:
-        raise ValueError("`q0` is not given: the position of the start")
+        raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1
     return system(L, coordinates, parameters, n=n), q0, v0
 
@@ -156,7 +156,7 @@ def columns_of(observe, L):
     if not observe:
         return []
     if not hasattr(observe, "values"):
-        raise ValueError(f'`observe` is {observe!r}, where expressions by name are needed: observe={{"square": "x^2"}}')
+        raise ValueError(f'`observe` is {observe!r}; it must give expressions by name, as in observe={{"square": "x^2"}}')
     return [expression(column, L) for column in observe.values()]
 
 

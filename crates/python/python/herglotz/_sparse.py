@@ -81,7 +81,7 @@ class SparseSolution:
         if t is None:
             t = asked[asked > at] if asked[-1] > start else asked[asked < at]
             if len(t) == 0:
-                raise ValueError("the motion has reached its end: give `t`, a later one")
+                raise ValueError("the motion has reached its end: give a later `t`")
         times = np.array(t, dtype=float, ndmin=1)
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
@@ -189,7 +189,7 @@ def lattice(
     sizes = q0.shape
     if len(coordinates) > 1:
         if sizes[-1:] != (len(coordinates),):
-            raise ValueError(f"`q0` has the shape {sizes}, where the last axis is to have {len(coordinates)} coordinates")
+            raise ValueError(f"`q0` has the shape {sizes}; its last axis must have the {len(coordinates)} coordinates of a site")
         sizes = sizes[:-1]
     parameters = dict(parameters) if parameters else None
     run = functools.partial(_run_lattice, (coordinates, site, bond), sizes, boundary, parameters)
@@ -257,7 +257,7 @@ def bodies(
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     masses = _array("masses", masses)
     if q0.ndim != 2 or len(q0) != len(masses):
-        raise ValueError(f"`q0` has the shape {q0.shape}, where a row for each of the {len(masses)} bodies is needed")
+        raise ValueError(f"`q0` has the shape {q0.shape}; it must have a row for each of the {len(masses)} bodies")
     run = functools.partial(_run_bodies, masses, q0.shape[1], G, gamma)
     return _solution(run, request, q0.shape, True)
 
@@ -276,22 +276,22 @@ def _array(name, x):
     try:
         return np.array(x, dtype=float, ndmin=1)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"`{name}` is no array of real numbers: {error}") from None
+        raise ValueError(f"`{name}` must be an array of real numbers: {error}") from None
 
 
 def _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor):
     """The initial position with its shape, and the request in the form of the core."""
     if q0 is None:
-        raise ValueError("`q0` is not given: the position of the start")
+        raise ValueError("`q0` is not given: give the initial position")
     if t is None:
-        raise ValueError("`t` is not given: the end, or the times of the rows")
+        raise ValueError("`t` is not given: give the final time, or the times of the rows")
     if (v0 is None) == (p0 is None):
-        raise ValueError("give `v0` or `p0`, one of them")
+        raise ValueError("give either `v0` or `p0`")
     q0 = _array("q0", q0)
     name, rate = ("v0", v0) if p0 is None else ("p0", p0)
     of_all, rate = np.ndim(rate) == 0, _array(name, rate)
     if not of_all and rate.shape != q0.shape:
-        raise ValueError(f"`{name}` has the shape {rate.shape}, where `q0` has {q0.shape}")
+        raise ValueError(f"`{name}` has the shape {rate.shape}, but `q0` has {q0.shape}")
     rate = np.broadcast_to(rate, q0.shape).ravel()
     way = integrator, step, steps
     return q0, ((q0.ravel(), rate, p0 is not None, z0), copied(t), every, way, conformal_factor)

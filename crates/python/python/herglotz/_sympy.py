@@ -17,13 +17,13 @@ def formula_of_expression(L, coordinates, parameters):
     functions = _functions(L)
     if coordinates is None:
         if not functions:
-            raise ValueError("`coordinates` is not given: the symbols that are coordinates, as [x, y]")
+            raise ValueError("`coordinates` is not given: give the symbols that are coordinates, such as [x, y]")
         coordinates = [f for f in functions if f.has(sympy.Symbol("t")) and any(d.expr == f for d in L.atoms(sympy.Derivative))]
         if len(coordinates) < len(functions):
             others = _shown(f for f in functions if f not in coordinates)
             raise ValueError(
-                f"the expression has the functions {_shown(functions)}, and not all have a velocity: give those that are coordinates, "
-                f"as coordinates=[{_shown(coordinates or functions[:1])}], and write {others} out as expressions of t"
+                f"the expression has the functions {_shown(functions)}, some of them without a velocity: give those that are coordinates, "
+                f"as in coordinates=[{_shown(coordinates or functions[:1])}], and write {others} out as expressions of t"
             )
     given = [sympy.Symbol(c) if isinstance(c, str) else c for c in coordinates]
     _check(L, given, functions)
@@ -55,17 +55,17 @@ def _check(L, coordinates, functions):
     for derivative in L.atoms(sympy.Derivative):
         if derivative.expr in coordinates and derivative.derivative_count > 1:
             raise ValueError(
-                f"{derivative} is a second derivative, which no Lagrangian of Herglotz' principle has: write L of "
-                f"{derivative.expr} and its first derivative alone"
+                f"{derivative} is a second derivative, on which a Lagrangian cannot depend: write L in terms of "
+                f"{derivative.expr} and its first derivative"
             )
     for f in functions:
         if f not in coordinates and _name(f) == "z":
-            raise ValueError(f"the action is {f} in the expression, where it is the symbol `z`, whose rate is L itself")
+            raise ValueError(f"the expression uses {f} for the action: use the symbol `z`, whose time derivative is L itself")
     others = [f for f in functions if f not in coordinates]
     if others:
         names = ", ".join(f"`{f}`" for f in others)
         raise ValueError(
-            f"the expression has {names}, neither coordinate nor known function: write it out as an expression of t, or give it as a "
+            f"the expression contains {names}, neither coordinate nor known function: write it out as an expression of t, or give it as a "
             "coordinate"
         )
 
@@ -93,7 +93,7 @@ def _text(L, coordinates, parameters):
     if unknown:
         names = ", ".join(sorted(f"`{symbol}`" for symbol in unknown))
         raise ValueError(
-            f"the expression has {names}, neither coordinate nor parameter: give coordinates=[...] and parameters={{...}}; "
+            f"the expression contains {names}, neither coordinate nor parameter: give coordinates=[...] and parameters={{...}}; "
             "the velocity of x is `xdot`, or the derivative of x(t)"
         )
     function = sympy.lambdify([t, positions, velocities, z, *values], L, modules="numpy", dummify=True)

@@ -35,7 +35,7 @@ def system(L, coordinates=None, parameters=None, *, n=None):
     System
     """
     if parameters is not None and not hasattr(parameters, "keys"):
-        raise ValueError(f"`parameters` is {parameters!r}, where values by name are needed: parameters={{\"gamma\": -0.1}}")
+        raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     if isinstance(L, _core.System):
         return L.with_parameters(parameters) if parameters else L
     if isinstance(coordinates, str):
@@ -50,7 +50,7 @@ def system(L, coordinates=None, parameters=None, *, n=None):
         from ._sympy import formula_of_expression
 
         return _of_text(*formula_of_expression(L, coordinates, parameters), parameters, n)
-    raise TypeError(f"L is a {type(L).__name__}, where a function, a formula, a SymPy expression or a System is needed")
+    raise TypeError(f"L is a {type(L).__name__}; it must be a function, a formula, a SymPy expression or a System")
 
 
 _velocity_names = functools.lru_cache(256)(
@@ -67,7 +67,7 @@ def expression(of, system):
         return _trace.formula_of(
             of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters))
         )
-    raise ValueError(f"{of!r} is no expression: give a text, or a function of (t, q, v, z)")
+    raise ValueError(f"{of!r} is not an expression: give a string, or a function of (t, q, v, z)")
 
 
 def check_parameters(system, given, L, expressions):
@@ -82,8 +82,8 @@ def check_parameters(system, given, L, expressions):
             continue
         names = sorted({*known, *own})
         near = difflib.get_close_matches(str(name), names, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(map(repr, names)) or 'none'}"
-        raise ValueError(f"the parameter {name!r} is not in the Lagrangian, nor in an event or a column: {hint}")
+        hint = f"did you mean {near[0]!r}?" if near else f"the formulas use {', '.join(map(repr, names)) or 'no parameters'}"
+        raise ValueError(f"the parameter {name!r} is not used in the Lagrangian, an event or a column: {hint}")
 
 
 def copied(x):
@@ -98,7 +98,7 @@ def names(coordinates, n):
     if coordinates is not None:
         return list(coordinates)
     if n is None:
-        raise ValueError('`coordinates` is not given: their names, as ["x", "y"], or "q[3]" for three')
+        raise ValueError('`coordinates` is not given: give their names, such as ["x", "y"], or "q[3]" for three')
     return [f"q[{n}]"]
 
 

@@ -120,8 +120,8 @@ def apply(ufunc, method, inputs, kwargs):
     out = kwargs.pop("out", None)
     known = _UFUNCS.get(ufunc) or (ufunc if ufunc in _OWN else None)
     if known is None:
-        hint = "it jumps: write its pieces by hz.where" if ufunc.__name__ in _JUMPING else "write it out"
-        raise TypeError(f"np.{ufunc.__name__} is not known of a traced value: {hint}")
+        hint = "it is discontinuous: write its pieces with hz.where" if ufunc.__name__ in _JUMPING else "write it out"
+        raise TypeError(f"np.{ufunc.__name__} is not supported for traced values: {hint}")
     found = getattr(known, method)(*map(_plain, inputs), **kwargs)
     if out is not None:
         out[0][...] = found
@@ -145,14 +145,14 @@ def where(condition, x, y):
 def _norm(x, ord=None, axis=None, keepdims=False):
     x = np.asanyarray(x)
     if x.ndim > 1 and axis is None and ord is not None:
-        raise TypeError("np.linalg.norm of a traced matrix is known for ord=None alone")
+        raise TypeError("np.linalg.norm of a traced matrix supports only ord=None")
     if ord in (None, 2):
         return np.sqrt(np.sum(x * x, axis=axis, keepdims=keepdims))
     if ord == 1:
         return np.sum(np.abs(x), axis=axis, keepdims=keepdims)
     if ord == np.inf:
         return np.max(np.abs(x), axis=axis, keepdims=keepdims)
-    raise TypeError(f"np.linalg.norm with ord={ord} is not known of a traced value: take None, 1, 2 or inf")
+    raise TypeError(f"np.linalg.norm with ord={ord} is not supported for traced values: use None, 1, 2 or inf")
 
 
 def _select(condlist, choicelist, default=0):
@@ -170,13 +170,13 @@ def _clip(a, a_min=None, a_max=None, **kwargs):
 
 def _interp(x, xp, fp, left=None, right=None, period=None):
     if period is not None:
-        raise TypeError("np.interp with a period is not known of a traced value: write its pieces by hz.where")
+        raise TypeError("np.interp with a period is not supported for traced values: write its pieces with hz.where")
     try:
         xp, fp = np.asarray(xp, float), np.asarray(fp, float)
     except TypeError:
-        raise TypeError("np.interp of traced knots is not known: write its pieces by hz.where") from None
+        raise TypeError("np.interp does not support traced knots: write its pieces with hz.where") from None
     if xp.ndim != 1 or xp.shape != fp.shape or len(xp) == 0 or not np.all(np.diff(xp) > 0):
-        raise ValueError("np.interp of a traced value needs as many values as knots, and knots that rise")
+        raise ValueError("np.interp of a traced value requires increasing knots, and one value for each knot")
     x = x if isinstance(x, Symbol) else array(x)
     found = fp[-1] if right is None else _where(x > xp[-1], right, fp[-1])
     for k in reversed(range(len(xp) - 1)):
@@ -220,7 +220,7 @@ def call(func, args, kwargs):
         module = func.__module__.removeprefix("numpy").lstrip(".")
         name = f"np.{module}.{func.__name__}" if module else f"np.{func.__name__}"
         raise TypeError(
-            f"{name} is not known of a traced value: write it out by sums, products and functions of numbers, as np.sin"
+            f"{name} is not supported for traced values: write it out with sums, products and functions such as np.sin"
         ) from error
 
 
@@ -255,11 +255,11 @@ def components_of(function, n):
     _, q, p, z, _ = symbols(n, 0)
     found = function(_vector(q), _vector(p), z)
     if not isinstance(found, (tuple, list)) or len(found) != 3:
-        raise ValueError(f"{_name(function)} gives {found!r}, where a tuple (q, p, z) is needed")
+        raise ValueError(f"{_name(function)} returns {found!r}; it must return a tuple (q, p, z)")
     found = list(np.ravel(np.array(found[0], dtype=object))), list(np.ravel(np.array(found[1], dtype=object))), found[2]
     for what, x in (("q", found[0]), ("p", found[1])):
         if len(x) != n:
-            raise ValueError(f"{_name(function)} gives a {what} of {len(x)} numbers, where there are {n} coordinates")
+            raise ValueError(f"{_name(function)} returns a {what} with {len(x)} numbers, but there are {n} coordinates")
     return [value_text(x, function, (*names, [])) for x in (*found[0], *found[1], found[2])]
 
 
@@ -287,14 +287,14 @@ def value_text(value, function, names):
     if isinstance(value, np.ndarray):
         if value.ndim:
             raise ValueError(
-                f"{_name(function)} gives an array of shape {value.shape}, where a number is needed: take a component, or a sum"
+                f"{_name(function)} returns an array of shape {value.shape}; it must return a number: take a component, or a sum"
             )
         value = value[()]
     if isinstance(value, Symbol):
         return value.text(*names)
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         return repr(float(value))
-    raise ValueError(f"{_name(function)} gives {value!r}, where a number is needed: does it return?")
+    raise ValueError(f"{_name(function)} returns {value!r}; it must return a number: check its return statement")
 
 
 __all__ = ["Traced", "array", "formula_of", "velocity_names", "where"]

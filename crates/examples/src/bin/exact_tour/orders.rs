@@ -107,7 +107,9 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
     figure(out)?;
 
     let mut text = format!(
-        "\nOrders against the exact discrete Lagrangian: lowest and highest slope over the catalogue\n\n  {:<16}{:>16}{:>16}{:>16}{:>16}\n",
+        "\nOrders of the difference from the exact discrete Lagrangian: lowest and highest slope over the \
+         catalogue\n\n  \
+         {:<16}{:>16}{:>16}{:>16}{:>16}\n",
         "method", "|L_d - L_h^e|", "F-", "F+", "flow, one step"
     );
     let mut methods: Vec<&str> = rows.iter().map(|r| r.method).collect();
@@ -126,9 +128,13 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
         }
         text += "\n";
     }
-    text += "\n  For a method of order r the value and the flow show r + 1, as the theory has it, the Legendre transforms only r:\n  \
-             they are derivatives of L_d - L_h^e = h^(r+1) C(q0, u, z0) in q0 and q1, and u = (q1 - q0)/h brings a factor 1/h. The\n  \
-             flow gains it back: in F+ o (F-)^-1 the two errors cancel to leading order (Patrick and Cuell, 2009).\n";
+    text += "\n  \
+             For a method of order r the value and the flow have order r + 1, as the theory states, and the Legendre \
+             transforms\n  \
+             order r: they are derivatives of L_d - L_h^e = h^(r+1) C(q0, u, z0) in q0 and q1, where u = (q1 - q0)/h \
+             contributes\n  \
+             a factor 1/h. In the flow F+ o (F-)^-1 the two errors cancel to leading order (Patrick and Cuell, \
+             2009).\n";
     Ok(text)
 }
 

@@ -113,9 +113,9 @@ fn differences(slow: &[Row], fast: &[Row]) -> Panel {
         y: Axis::Logarithmic(-8, 2, 2),
         legend: (0.04, 0.97),
         curves: vec![
-            Curve::new("left midpoint, above h = 1, below h = 0.1", Line::Solid, left(slow)),
+            Curve::new("left midpoint: h = 1 (upper), h = 0.1 (lower)", Line::Solid, left(slow)),
             Curve::unnamed(Line::Solid, left(fast)),
-            Curve::new("midpoint, above h = 1, below h = 0.1", Line::DashDot, middle(slow)),
+            Curve::new("midpoint: h = 1 (upper), h = 0.1 (lower)", Line::DashDot, middle(slow)),
             Curve::unnamed(Line::DashDot, middle(fast)),
         ],
         marks: Vec::new(),

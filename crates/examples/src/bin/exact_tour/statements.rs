@@ -94,13 +94,14 @@ pub fn tables(checks: &Checks) -> String {
         format!("  {name:<40}{entries}\n")
     };
     let mut text = String::from(
-        "The statements of section 4: worst residual over the catalogue, in units of the condition of the motion, by h\n\n",
+        "The statements of section 4: largest residual over the catalogue, in units of the condition of the motion, \
+         for each h\n\n",
     );
     text += &header("statement");
     for statement in statements::STATEMENTS {
         text += &row(&format!("{:>2}  {}", statement.number(), statement.title()), &|s| s.statement == statement);
     }
-    text += "\nThe same for each system: worst over the statements\n\n";
+    text += "\nLargest residual over the statements of section 4 for each system, in the same units\n\n";
     text += &header("system");
     let mut systems: Vec<&str> = checks.iter().map(|(subject, _)| subject.system).collect();
     systems.sort_unstable();
@@ -114,7 +115,8 @@ pub fn tables(checks: &Checks) -> String {
 /// The loss of the velocity and its prediction, worst over the catalogue, as text.
 pub fn loss(losses: &[Loss]) -> String {
     let mut text = String::from(
-        "\nA velocity from two rounded positions, R_h^(e-) o exp_h: relative error, and what the condition of exp_h predicts\n\n",
+        "\nRelative error of a velocity computed from two rounded positions, R_h^(e-) o exp_h, and its prediction \
+         from the condition of exp_h\n\n",
     );
     let steps: Vec<f64> = (0..=8).rev().map(|k| 10f64.powi(-k)).collect();
     let row = |name: &str, of: &dyn Fn(&Loss) -> f64| {

@@ -214,8 +214,10 @@ impl Area {
     pub fn report(&self) -> String {
         let mut text = format!(
             "An area in phase space (area.svg, area.csv)\n\n  \
-             A disc of initial states (q, p) of the damped pendulum q'' = -sin q + gamma q', gamma = {}, is carried along over\n  \
-             {} time units. The motion contracts its area A by exactly e^(gamma t). The largest |A(t)/(A(0) e^(gamma t)) - 1|:\n\n",
+             A disc of initial states (q, p) of the damped pendulum q'' = -sin q + gamma q', gamma = {}, follows the \
+             motion over\n  \
+             {} time units. The motion contracts its area A by exactly e^(gamma t). The largest |A(t)/(A(0) e^(gamma \
+             t)) - 1|:\n\n",
             PENDULUM.gamma,
             time(STEPS)
         );
@@ -225,9 +227,10 @@ impl Area {
             (format!("classical Runge-Kutta, order 4, h = {STEP}"), 4, &self.classical),
             (finer, 4 * SUBSTEPS, &self.finer),
         ] {
-            text += &format!("    {method:<42} {forces:>2} forces a time unit   {:.1e}\n", carried.worst());
+            text += &format!("    {method:<42} {forces:>2} forces per time unit   {:.1e}\n", carried.worst());
         }
-        text + "\n  The defect of the splitting is round-off: its step contracts the area by e^(gamma h), however long h is.\n\n"
+        text + "\n  The defect of the splitting is round-off: its step contracts the area by e^(gamma h) for every \
+                h.\n\n"
     }
 
     /// Fails where the splitting has more than round-off.

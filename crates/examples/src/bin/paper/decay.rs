@@ -147,7 +147,7 @@ pub fn angular_momentum(out: &Directory) -> Result<(), Failure> {
         curves: vec![
             Curve::new("left midpoint, from J(0) exp(γt)", Line::Solid, left[1..].iter().map(deviation)),
             Curve::new("midpoint, from J(0) exp(γt)", Line::DashDot, middle[1..].iter().map(deviation)),
-            Curve::new("both, from the product of the σ", Line::Dotted, left[1..].iter().map(defect)),
+            Curve::new("both rules, from the product of the σ", Line::Dotted, left[1..].iter().map(defect)),
             Curve::unnamed(Line::Dotted, middle[1..].iter().map(defect)),
         ],
         marks: Vec::new(),

@@ -26,8 +26,9 @@ pub fn deviations(free: (&[Row], &[PublishedRow]), oscillator: (&[Row], &[Publis
     curves.extend(harmonic_oscillator(oscillator.0, oscillator.1));
     let mut text = String::from(
         "The curves of the paper's figures, gamma = -0.05, h = 0.5 (dimensionless)\n\
-         \x20 vs data:  largest deviation of this program's points from the published data (kept for the free particle)\n\
-         \x20 vs truth: largest distance of the curve from the true motion; for a solid one, the error of the method\n\n",
+         \x20 vs data:  largest deviation of this program's points from the published data (available for the free \
+         particle)\n\
+         \x20 vs truth: largest distance of the curve from the true motion; for a solid curve, the error of the method\n\n",
     );
     text += &format!("  {:<30} {:<48} {:>9} {:>9}\n", "curve", "reproduced by", "vs data", "vs truth");
     for Curve { name, formula, published, truth } in curves {
@@ -37,7 +38,9 @@ pub fn deviations(free: (&[Row], &[PublishedRow]), oscillator: (&[Row], &[Publis
     let apart =
         |rows: &[Row]| distance(rows.iter().map(|r| r.log_energy_midpoint), rows.iter().map(|r| r.log_hamiltonian));
     text += &format!(
-        "\n  The captions say ln H o F-L_d; the data are the logarithm of the midpoint energy. The two differ by up to\n  \
+        "\n  \
+         The captions state ln H o F-L_d, but the data are the logarithm of the midpoint energy. The two differ by up \
+         to\n  \
          {:.3} (free particle) and {:.3} (oscillator).\n",
         apart(free.0),
         apart(oscillator.0)
@@ -50,9 +53,14 @@ pub fn rounding(by_flow: &[f64]) -> String {
     let (data, solved) = (Fixture::q().discrete, solved_recurrence(by_flow.len()));
     let from_solution = |a: &[f64]| distance(a.iter().copied(), solved.iter().copied());
     format!(
-        "\n  The solid points of the free particle's q are those of the paper's explicit formula in double precision. Its\n  \
-         coefficients are rounded, so they and the published ones are {:.1e} from the solution of the discrete equations,\n  \
-         q_k = (q_1 - q_0) ((1 + h gamma)^k - 1)/(h gamma); the library's flow in (q, p, z) is {:.1e} from it.\n",
+        "\n  \
+         The solid points of the free particle's q are those of the paper's explicit formula in double precision. \
+         Its\n  \
+         coefficients are rounded, so that these points and the published ones differ by {:.1e} from the solution of \
+         the\n  \
+         discrete equations, q_k = (q_1 - q_0) ((1 + h gamma)^k - 1)/(h gamma). The library's flow in (q, p, z) \
+         differs from\n  \
+         this solution by {:.1e}.\n",
         from_solution(&data),
         from_solution(by_flow),
     )
@@ -104,7 +112,7 @@ fn harmonic_oscillator(rows: &[Row], published: &[PublishedRow]) -> Vec<Curve> {
     vec![
         curve("oscillator q, solid", rule, of(|r| r.q), |r| r.q_exact),
         curve("oscillator z, solid", rule, of(|r| r.z), |r| r.z_exact),
-        curve("oscillator ln H, solid", "the same, midpoint energy", of(|r| r.log_energy_midpoint), |r| {
+        curve("oscillator ln H, solid", "midpoint rule, midpoint energy", of(|r| r.log_energy_midpoint), |r| {
             r.log_hamiltonian_exact
         }),
         curve("oscillator q, dashed", "true motion", dashed(|r| r.q), |r| r.q_exact),
@@ -116,7 +124,7 @@ fn harmonic_oscillator(rows: &[Row], published: &[PublishedRow]) -> Vec<Curve> {
 /// For each theorem of section 3 the worst residual over the catalogue, and where it was met.
 pub fn theorems(checks: &Checks) -> String {
     let mut text = String::from(
-        "\nThe theorems of section 3: worst residual over the catalogue, relative to the size of its terms\n\n",
+        "\nThe theorems of section 3: largest residual over the catalogue, relative to the size of its terms\n\n",
     );
     text += &format!("  {:>2}  {:<42} {:>6} {:>9}  {}\n", "no", "statement", "checks", "residual", "worst at");
     for statement in Statement::ALL.into_iter().filter(|s| s.section().starts_with('3')) {
@@ -135,12 +143,17 @@ pub fn summary(area: &Area, checks: &Checks, out: &Path) -> String {
     let residual = checks.iter().map(|(_, residual)| residual).fold(0.0, max_or_nan);
     format!(
         "\nSummary: the files are in {}\n\n  \
-         area.svg, .csv                    an area in phase space contracts by e^(gamma t), to a relative {:.1e}\n  \
-         free_particle_*.svg, .csv         figures of the paper with the true motions; the first table compares both\n  \
-         harmonic_oscillator_*.svg, .csv   the same for the damped oscillator\n  \
-         conformal_factor.svg, .csv        the contact form contracts by the product of the sigma_d, the factors of the steps\n  \
-         angular_momentum.svg, .csv        so does the angular momentum of a Kepler orbit with drag\n  \
-         statements.csv                    {} statements of the paper in {} checks: largest residual {residual:.1e}, allowed {TOLERANCE:e}\n",
+         area.svg, .csv                    an area in phase space contracts by e^(gamma t), with a relative defect of \
+         {:.1e}\n  \
+         free_particle_*.svg, .csv         figures of the paper with the true motions; the first table compares \
+         both\n  \
+         harmonic_oscillator_*.svg, .csv   figures of the damped oscillator with the true motions\n  \
+         conformal_factor.svg, .csv        the contact form contracts by the product of the sigma_d, the factors of \
+         the steps\n  \
+         angular_momentum.svg, .csv        the angular momentum of a Kepler orbit with drag contracts by the same \
+         product\n  \
+         statements.csv                    {} statements of the paper in {} checks: largest residual {residual:.1e}, \
+         allowed {TOLERANCE:e}\n",
         out.display(),
         area.defect(),
         statements.len(),

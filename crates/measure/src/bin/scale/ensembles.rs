@@ -124,7 +124,7 @@ fn heyoka(report: &mut Report) -> Result<Vec<Peer>, Failure> {
     let (count, end, ..) = NEIGHBOURS;
     let input = format!("{:e}\n{count}\n{end}\n", PENDULUM.gamma);
     let Some(output) = python(include_str!("ensembles_heyoka.py"), &input)? else {
-        print("            heyoka is not there (python3 with the package heyoka): its times are those of its table\n")?;
+        print("            heyoka is not installed (python3 with the package heyoka); its tabulated times are used\n")?;
         return Ok(Vec::new());
     };
     let mut peers = Vec::new();
@@ -144,7 +144,7 @@ fn heyoka(report: &mut Report) -> Result<Vec<Peer>, Failure> {
 fn peer_time(peers: &[Peer], what: &str, accuracy: f64, by_table: f64) -> (f64, &'static str) {
     let found = peers.iter().filter(|peer| peer.what == what && peer.error <= accuracy).map(|peer| peer.seconds);
     let shortest = found.fold(f64::INFINITY, f64::min);
-    if shortest < f64::INFINITY { (shortest, "heyoka's time") } else { (by_table, "heyoka's tabulated time") }
+    if shortest < f64::INFINITY { (shortest, "the time of heyoka") } else { (by_table, "the tabulated time of heyoka") }
 }
 
 fn pendula(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {

@@ -75,7 +75,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     }
     let Some(theirs) = &theirs else {
         return print(
-            "            REBOUND is not there (python3 with the package rebound, and cc): nothing to compare with\n",
+            "            REBOUND is not installed (python3 with the package rebound, and cc); the comparison is \
+             skipped\n",
         );
     };
     for (error, seconds) in &theirs.runs {

@@ -240,20 +240,21 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let refused = that(&|f| matches!(f.verdict, Verdict::Refused | Verdict::Failed | Verdict::Unresolved));
     let solvable = that(&|f| f.solvable);
     report.say(&format!(
-        "  {all} random problems of {count} have a truth that is known to a twentieth of the tolerance\n"
+        "  {all} of {count} random problems have a reference that is known to a twentieth of the tolerance\n"
     ))?;
-    report.at_most("problems without such a truth, of all", 1.0 - all / count as f64, 0.2)?;
-    report.at_most("true error above the tolerance, of all", above / all, 0.01)?;
-    report.at_most("above ten times the tolerance, or no number, or a panic: count", bad, 0.0)?;
-    report.at_most("refused though the library solves it, of all", solvable / all, 0.02)?;
-    report.at_most("where dop853 sides with the run, not with the exact flow: count", that(&|f| f.doubt), 0.0)?;
+    report.at_most("problems without an accurate reference, share of all", 1.0 - all / count as f64, 0.2)?;
+    report.at_most("true error above the tolerance, share of all", above / all, 0.01)?;
+    report.at_most("error above ten times the tolerance, NaN or a panic: count", bad, 0.0)?;
+    report.at_most("refused although the library solves it, share of all", solvable / all, 0.02)?;
+    report.at_most("dop853 agrees with the run and not with the exact flow: count", that(&|f| f.doubt), 0.0)?;
     let of = |value: &dyn Fn(&Found) -> Option<f64>| known.iter().filter_map(|(_, f)| value(f)).collect::<Vec<f64>>();
     let planned = of(&|f| (f.named.is_none() && f.run.is_finite()).then_some(f.plan / f.run));
-    report.at_most_timed("time of plan and trial runs over the run's, median", quantile(&planned, 0.5), 4.0)?;
+    report.at_most_timed("time of plan and trial runs over that of the run, median", quantile(&planned, 0.5), 4.0)?;
     let ratios = of(&|f| Some(f.run / f.best?));
-    report.at_most_timed("time of the run over the best configuration's, median", quantile(&ratios, 0.5), 1.5)?;
+    report.at_most_timed("time of the run over that of the best configuration, median", quantile(&ratios, 0.5), 1.5)?;
     report.say(&format!(
-        "        plans: 10% {:.1}, 90% {:.1}; runs over the best: 10% {:.2}, 90% {:.2}, of {} compared\n",
+        "        time of the plan over that of the run: 10% {:.1}, 90% {:.1}; time of the run over the best: 10% \
+         {:.2}, 90% {:.2}, for {} runs\n",
         quantile(&planned, 0.1),
         quantile(&planned, 0.9),
         quantile(&ratios, 0.1),
@@ -273,13 +274,20 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         row[4] += f64::from(u8::from(f.solvable));
     }
     report.markdown(
-        &["tolerance", "problems", "above it", "above ten times", "refused", "of these solvable"],
+        &[
+            "tolerance",
+            "problems",
+            "above the tolerance",
+            "above ten times the tolerance",
+            "refused",
+            "refused but solvable",
+        ],
         decades.iter().rev().map(|(decade, row)| {
             let name = format!("1e{} .. 1e{decade}", decade + 1);
             [name].into_iter().chain(row.iter().map(|x| x.to_string())).collect()
         }),
     );
-    report.say(&format!("        {refused} refused in all\n"))?;
+    report.say(&format!("        {refused} refused in total\n"))?;
     report.table(
         &["problem", "dimension", "integrator", "tolerance", "worth", "error", "steps"],
         known.iter().map(|(i, f)| {
@@ -293,16 +301,16 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         of.map(|(_, f)| (f.tolerance, f.error)).collect::<Vec<_>>()
     };
     report.figure(&draw(&Panel {
-        x_label: "relative error asked for".into(),
+        x_label: "requested relative error".into(),
         y_label: "true relative error at the end".into(),
         x: Axis::Logarithmic(-12, -3, 1),
         y: Axis::Logarithmic(-17, 1, 2),
         legend: (0.03, 0.98),
         curves: vec![
-            Curve::new("what is asked for", Line::Dashed, [(1e-12, 1e-12), (1e-3, 1e-3)]),
-            Curve::new("ten times that", Line::Dotted, [(1e-12, 1e-11), (1e-3, 1e-2)]),
+            Curve::new("the requested error", Line::Dashed, [(1e-12, 1e-12), (1e-3, 1e-3)]),
+            Curve::new("ten times the requested error", Line::Dotted, [(1e-12, 1e-11), (1e-3, 1e-2)]),
             Curve::new("one degree of freedom", Line::Discs, points(1)),
-            Curve::new("two", Line::Crosses, points(2)),
+            Curve::new("two degrees of freedom", Line::Crosses, points(2)),
         ],
         marks: Vec::new(),
     }))

@@ -101,14 +101,14 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         of_family.iter().map(|(name, worst)| vec![name.clone(), format!("{worst:.1}")]),
     );
     report.figure(&draw(&Panel {
-        x_label: "time forward, and again back".into(),
+        x_label: "time forward and backward".into(),
         y_label: "distance from the start".into(),
         x: Axis::Logarithmic(0, 2, 1),
         y: Axis::Logarithmic(-16, 2, 2),
         legend: (0.03, 0.98),
         curves: vec![
-            Curve::new("gauss 8, forward and back", Line::Solid, points.iter().map(|p| (p.0, p.1))),
-            Curve::new("growth of a rounding", Line::Dotted, points.iter().map(|p| (p.0, p.2 * f64::EPSILON))),
+            Curve::new("gauss 8, forward and backward", Line::Solid, points.iter().map(|p| (p.0, p.1))),
+            Curve::new("growth of a rounding error", Line::Dotted, points.iter().map(|p| (p.0, p.2 * f64::EPSILON))),
         ],
         marks: Vec::new(),
     }))
@@ -155,7 +155,8 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
     let mut swinging = chaotic(0.0);
     swinging.rate = Rate::Swinging { size: -0.1, frequency: 0.9 };
     let acting = Formula::<2> { action: 0.1, ..chaotic(-0.05) };
-    let systems = [("drag", chaotic(-0.1)), ("drive", driven), ("swinging drag", swinging), ("acting z", acting)];
+    let systems =
+        [("drag", chaotic(-0.1)), ("drive", driven), ("oscillating drag", swinging), ("not affine in z", acting)];
     let start = VelocityPoint::new([0.3, -0.2], [0.9, 1.1], 0.1);
     let steps = 1001;
     let (mut again, mut pieces, mut recorded) = (0, 0, 0);
@@ -192,7 +193,7 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
         }
     }
     report.at_most("runs whose bits differ from those of the same run", f64::from(again), 0.0)?;
-    report.at_most("runs whose bits differ when they are advanced in pieces", f64::from(pieces), 0.0)?;
+    report.at_most("runs whose bits differ when they are advanced in parts", f64::from(pieces), 0.0)?;
     report.at_most("runs whose bits differ when rows or factors are recorded", f64::from(recorded), 0.0)
 }
 

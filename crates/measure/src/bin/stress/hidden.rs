@@ -150,18 +150,18 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         }
     }
     let unknown = found.iter().filter(|f| f.is_none()).count();
-    report.at_most("random hidden things without a known truth", unknown as f64, 0.0)?;
+    report.at_most("random features without a known reference", unknown as f64, 0.0)?;
     for (by, narrow, what) in [
-        ("to 1e-6", false, "hidden things"),
-        ("exact flow", false, "hidden things"),
-        ("to 1e-6", true, "hidden things narrower than a thousandth of the span"),
-        ("exact flow", true, "hidden things narrower than a thousandth of the span"),
+        ("to 1e-6", false, "features"),
+        ("exact flow", false, "features"),
+        ("to 1e-6", true, "features narrower than a thousandth of the span"),
+        ("exact flow", true, "features narrower than a thousandth of the span"),
     ] {
         let of = || tallies.iter().filter(|((who, thin, _), _)| (*who, *thin) == (by, narrow)).map(|(_, tally)| tally);
         let all: usize = of().flat_map(|tally| tally.values()).sum();
         // A quick run has no features that narrow.
         if all > 0 {
-            report.at_most(&format!("{what}, {by}: of {all} wrong in silence"), bad(of()), 0.0)?;
+            report.at_most(&format!("{what}, {by}: of {all} silently wrong"), bad(of()), 0.0)?;
         }
     }
     let named = |by: &str, narrow: bool, kind: usize| {
@@ -170,7 +170,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let mut lines: Vec<Vec<String>> =
         tallies.iter().map(|((by, narrow, kind), tally)| row(named(by, *narrow, *kind), tally)).collect();
     lines.extend(claims(report, &mut rows)?);
-    let columns: Vec<&str> = ["what is hidden"].into_iter().chain(COLUMNS).collect();
+    let columns: Vec<&str> = ["feature"].into_iter().chain(COLUMNS).collect();
     report.markdown(&columns, lines);
     report.table(&["what", "by", "width", "worth", "error"], rows)
 }
@@ -190,15 +190,18 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
     let (none, still) = (Force::None, Rate::Constant(-0.1));
     let lies = [
         (
-            "rate -0.3 cos t said constant",
+            "rate -0.3 cos t claimed constant",
             all(timed(Rate::Swinging { size: -0.3, frequency: 1.0 }, none), |c| c.constant_rate = true),
         ),
-        ("force 0.5 cos 0.7 t said steady", all(timed(still, Force::Swinging { size: 0.5, frequency: 0.7 }), steady)),
-        ("late force said steady", all(timed(still, Force::Pulse { size: 2.0, at: 5.0, width: 0.5 }), steady)),
-        ("late drag said constant", all(timed(Rate::Pulse { size: -2.0, at: 5.0, width: 0.5 }, none), steady)),
-        ("region of drag said affine", all(timed(Rate::Region { size: -1.0, at: -0.5, width: 0.02 }, none), affine)),
-        ("wall said quadratic", all(bump(Feature::Wall { width: 1.5 }), quadratic)),
-        ("hill said quadratic", all(bump(Feature::Hill { at: -0.8, width: 0.05, height: 2.0 }), quadratic)),
+        (
+            "force 0.5 cos 0.7 t claimed autonomous",
+            all(timed(still, Force::Swinging { size: 0.5, frequency: 0.7 }), steady),
+        ),
+        ("late force claimed autonomous", all(timed(still, Force::Pulse { size: 2.0, at: 5.0, width: 0.5 }), steady)),
+        ("late drag claimed constant", all(timed(Rate::Pulse { size: -2.0, at: 5.0, width: 0.5 }, none), steady)),
+        ("region of drag claimed affine", all(timed(Rate::Region { size: -1.0, at: -0.5, width: 0.02 }, none), affine)),
+        ("wall claimed quadratic", all(bump(Feature::Wall { width: 1.5 }), quadratic)),
+        ("hill claimed quadratic", all(bump(Feature::Hill { at: -0.8, width: 0.05, height: 2.0 }), quadratic)),
     ];
     let mut lines = Vec::new();
     let mut tallies = Vec::new();
@@ -229,7 +232,7 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
         lines.push(row(name.into(), &tally));
         tallies.push(tally);
     }
-    report.at_most("claims that are false later: runs wrong in silence", bad(&tallies), 0.0)?;
+    report.at_most("claims that are false later: runs silently wrong", bad(&tallies), 0.0)?;
     // True claims near the border of the domain of L.
     let mut refused = 0;
     for q in [0.0, 0.9, 0.99, 0.999, -0.999] {
@@ -248,7 +251,7 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
             ]);
         }
     }
-    report.at_most("true claims beside the border of a domain: refused", f64::from(refused), 0.0)?;
+    report.at_most("true claims next to the boundary of a domain: refused", f64::from(refused), 0.0)?;
     Ok(lines)
 }
 

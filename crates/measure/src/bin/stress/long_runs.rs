@@ -123,7 +123,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         }
         Ok(seen)
     });
-    report.say(&format!("  the long runs: {:.1} s\n", clock.elapsed().as_secs_f64()))?;
+    report.say(&format!("  time of the long runs: {:.1} s\n", clock.elapsed().as_secs_f64()))?;
     let (mut rows, mut curves) = (Vec::new(), Vec::new());
     for (i, (long, seen)) in all.iter().zip(found).enumerate() {
         let (seen, name) = (seen?, format!("{} by {}", long.name, long.integrator));
@@ -147,7 +147,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.table(&["run", "steps", "relative_error", "bound"], rows)?;
     report.figure(&draw(&Panel {
         x_label: "steps".into(),
-        y_label: "relative error; in grey its bound".into(),
+        y_label: "relative error, with its bound in grey".into(),
         x: Axis::Logarithmic(3, 9, 1),
         y: Axis::Logarithmic(-16, -9, 1),
         legend: (0.03, 0.98),
@@ -193,7 +193,7 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
                 // A random walk of relative rounding errors, and the rounding of the phase of the closed form.
                 let bound = ROUNDINGS * f64::EPSILON * (2000.0f64.sqrt() + 250.0);
                 let name = format!("decayed to {:.0e} by {integrator}", exact.q.amax());
-                report.at_most(&format!("{name}: error of what is left"), error, bound)?;
+                report.at_most(&format!("{name}: relative error of the state"), error, bound)?;
                 rows.push([name, "2000".into(), number(error), number(bound)].into());
             }
         }
@@ -203,9 +203,9 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
         slower.push(quantile(&times[11..], 0.5) / quantile(&times[..8], 0.5));
     }
     report.at_most("families that fail or give a NaN on the way to zero", f64::from(broken), 0.0)?;
-    report.at_most("what is left where e^-1000 is", left, 1e-300)?;
+    report.at_most("size of the state after a decay by e^-1000", left, 1e-300)?;
     report.at_most_timed(
-        "time of a step at zero over that of a step before, the slowest family",
+        "time of a step at zero over that of an earlier step, in the slowest family",
         max_abs_or_nan(slower),
         5.0,
     )

@@ -60,16 +60,16 @@ struct Arguments {
 type Case = (&'static str, &'static str, fn(&mut Report) -> Result<(), Failure>);
 
 const CASES: [Case; 10] = [
-    ("round_off", "how the round-off of what is conserved grows", round_off::run),
-    ("long_runs", "a thousand million steps, and decay to zero", long_runs::run),
+    ("round_off", "growth of the round-off of conserved quantities", round_off::run),
+    ("long_runs", "1e9 steps, and decay to zero", long_runs::run),
     ("damping", "damping, stiffness and unequal masses", damping::run),
     ("scales", "tiny and huge steps, states and times", scales::run),
-    ("near_singular", "beside what is singular", near_singular::run),
-    ("hidden", "what is hidden between the steps", hidden::run),
-    ("chaos", "forward and back, and the same bits", chaos::run),
-    ("conformal", "conformality for ever", conformal::run),
-    ("solvers", "solvers where they have it hard", solvers::run),
-    ("accuracy", "whether an accuracy that is asked for is kept", accuracy::run),
+    ("near_singular", "motions near singularities", near_singular::run),
+    ("hidden", "features between the steps", hidden::run),
+    ("chaos", "runs forward and backward, and bitwise repetition", chaos::run),
+    ("conformal", "conformality of long runs", conformal::run),
+    ("solvers", "difficult problems for the solvers", solvers::run),
+    ("accuracy", "whether the requested accuracy is reached", accuracy::run),
 ];
 
 fn main() -> ExitCode {
@@ -78,7 +78,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(name) = &arguments.probe {
-        return print(&probe::answer(name).unwrap_or_else(|| "no such call".into()));
+        return print(&probe::answer(name).unwrap_or_else(|| "unknown call".into()));
     }
     let names = CASES.map(|(name, ..)| name);
     let unknown = |name: &&String| name.as_str() != "all" && !names.contains(&name.as_str());

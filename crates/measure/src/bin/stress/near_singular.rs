@@ -23,7 +23,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     time_zero(report, &mut table)?;
     vanishing_sigma(report, &mut table)?;
     conjugate_points(report, &mut table)?;
-    report.at_most("all fixed steps near singularities: runs wrong in silence", bad([&table.tally]), 0.0)?;
+    report.at_most("all fixed steps near singularities: runs silently wrong", bad([&table.tally]), 0.0)?;
     report.table(&["what", "integrator", "parameter", "worth", "error"], table.rows)?;
     let grey = [1e2, 1e16].map(|c: f64| (c, c * f64::EPSILON));
     report.figure(&draw(&Panel {
@@ -100,9 +100,9 @@ fn mass_condition(report: &mut Report, table: &mut Table) -> Result<Points, Fail
             }
         }
     }
-    report.at_most("W of condition 1e2 .. 1e10: runs that are refused or marked", f64::from(refused), 0.0)?;
+    report.at_most("W of condition 1e2 .. 1e10: runs that are refused, halted or flagged", f64::from(refused), 0.0)?;
     // One rounding error of the momentum in each of 64 steps, amplified by the inverse of W.
-    report.at_most("the same: error of Gauss over the condition", worst, 64.0 * f64::EPSILON)?;
+    report.at_most("W of condition 1e2 .. 1e10: error of Gauss over the condition", worst, 64.0 * f64::EPSILON)?;
     Ok(points)
 }
 
@@ -160,7 +160,11 @@ fn fall(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         table.add("fall", integrator, count as f64, end.verdict(&exact, 0.0, ORDER_ONE), f64::NAN);
     }
     let through = u32::from(problem.exact().is_ok()) + u32::from(matches!(problem.to(1e-6), RunEnd::Completed(_)));
-    report.at_most("a fall into the centre by the exact flow and to an accuracy: that go on", f64::from(through), 0.0)
+    report.at_most(
+        "a fall into the centre by the exact flow and to an accuracy: runs that continue",
+        f64::from(through),
+        0.0,
+    )
 }
 
 /// Past a pole of the chart of the sphere: a great circle, on which the longitude changes abruptly.
@@ -250,7 +254,7 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             }
         }
     }
-    report.at_most("a drag 2/t from t = 0: families that begin and are wrong", f64::from(begun), 0.0)
+    report.at_most("a drag 2/t from t = 0: families that start and are wrong", f64::from(begun), 0.0)
 }
 
 /// Quadrature rules with `1 + h gamma`, which is sigma_d for rules explicit in z, close to zero and negative.
@@ -272,7 +276,7 @@ fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure
             table.add("sigma", integrator, left, verdict, error);
         }
     }
-    report.at_most("rules explicit in z with sigma_d <= 0: that go on", f64::from(beyond), 0.0)
+    report.at_most("rules explicit in z with sigma_d <= 0: runs that continue", f64::from(beyond), 0.0)
 }
 
 /// The initial velocity of the motion through two points that are almost conjugate.
@@ -308,6 +312,6 @@ fn conjugate_points(report: &mut Report, table: &mut Table) -> Result<(), Failur
             number(error),
         ]);
     }
-    report.at_most("velocities through almost conjugate points: wrong in silence", f64::from(silent), 0.0)?;
-    report.at_most("the same: roundings of the positions in the error", worst, 8.0)
+    report.at_most("velocities through almost conjugate points: silently wrong", f64::from(silent), 0.0)?;
+    report.at_most("velocities through almost conjugate points: roundings of the positions in the error", worst, 8.0)
 }

@@ -94,7 +94,7 @@ fn huge_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
             }
         }
     }
-    report.at_most("steps of 3 to 1000 time units: runs wrong in silence", bad([&tally]), 0.0)
+    report.at_most("steps of 3 to 1000 time units: runs silently wrong", bad([&tally]), 0.0)
 }
 
 /// From t0 = 1e9, an autonomous motion is the same to the last digit, and a driven one is accurate to the rounding of
@@ -150,5 +150,9 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
     }
     // For a state of 1e-160 the action and the energy underflow, since they are squares; (q, p) do not.
     report.at_most("an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: above 1e-8", bad([&tally]), 0.0)?;
-    report.at_most("the same: refused, though the end is a normal number", f64::from(refused), 0.0)
+    report.at_most(
+        "an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: refused although the end is a normal number",
+        f64::from(refused),
+        0.0,
+    )
 }

@@ -51,10 +51,10 @@ fn alone(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
         rows.push(row("alone", name, "-", ended.text(), f64::NAN));
         lines.push(vec![(*name).into(), right.join(" or "), ended.text().into()]);
     }
-    report.markdown(&["call", "right is", "found"], lines);
+    report.markdown(&["call", "right answer", "found"], lines);
     report.at_most("calls that crash", f64::from(crashed), 0.0)?;
     report.at_most("calls that do not end", f64::from(endless), 0.0)?;
-    report.at_most("calls that end with something else than what is right", f64::from(otherwise), 0.0)
+    report.at_most("calls that end with a wrong answer", f64::from(otherwise), 0.0)
 }
 
 /// First steps from guesses of the velocity that are far from the solution, where there is only one solution.
@@ -90,7 +90,7 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
             }
         }
     }
-    report.at_most("first steps from poor guesses of the velocity: wrong in silence", f64::from(wrong), 0.0)
+    report.at_most("first steps from poor guesses of the velocity: silently wrong", f64::from(wrong), 0.0)
 }
 
 /// The state after one step; `None` if the step fails.
@@ -124,7 +124,7 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
             rows.push(row("domain", &integrator.to_string(), &speed.to_string(), verdict.name(), error));
         }
     }
-    report.at_most("motions out of the domain of L: that go on in silence", f64::from(on), 0.0)?;
+    report.at_most("motions that leave the domain of L: silently continued", f64::from(on), 0.0)?;
     let mut silent = 0;
     for (at, slope) in [(0.3, 1.0), (0.0, 5.0), (-0.2, 100.0)] {
         let smooth = Smooth { spring: 1.0, ..Smooth::default() };
@@ -156,8 +156,8 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
             rows.push(row("kink", &integrator.to_string(), &slope.to_string(), verdict.name(), error));
         }
     }
-    report.at_most("motions over kinks: energy wrong by a tenth in silence", f64::from(silent), 0.0)?;
-    report.at_most("motions over kinks and borders: no number, or a panic", f64::from(broken), 0.0)
+    report.at_most("motions over kinks: energy silently wrong by a tenth", f64::from(silent), 0.0)?;
+    report.at_most("motions over kinks and boundaries of domains: NaN or a panic", f64::from(broken), 0.0)
 }
 
 /// The size from which faer solves the linear systems.
@@ -219,11 +219,11 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         }
     }
     report.at_most(
-        "matrices that are singular or no numbers and solved, or regular and refused",
+        "matrices that are singular or not finite and solved, or regular and refused",
         f64::from(wrong),
         0.0,
     )?;
-    report.at_most("residuals of the solved, over their terms", worst, 1e-13)
+    report.at_most("residuals of the solved systems, over the size of their terms", worst, 1e-13)
 }
 
 /// The time of a step whose stage iteration does not contract, relative to one whose iteration contracts.
@@ -244,14 +244,14 @@ fn price(report: &mut Report) -> Result<(), Failure> {
         let general = per_step(&|h| of_step(acting, plain, integrator, h));
         let coupled = per_step(&|h| of_step(coupled, pair, integrator, h));
         for (j, (name, times)) in
-            [("pendulum", pendulum), ("pendulum, acting z", general), ("pair", coupled)].into_iter().enumerate()
+            [("pendulum", pendulum), ("pendulum not affine in z", general), ("pair", coupled)].into_iter().enumerate()
         {
             let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, max_or_nan);
             // Zero if there is no such step.
             let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, max_or_nan);
-            for (which, of) in ["step that is taken", "step that is given up"].into_iter().enumerate() {
+            for (which, of) in ["successful step", "failed step"].into_iter().enumerate() {
                 report.at_most_timed(
-                    &format!("{integrator}, {name}: dearest {of} over the dearest that contracts"),
+                    &format!("{integrator}, {name}: slowest {of} over the slowest contracting step"),
                     dearest(which) / contracting,
                     MAX_TIME_RATIO,
                 )?;
@@ -265,7 +265,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
     }
     let svg = draw(&Panel {
         x_label: "step".into(),
-        y_label: "seconds a step".into(),
+        y_label: "seconds per step".into(),
         x: Axis::Logarithmic(-2, 2, 1),
         y: Axis::Logarithmic(-8, -1, 1),
         legend: (1.0, 1.0),

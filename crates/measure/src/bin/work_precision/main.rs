@@ -110,7 +110,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         print(&summary::of(problem, z, &rows))?;
     }
     print(&format!(
-        "\nRatios are times of the peer over ours: above 1, the library is the faster one.\n\
+        "\nA ratio is the time of the peer over that of the library: above 1, the library is faster.\n\
          Table and diagrams are in {}.\n",
         out.path().display()
     ))

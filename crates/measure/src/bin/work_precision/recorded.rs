@@ -52,8 +52,8 @@ pub fn read(path: &Path, peers: Peers) -> Result<Vec<Row>, Failure> {
             path: path.into(),
             cause,
             expected: format!(
-                "--peers takes a CSV file with the columns {}, where problem is a name, variant is z or noz, err_qv, \
-                 err_z, wall_med_s, nfev and nsteps are numbers, and status is ok for a good row",
+                "--peers requires a CSV file with the columns {}, where problem is a name, variant is z or noz, \
+                 err_qv, err_z, wall_med_s, nfev and nsteps are numbers, and status is ok for a valid row",
                 COLUMNS.join(",")
             ),
         },
@@ -94,16 +94,16 @@ fn parse(text: &str, peers: Peers) -> Result<Vec<Row>, String> {
 fn configuration(record: &csv::StringRecord, peers: Peers) -> Result<Option<Configuration>, String> {
     let field = |name: &str| {
         let place = COLUMNS.iter().position(|column| *column == name);
-        place.and_then(|i| record.get(i)).ok_or_else(|| format!("no {name}"))
+        place.and_then(|i| record.get(i)).ok_or_else(|| format!("the column {name} is missing"))
     };
     let number = |name: &str| {
         let text = field(name)?;
-        text.parse::<f64>().map_err(|_| format!("{name} is {text:?}, not a number"))
+        text.parse::<f64>().map_err(|_| format!("{name} is {text:?}; it must be a number"))
     };
     let z = match field("variant")? {
         "z" => Action::On,
         "noz" => Action::Off,
-        other => return Err(format!("variant is {other:?}, not z or noz")),
+        other => return Err(format!("variant is {other:?}; it must be z or noz")),
     };
     let (peer, error) = (field("peer")?, number("err_qv")?);
     let problem = field("problem")?;

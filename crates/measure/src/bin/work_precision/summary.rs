@@ -56,7 +56,7 @@ pub fn of(problem: &Problem, z: Action, rows: &[Row]) -> String {
     }
     text += &format!("{bests}\n");
     if floor.is_some() {
-        text += &format!("  * the best that {PEER} reached\n");
+        text += &format!("  * the smallest error that {PEER} reached\n");
     }
     text
 }
