@@ -88,7 +88,7 @@ fn geometry_errors() {
 fn exact_errors() {
     let oscillator = HarmonicOscillator { gamma: 0.0 };
     every!(ExactError<1>, "exact-lagrangian/src/error.rs" {
-        ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite number", "positive"];
+        ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite nonzero number", "positive"];
         ExactError::OutsideDomain { .. } => {
             herglotz_flow(&Explosive, 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()
         }, ["only until t = ", "smaller h", "another start"];

@@ -269,7 +269,7 @@ fn parameters_that_are_nowhere_are_refused() {
     let told = error.to_string();
     assert!(told.contains("line 4") && told.contains("`gama`") && told.contains("did you mean `gamma`?"), "{told}");
     let told = read(&with("gamma = -0.1, level = 1.0 }")).err().unwrap().to_string();
-    assert!(told.contains("there are gamma"), "{told}");
+    assert!(told.contains("the formulas use gamma"), "{told}");
     // A parameter whose name is only part of a longer name is unused.
     let levels = with("gamma = -0.1, level = 1.0, levels = 2.0 }").replace("exp(-0.1*t)*theta", "levels*theta");
     assert!(read(&levels).err().unwrap().to_string().contains("`level`"));

@@ -6,11 +6,12 @@ use crate::common::gauss::GaussSteppers;
 use crate::numbers::{Claiming, EXTREME, Everything, Grade, Numbers, Report, fine, grade, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, PhasePoint};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint};
 use discrete_herglotz::{
-    DiscreteLagrangian, InputError, SplittingScheme, Stepper,
+    DiscreteLagrangian, InputError, Problem, SplittingScheme, Start, Stepper, StepperOptions, Steps, TransformedGauss,
+    Until,
     checks::{EnergyDrift, EnergySample},
-    gauss::{Gauss, GaussRoute},
+    gauss::{Gauss, GaussRoute, GaussStepper, TransformedStepper},
     rules::{Composition, Flow, Midpoint},
     splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, Splitting},
 };
@@ -34,8 +35,8 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest {
         entries: &[
-            "Gauss::stepper",
-            "Gauss::stepper_without_action",
+            "Gauss::lagrangian",
+            "GaussStepper::new",
             "GaussStepper::without_newton",
             "GaussStepper::route",
             "GaussStepper::newton_steps",
@@ -48,7 +49,9 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest {
         entries: &[
-            "Gauss::transformed_stepper",
+            "TransformedGauss::new",
+            "TransformedGauss::with",
+            "TransformedStepper::new",
             "TransformedStepper::time_momentum",
             "TransformedStepper::advance_to",
             "Stepper::advance_until",
@@ -225,6 +228,10 @@ fn flows(report: &mut Report) {
     }
 }
 
+fn tame_start<L: Lagrangian<1>>(lagrangian: &L) -> Problem<'_, L, 1> {
+    Problem::new(lagrangian, 0.0, Start::Momentum(triples()[0].into(), SVector::from([1.0]))).unwrap()
+}
+
 fn gauss(report: &mut Report) {
     let general = Gauss::new(Everything, 5, 0.1).unwrap();
     let condensed = Gauss::new(Claiming, 5, 0.1).unwrap();
@@ -255,6 +262,12 @@ fn gauss(report: &mut Report) {
         report.formula(&t, fine(curve.at(t)));
         report.formula(&t, fine(curve.velocity(t)));
     }
+    let problem = tame_start(&Everything);
+    for (stages, h) in [0, 1, 16, 17, usize::MAX].into_iter().flat_map(|s| EXTREME.map(|h| (s, h))) {
+        let made = GaussStepper::new(&problem, stages, h, StepperOptions::default());
+        let good = (1..=16).contains(&stages) && h != 0.0 && h.is_finite();
+        report.check(good || made.is_err(), || format!("{stages} stages, h = {h}"));
+    }
     let back = Gauss::new(Everything, 5, -0.1).unwrap();
     let mut stepper = back.stepper(0.0, triples()[0].into(), one).unwrap();
     let span = stepper.advance(1).ok().and_then(|()| stepper.dense()).map(|curve| curve.span());
@@ -263,6 +276,18 @@ fn gauss(report: &mut Report) {
 
 fn transformed(report: &mut Report) {
     let kepler = Kepler::<2>::default();
+    let problem = Problem::new(&kepler, 0.0, PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0)).unwrap();
+    for (stages, h) in [0, 1, 16, 17, usize::MAX].into_iter().flat_map(|s| EXTREME.map(|h| (s, h))) {
+        let good = (1..=16).contains(&stages) && h != 0.0 && h.is_finite();
+        let clock = kepler.time_transformation();
+        let made = TransformedStepper::new(&problem, stages, h, clock).map(|stepper| stepper.time());
+        report.check(good || made.is_err(), || format!("{stages} stages, h = {h}"));
+        let own = problem.by(TransformedGauss::new(stages)).steps(Steps::Size(h)).run(Until::Steps(1)).is_err();
+        report.check(good || own, || format!("TransformedGauss::new({stages}), h = {h}"));
+        let by = TransformedGauss::with(stages, kepler.time_transformation());
+        let given = problem.by(by).steps(Steps::Size(h)).run(Until::Steps(1)).is_err();
+        report.check(good || given, || format!("TransformedGauss::with({stages}), h = {h}"));
+    }
     for (value, h) in EXTREME.into_iter().flat_map(|value| [(value, 0.2), (value, -0.2)]) {
         let gauss = Gauss::new(kepler, 4, h).unwrap();
         for x in [[value, 0.0, 0.0, 1.0], [1.0, value, 0.0, 1.0], [1.0, 0.0, value, 1.0], [value; 4]] {

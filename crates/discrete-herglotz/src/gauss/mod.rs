@@ -48,7 +48,7 @@ pub(crate) use tables::coefficients::MAX_STAGES;
 /// use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss};
 /// let ld = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
 /// let x = DiscretePoint::new([1.0, 0.5], [0.95, 0.5], 0.0);
-/// println!("L_d = {}, sigma_d = {}", ld.value(0.0, &x)?, ld.jet(0.0, &x)?.sigma);
+/// println!("L_d = {}, sigma_d = {}", ld.value(0.0, &x)?, ld.jet(0.0, &x)?.sigma());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

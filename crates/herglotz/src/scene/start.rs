@@ -188,7 +188,9 @@ fn all(
             let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
             let key = if bare { name.clone() } else { format!("\"{name}\"") };
             let table = if end == "end" { "ends" } else { "start" };
-            let message = format!("the {what} `{name}` has no {end}; add `{key} = 0.0` to [{table}], or another value");
+            let message = format!(
+                "the {what} `{name}` has no value at the {end}; add `{key} = 0.0` to [{table}], or another value"
+            );
             SceneError::at(text, at, message)
         })?);
     }
