@@ -2,7 +2,10 @@
 
 use crate::{Dispatch, MpiError};
 use contact_geom::Lagrangian;
-use discrete_herglotz::{Ensemble, Until, ensemble::{EnsembleError, Member, Merge, ShardedEnsemble, Tally}};
+use discrete_herglotz::{
+    Ensemble, Until,
+    ensemble::{EnsembleError, Member, Merge, ShardedEnsemble, Tally},
+};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use mpi::{Rank, Tag};
