@@ -222,7 +222,9 @@ impl Symbol {
             "arctan2" => Operation::Atan2,
             "hypot" => Operation::Hypot,
             _ => {
-                return Err(PyTypeError::new_err(format!("np.{name} is not supported for traced values: write it out")));
+                return Err(PyTypeError::new_err(format!(
+                    "np.{name} is not supported for traced values: write it out"
+                )));
             }
         };
         self.binary(operation, other, reversed)

@@ -1,7 +1,8 @@
 //! Contact Gauss collocation as an integrator.
 
+use crate::gauss::checks::check_stages;
 use crate::gauss::routes::transformed::StatedTransformation;
-use crate::gauss::{GaussStepper, MAX_STAGES, TransformedStepper};
+use crate::gauss::{GaussStepper, TransformedStepper};
 use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
 use contact_geom::{Lagrangian, TimeTransformation};
 
@@ -68,16 +69,6 @@ pub(crate) fn info(stages: usize, in_transformed_time: bool) -> MethodInfo {
         source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
             .into(),
     }
-}
-
-fn check_stages(stages: usize) -> Result<(), InputError> {
-    if (1..=MAX_STAGES).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
-}
-
-/// Checks a number of stages and a step.
-pub(crate) fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
-    check_stages(stages)?;
-    if h != 0.0 && h.is_finite() { Ok(()) } else { Err(InputError::Step { h }) }
 }
 
 fn check_transformed<L: Lagrangian<N>, const N: usize>(lagrangian: &L, stages: usize) -> Result<(), InputError> {

@@ -1,5 +1,6 @@
 //! Contact Gauss collocation.
 
+mod checks;
 mod dense;
 mod initial_mass;
 pub(crate) mod integrator;
@@ -70,7 +71,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        integrator::check_step(stages, h)?;
+        checks::check_step(stages, h)?;
         if N == 0 {
             return Err(InputError::Dimension);
         }

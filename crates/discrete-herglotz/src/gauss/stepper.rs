@@ -4,9 +4,9 @@ mod resolution;
 mod retries;
 mod state_words;
 
+use crate::gauss::checks::check_step;
 use crate::gauss::dense::{SolvedStep, StepStart};
 use crate::gauss::initial_mass::InitialMass;
-use crate::gauss::integrator::check_step;
 use crate::gauss::limits::{FIRST_NEWTON_PAUSE, MAX_LINEAR_DIMENSION};
 use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail;

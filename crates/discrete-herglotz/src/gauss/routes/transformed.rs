@@ -1,7 +1,7 @@
 //! Stepper of contact Gauss collocation with equal steps in transformed time.
 
+use crate::gauss::checks::check_step;
 use crate::gauss::initial_mass::InitialMass;
-use crate::gauss::integrator::check_step;
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::fixed_point::IterationOutcome;

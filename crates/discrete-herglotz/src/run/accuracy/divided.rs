@@ -30,18 +30,15 @@ pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
     let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, SelectionFailure::Budget);
     let mut coarse: Option<Track<N>> = None;
     for _ in 0..MAX_DIVISIONS {
-        let integrator = DividedGauss { stages: DIVIDED_STAGES, max_defect: max_defect };
-        let mut track = |max_defect: f64| match trials.divided(
-            DividedGauss { max_defect: max_defect, ..integrator },
-            count,
-            &grid,
-        )? {
-            TrialEnd::Completed(track) => Ok(Ok(track)),
-            TrialEnd::StepFailed { part, cause } => {
-                Ok(Err(SelectionFailure::StepFailed { t: t0 + part * span, cause }))
-            }
-            _ => Ok::<_, InputError>(Err(SelectionFailure::Budget)),
-        };
+        let integrator = DividedGauss { stages: DIVIDED_STAGES, max_defect };
+        let mut track =
+            |max_defect: f64| match trials.divided(DividedGauss { max_defect, ..integrator }, count, &grid)? {
+                TrialEnd::Completed(track) => Ok(Ok(track)),
+                TrialEnd::StepFailed { part, cause } => {
+                    Ok(Err(SelectionFailure::StepFailed { t: t0 + part * span, cause }))
+                }
+                _ => Ok::<_, InputError>(Err(SelectionFailure::Budget)),
+            };
         let first = match coarse.take() {
             Some(track) => Ok(track),
             None => track(max_defect)?,

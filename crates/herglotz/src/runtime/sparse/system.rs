@@ -2,7 +2,8 @@
 
 use sparse_herglotz::SparseSystem;
 
-/// A system of any number of coordinates as a sum of local terms: a [`Lattice`] or [`Bodies`], ready to be run.
+/// A system of any number of coordinates as a sum of local terms: a [`Lattice`](crate::runtime::Lattice) or
+/// [`Bodies`](crate::runtime::Bodies), ready to be run.
 ///
 /// ```
 /// use herglotz::runtime::{SiteMotion, Boundary, Lattice, Start, Steps};

@@ -173,7 +173,7 @@ mod tests {
         let error = line("1,P1,z,heyoka,taylor,1e-07,much,0,3e-05,1e-05,200,0,0,762,ok");
         assert_eq!(error, "line 2: err_qv is \"much\"; it must be a number");
         let error = line("1,P1,both,heyoka,taylor,1e-07,1e-9,0,3e-05,1e-05,200,0,0,762,ok");
-        assert_eq!(error, "line 2: variant is \"both\", not z or noz");
+        assert_eq!(error, "line 2: variant is \"both\"; it must be z or noz");
         assert!(line("1,P1,z").contains("line"));
     }
 
