@@ -55,9 +55,10 @@ pub mod support {
 }
 
 pub use dynamics::{
-    Defect, Defects, Derivatives, Energy, Force, Forced, HerglotzField, Hessian, Hints, Lagrangian, Legendre,
-    LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry, TimeTransformation,
-    WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, regularity,
+    Control, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints,
+    Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
+    TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
+    legendre_jacobian, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{

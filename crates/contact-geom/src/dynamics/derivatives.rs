@@ -29,10 +29,10 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     /// equations of motion `(L_v)' = L_q + f + L_z L_v` contain of first derivatives. For kernels.
     fn with_gradient_and_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>);
 
-    /// The value with the partial derivatives `L_q` alone, for kernels that need only the force.
+    /// The value with `L_q + f`, where f is the [applied force](Lagrangian::applied_force), for kernels.
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
 
-    /// `L_q` without the value, for kernels.
+    /// `L_q + f` without the value, for kernels.
     fn force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N>;
 
     /// `L_z` alone, for kernels.
@@ -90,40 +90,25 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     #[inline(always)]
     fn with_gradient_and_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>) {
         let (l, mut gradient) = self.with_gradient(t, x);
-        if const { Self::HINTS.forced } {
-            let force = self.applied_force(t, x);
-            for i in 0..N {
-                gradient.x[i] += force[i];
-            }
-        }
+        add_applied_force(self, t, x, &mut gradient.x);
         (l, gradient)
     }
 
     #[inline(always)]
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
-        if let Some(both) = self.closed_with_force(t, x) {
-            return both;
-        }
-        if const { Self::HINTS.proved } {
-            return (T::from(f64::NAN), missing::<T, N>().x);
-        }
-        if const { N > BLOCK } {
-            return blocks::with_force(self, t, x);
-        }
-        let mut q = still::<T, SVector<T, N>, N>(&x.q);
-        for i in 0..N {
-            q[i].d[i] = T::one();
-        }
-        let l = self.value(KernelDual::constant(t), &q, &still(&x.v), KernelDual::constant(x.z));
-        (l.re, l.d)
+        let (value, mut force) = with_lagrangian_force(self, t, x);
+        add_applied_force(self, t, x, &mut force);
+        (value, force)
     }
 
     #[inline(always)]
     fn force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        match self.closed_force(t, x) {
+        let mut force = match self.closed_force(t, x) {
             Some(force) => force,
-            None => self.with_force(t, x).1,
-        }
+            None => with_lagrangian_force(self, t, x).1,
+        };
+        add_applied_force(self, t, x, &mut force);
+        force
     }
 
     #[inline(always)]
@@ -255,5 +240,42 @@ pub fn derived_hessian<T: Scalar, const N: usize>(
         qz: SVector::from_fn(|i, _| g.x[i].d.z),
         vz: SVector::from_fn(|i, _| g.y[i].d.z),
         zz: g.z.d.z,
+    }
+}
+
+/// The value with `L_q`.
+#[inline(always)]
+fn with_lagrangian_force<L: Lagrangian<N> + ?Sized, T: Scalar, const N: usize>(
+    lagrangian: &L,
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> (T, SVector<T, N>) {
+    if let Some(both) = lagrangian.closed_with_force(t, x) {
+        return both;
+    }
+    if const { L::HINTS.proved } {
+        return (T::from(f64::NAN), missing::<T, N>().x);
+    }
+    if const { N > BLOCK } {
+        return blocks::with_force(lagrangian, t, x);
+    }
+    let mut q = still::<T, SVector<T, N>, N>(&x.q);
+    for i in 0..N {
+        q[i].d[i] = T::one();
+    }
+    let l = lagrangian.value(KernelDual::constant(t), &q, &still(&x.v), KernelDual::constant(x.z));
+    (l.re, l.d)
+}
+
+/// Adds the applied force, if there is one.
+#[inline(always)]
+pub(crate) fn add_applied_force<L: Lagrangian<N> + ?Sized, T: Scalar, const N: usize>(
+    lagrangian: &L,
+    t: T,
+    x: &VelocityPoint<N, T>,
+    to: &mut SVector<T, N>,
+) {
+    if const { L::HINTS.forced } {
+        *to += lagrangian.applied_force(t, x);
     }
 }

@@ -1,6 +1,7 @@
 //! Forces that no Lagrangian contains.
 
-use crate::{ChartVector, Hessian, Hints, Lagrangian, Scalar, Structure, VelocityPoint};
+use crate::dynamics::lagrangian::forward_lagrangian;
+use crate::{Hints, Lagrangian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// A force on a motion, in the Lagrange-d'Alembert-Herglotz equations
@@ -30,12 +31,53 @@ use nalgebra::{SMatrix, SVector};
 pub trait Force<const N: usize> {
     /// The force `f(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N>;
+
+    /// What integrators may rely on; by default nothing. A false claim makes results wrong.
+    fn structure(&self) -> ForceStructure<N> {
+        ForceStructure::General
+    }
+}
+
+/// The declared structure of an applied force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ForceStructure<const N: usize> {
+    /// There is no force.
+    None,
+    /// Nothing is known.
+    General,
+    /// `f_i(t, q, v) = f_i(t, q, 0) - linear_i v_i - quadratic |v| v_i`: a force of the positions, with drag.
+    Drag {
+        /// The coefficients of the linear drag of each velocity.
+        linear: SVector<f64, N>,
+        /// The coefficient of the quadratic drag of the velocity.
+        quadratic: f64,
+    },
+}
+
+impl<const N: usize> ForceStructure<N> {
+    /// A force `f(t, q)`.
+    pub fn of_positions() -> Self {
+        ForceStructure::Drag { linear: SVector::zeros(), quadratic: 0.0 }
+    }
+
+    /// Whether the force depends on time and positions alone; so does a force that does not exist.
+    pub fn is_of_positions(&self) -> bool {
+        match self {
+            ForceStructure::None => true,
+            ForceStructure::General => false,
+            ForceStructure::Drag { linear, quadratic } => *quadratic == 0.0 && linear.iter().all(|c| *c == 0.0),
+        }
+    }
 }
 
 impl<const N: usize, F: Force<N>> Force<N> for &F {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         (**self).value(t, x)
+    }
+    fn structure(&self) -> ForceStructure<N> {
+        (**self).structure()
     }
 }
 
@@ -54,62 +96,29 @@ pub struct Forced<L, F> {
 impl<const N: usize, L: Lagrangian<N>, F: Force<N>> Lagrangian<N> for Forced<L, F> {
     const HINTS: Hints = Hints { forced: true, ..L::HINTS };
 
-    #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        self.lagrangian.value(t, q, v, z)
-    }
+    forward_lagrangian!(of_value, self => self.lagrangian);
+    forward_lagrangian!(of_switches, self => self.lagrangian);
+
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         self.force.value(t, x)
     }
-    #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
-        self.lagrangian.closed_gradient(t, x)
+    fn force_structure(&self) -> ForceStructure<N> {
+        self.force.structure()
     }
-    #[inline(always)]
-    fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
-        self.lagrangian.closed_hessian(t, x)
-    }
-    #[inline(always)]
-    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
-        self.lagrangian.closed_with_gradient(t, x)
-    }
-    #[inline(always)]
-    fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
-        self.lagrangian.closed_force(t, x)
-    }
-    #[inline(always)]
-    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
-        self.lagrangian.closed_with_force(t, x)
-    }
-    #[inline(always)]
-    fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
-        self.lagrangian.closed_rate(t, x)
-    }
-    #[inline(always)]
-    fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
-        self.lagrangian.closed_mass_matrix(t, x)
-    }
-    /// Of the structure of the Lagrangian, what a force leaves: the drag and the mass matrix. The motion may depend on time
-    /// and on z, and is neither separable nor linear.
+    /// Of the structure of the Lagrangian, what a force leaves. The motion may depend on time and is not linear. The
+    /// Lagrangian remains separable for methods if the force depends on time and positions alone.
     fn structure(&self) -> Structure {
         let of_lagrangian = self.lagrangian.structure();
         let constant_mass = of_lagrangian.constant_mass || of_lagrangian.separable || of_lagrangian.quadratic;
         Structure {
             autonomous: false,
-            z_free: false,
-            separable: false,
+            separable: of_lagrangian.separable && self.force.structure().is_of_positions(),
             quadratic: false,
             constant_mass,
             constant_rate: of_lagrangian.has_constant_rate(),
             z_affine: of_lagrangian.is_affine_in_z(),
+            ..of_lagrangian
         }
-    }
-    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        self.lagrangian.switching_functions(t, x, values);
-    }
-    #[inline(always)]
-    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        self.lagrangian.dt_dtau(q)
     }
 }

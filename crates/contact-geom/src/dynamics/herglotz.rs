@@ -1,6 +1,7 @@
 //! Regularity, energy, the Legendre transformation and the Herglotz vector field of a Lagrangian.
 
 use crate::dynamics::blocks::BLOCK;
+use crate::dynamics::derivatives::add_applied_force;
 use crate::support::linear::{SingularMatrix, solve};
 use crate::{ChartVector, OneParameterGroup, VelocityPoint};
 use crate::{
@@ -184,22 +185,6 @@ fn rates_of_many<T: Scalar, const N: usize>(
     add_applied_force(lagrangian, t, x, &mut a);
     solve(&mut lagrangian.mass_matrix(t, x), &mut a).map_err(irregular)?;
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
-}
-
-/// Adds the applied force, if there is one.
-#[inline(always)]
-fn add_applied_force<L: Lagrangian<N>, T: Scalar, const N: usize>(
-    lagrangian: &L,
-    t: T,
-    x: &VelocityPoint<N, T>,
-    to: &mut SVector<T, N>,
-) {
-    if const { L::HINTS.forced } {
-        let force = lagrangian.applied_force(t, x);
-        for i in 0..N {
-            to[i] += force[i];
-        }
-    }
 }
 
 /// The error for a singular W.

@@ -1,6 +1,6 @@
 //! Lagrangians L(t, q, v, z).
 
-use crate::{ChartVector, Hessian, Scalar, Structure, VelocityPoint};
+use crate::{ChartVector, Control, ForceStructure, Hessian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -21,7 +21,7 @@ pub struct Hints {
     pub proved: bool,
     /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
     pub interpreted: bool,
-    /// Whether there is an [applied force](Lagrangian::applied_force), as in [`Forced`](crate::Forced).
+    /// Whether there may be an [applied force](Lagrangian::applied_force), as in [`Forced`](crate::Forced).
     pub forced: bool,
 }
 
@@ -129,6 +129,18 @@ pub trait Lagrangian<const N: usize> {
         SVector::from_fn(|_, _| T::zero())
     }
 
+    /// What integrators may rely on about the applied force. By default nothing, if [`Hints::forced`] is set, and
+    /// otherwise that there is none.
+    fn force_structure(&self) -> ForceStructure<N> {
+        if Self::HINTS.forced { ForceStructure::General } else { ForceStructure::None }
+    }
+
+    /// Whether there is an applied force.
+    #[inline(always)]
+    fn has_force(&self) -> bool {
+        Self::HINTS.forced && self.force_structure() != ForceStructure::None
+    }
+
     /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a
     /// point, always in the same number and order. A run ends a step at each zero that its motion crosses, so that
     /// integrators keep their order; where L itself jumps across a surface in the positions, the motion is refracted or
@@ -138,6 +150,12 @@ pub trait Lagrangian<const N: usize> {
     /// Set [`Hints::switching_functions`] as well. For example, a spring that only pushes,
     /// `q.if_less(0, q^2/2, 0)`, has the single switching function q.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
+
+    /// What happens at a zero of the switching function with this index, at a point of the motion; `rising` is whether
+    /// the function increases along the run. By default the motion [continues](Control::Continue).
+    fn at_switch(&self, _index: usize, _t: f64, _x: &VelocityPoint<N>, _rising: bool) -> Control<N> {
+        Control::Continue
+    }
 
     /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) in which steps of equal
     /// length suit this motion, for autonomous Lagrangians. It must be positive and should decrease where the motion
@@ -161,15 +179,10 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivative
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         self.0.value(t, q, v, z)
     }
-    #[inline(always)]
-    fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        self.0.applied_force(t, x)
-    }
+    forward_lagrangian!(of_force, self => self.0);
+    forward_lagrangian!(of_switches, self => self.0);
     fn structure(&self) -> Structure {
         self.0.structure()
-    }
-    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        self.0.switching_functions(t, x, values);
     }
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
@@ -177,53 +190,97 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivative
     }
 }
 
+/// Methods of [`Lagrangian`] that are those of another Lagrangian, given as an expression of `self`: `all` of them but
+/// `HINTS`, or all but those on forces and switching functions (`of_value`).
+macro_rules! forward_lagrangian {
+    (all, $self:ident => $to:expr) => {
+        $crate::dynamics::lagrangian::forward_lagrangian!(of_value, $self => $to);
+        $crate::dynamics::lagrangian::forward_lagrangian!(of_force, $self => $to);
+        $crate::dynamics::lagrangian::forward_lagrangian!(of_switches, $self => $to);
+        fn structure(&$self) -> $crate::Structure {
+            $to.structure()
+        }
+    };
+    (of_value, $self:ident => $to:expr) => {
+        #[inline(always)]
+        fn value<T: $crate::Scalar>(&$self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+            $to.value(t, q, v, z)
+        }
+        #[inline(always)]
+        fn closed_gradient<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::VelocityPoint<N, T>,
+        ) -> Option<$crate::ChartVector<N, T>> {
+            $to.closed_gradient(t, x)
+        }
+        #[inline(always)]
+        fn closed_hessian<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::VelocityPoint<N, T>,
+        ) -> Option<$crate::Hessian<N, T>> {
+            $to.closed_hessian(t, x)
+        }
+        #[inline(always)]
+        fn closed_with_gradient<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::VelocityPoint<N, T>,
+        ) -> Option<(T, $crate::ChartVector<N, T>)> {
+            $to.closed_with_gradient(t, x)
+        }
+        #[inline(always)]
+        fn closed_force<T: $crate::Scalar>(&$self, t: T, x: &$crate::VelocityPoint<N, T>) -> Option<SVector<T, N>> {
+            $to.closed_force(t, x)
+        }
+        #[inline(always)]
+        fn closed_with_force<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::VelocityPoint<N, T>,
+        ) -> Option<(T, SVector<T, N>)> {
+            $to.closed_with_force(t, x)
+        }
+        #[inline(always)]
+        fn closed_rate<T: $crate::Scalar>(&$self, t: T, x: &$crate::VelocityPoint<N, T>) -> Option<T> {
+            $to.closed_rate(t, x)
+        }
+        #[inline(always)]
+        fn closed_mass_matrix<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::VelocityPoint<N, T>,
+        ) -> Option<SMatrix<T, N, N>> {
+            $to.closed_mass_matrix(t, x)
+        }
+        #[inline(always)]
+        fn dt_dtau<T: $crate::Scalar>(&$self, q: &SVector<T, N>) -> T {
+            $to.dt_dtau(q)
+        }
+    };
+    (of_force, $self:ident => $to:expr) => {
+        #[inline(always)]
+        fn applied_force<T: $crate::Scalar>(&$self, t: T, x: &$crate::VelocityPoint<N, T>) -> SVector<T, N> {
+            $to.applied_force(t, x)
+        }
+        fn force_structure(&$self) -> $crate::ForceStructure<N> {
+            $to.force_structure()
+        }
+    };
+    (of_switches, $self:ident => $to:expr) => {
+        fn switching_functions(&$self, t: f64, x: &$crate::VelocityPoint<N>, values: &mut Vec<f64>) {
+            $to.switching_functions(t, x, values);
+        }
+        fn at_switch(&$self, index: usize, t: f64, x: &$crate::VelocityPoint<N>, rising: bool) -> $crate::Control<N> {
+            $to.at_switch(index, t, x, rising)
+        }
+    };
+}
+pub(crate) use forward_lagrangian;
+
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     const HINTS: Hints = L::HINTS;
 
-    #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        (**self).value(t, q, v, z)
-    }
-    #[inline(always)]
-    fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        (**self).applied_force(t, x)
-    }
-    #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
-        (**self).closed_gradient(t, x)
-    }
-    #[inline(always)]
-    fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
-        (**self).closed_hessian(t, x)
-    }
-    #[inline(always)]
-    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
-        (**self).closed_with_gradient(t, x)
-    }
-    #[inline(always)]
-    fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
-        (**self).closed_force(t, x)
-    }
-    #[inline(always)]
-    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
-        (**self).closed_with_force(t, x)
-    }
-    #[inline(always)]
-    fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
-        (**self).closed_rate(t, x)
-    }
-    #[inline(always)]
-    fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
-        (**self).closed_mass_matrix(t, x)
-    }
-    fn structure(&self) -> Structure {
-        (**self).structure()
-    }
-    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        (**self).switching_functions(t, x, values);
-    }
-    #[inline(always)]
-    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        (**self).dt_dtau(q)
-    }
+    forward_lagrangian!(all, self => (**self));
 }

@@ -3,6 +3,7 @@
 
 mod action;
 pub(crate) mod blocks;
+mod control;
 mod derivatives;
 mod force;
 mod hamiltonian;
@@ -14,8 +15,9 @@ mod structure;
 mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
+pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
-pub use force::{Force, Forced};
+pub use force::{Force, ForceStructure, Forced};
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
     dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,

@@ -120,8 +120,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         let (s, wants_z) = (stages, action);
         let InitialMass { w, inverse } = InitialMass::of(problem)?;
-        // The condensed routes rest on forces that depend on positions and time alone.
-        let condensed = const { !L::HINTS.forced } && structure.separable && structure.has_constant_rate();
+        let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
             let table = Condensed::of(s, h, lagrangian.gradient(t0, &start).z)?;

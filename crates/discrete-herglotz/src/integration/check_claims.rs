@@ -9,10 +9,10 @@ use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, Vel
 /// # Errors
 /// [`InputError::Forced`].
 pub fn check_unforced<L: Lagrangian<N>, const N: usize>(
-    _lagrangian: &L,
+    lagrangian: &L,
     method: &'static str,
 ) -> Result<(), InputError> {
-    if const { L::HINTS.forced } { Err(InputError::Forced { method }) } else { Ok(()) }
+    if lagrangian.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
 }
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
