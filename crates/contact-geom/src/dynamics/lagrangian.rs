@@ -157,6 +157,12 @@ pub trait Lagrangian<const N: usize> {
         Control::Continue
     }
 
+    /// The times at which L or the applied force has a kink or a jump in time, in ascending order: steps end there. Set
+    /// [`Hints::switching_functions`] as well. By default there are none.
+    fn breaks(&self) -> &[f64] {
+        &[]
+    }
+
     /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) in which steps of equal
     /// length suit this motion, for autonomous Lagrangians. It must be positive and should decrease where the motion
     /// gets faster. Set [`Hints::time_transformation`] as well; by default tau is the time
@@ -274,6 +280,9 @@ macro_rules! forward_lagrangian {
         }
         fn at_switch(&$self, index: usize, t: f64, x: &$crate::VelocityPoint<N>, rising: bool) -> $crate::Control<N> {
             $to.at_switch(index, t, x, rising)
+        }
+        fn breaks(&$self) -> &[f64] {
+            $to.breaks()
         }
     };
 }

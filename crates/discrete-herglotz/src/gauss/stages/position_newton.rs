@@ -278,7 +278,7 @@ mod tests {
                 positions.solve(&at).unwrap();
                 let mut off = 0.0;
                 for (i, (a, q)) in positions.stages().enumerate() {
-                    let force = inverse * work.l[i].d.x;
+                    let force = inverse * work.l[i].force;
                     let differences = [q - equations.position(&given, &work.x, i), a - force];
                     off = max_or_nan(off, max_abs_or_nan(differences.iter().flatten().copied()));
                 }
