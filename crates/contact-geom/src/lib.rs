@@ -54,9 +54,14 @@ pub mod support {
     pub use crate::number::{KernelDual, legendre_polynomials, linear};
 }
 
+/// Surfaces at which a motion is interrupted: impacts, resets, and the times of kinks and jumps.
+pub mod switching {
+    pub use crate::dynamics::{Breaks, Control, Impact, Impacts, Surface};
+}
+
 pub use dynamics::{
-    Control, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints,
-    Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
+    Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints, Lagrangian,
+    Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
     TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
     legendre_jacobian, regularity,
 };

@@ -289,6 +289,33 @@ pub enum StepError {
         /// The time that is reached.
         t: f64,
     },
+    /// The state after a reset is not finite, or L is not defined or not regular there.
+    #[error(
+        "the reset at t = {t} gives a state that is not finite, or at which the Lagrangian is not defined; change what \
+         the reset assigns"
+    )]
+    ResetUndefined {
+        /// The time of the reset.
+        t: f64,
+    },
+    /// The state after a reset is beyond the surface of the reset.
+    #[error(
+        "the reset at t = {t} leaves the state on the other side of its own surface; assign a state on the surface or \
+         on the side from which the motion came"
+    )]
+    ResetBeyond {
+        /// The time of the reset.
+        t: f64,
+    },
+    /// Resets accumulate.
+    #[error(
+        "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or say \
+         how the motion continues there (`Lagrangian::at_accumulation`)"
+    )]
+    Accumulation {
+        /// The limit of their times.
+        t: f64,
+    },
     /// The Lagrangian jumps across a surface that depends on the velocity or on the action, or that the motion only
     /// touches; there the corner conditions do not determine how the motion continues.
     #[error(

@@ -61,16 +61,16 @@ pub use error::{InputError, SelectionFailure, StepError};
 
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
-    DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, PlanEntry, Problem, SplittingScheme, Start,
-    StepFailure, Stepper, StepperOptions,
+    DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, Piece, PlanEntry, Problem, Reset, SplittingScheme,
+    Start, StepFailure, Stepper, StepperOptions,
 };
 pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
     AnyIntegrator, Checkpoint, CheckpointError, Crossing, Event, Events, LastStep, MomentumDecay, MomentumRow,
-    Observer, Outcome, OutputRequest, Plan, Progress, Quotient, ResumeState, Row, Rows, Run, RunInfo, StepView, Steps,
-    Stop, Terminal, UnknownIntegrator, Until,
+    Observer, Outcome, OutputRequest, Plan, Progress, Quotient, Resets, ResumeState, Row, Rows, Run, RunInfo, StepView,
+    Steps, Stop, Terminal, UnknownIntegrator, Until,
 };
 pub use status::{Status, UnresolvedStep};
 pub use switching::DividedGauss;

@@ -1,6 +1,7 @@
 //! Lagrangians L(t, q, v, z).
 
-use crate::{ChartVector, Control, ForceStructure, Hessian, Scalar, Structure, VelocityPoint};
+use crate::switching::Control;
+use crate::{ChartVector, Force, ForceStructure, Forced, Hessian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -129,6 +130,14 @@ pub trait Lagrangian<const N: usize> {
         SVector::from_fn(|_, _| T::zero())
     }
 
+    /// This Lagrangian with an applied force.
+    fn with_force<F: Force<N>>(self, force: F) -> Forced<Self, F>
+    where
+        Self: Sized,
+    {
+        Forced { lagrangian: self, force }
+    }
+
     /// What integrators may rely on about the applied force. By default nothing, if [`Hints::forced`] is set, and
     /// otherwise that there is none.
     fn force_structure(&self) -> ForceStructure<N> {
@@ -154,6 +163,13 @@ pub trait Lagrangian<const N: usize> {
     /// What happens at a zero of the switching function with this index, at a point of the motion; `rising` is whether
     /// the function increases along the run. By default the motion [continues](Control::Continue).
     fn at_switch(&self, _index: usize, _t: f64, _x: &VelocityPoint<N>, _rising: bool) -> Control<N> {
+        Control::Continue
+    }
+
+    /// What happens where replacements at the zero of this switching function accumulate: at the limit of their times,
+    /// as for a ball that comes to rest by infinitely many impacts. By default the run ends there with a status that
+    /// names the time; a [`Control::Replace`] continues it.
+    fn at_accumulation(&self, _index: usize, _t: f64, _x: &VelocityPoint<N>) -> Control<N> {
         Control::Continue
     }
 
@@ -278,8 +294,11 @@ macro_rules! forward_lagrangian {
         fn switching_functions(&$self, t: f64, x: &$crate::VelocityPoint<N>, values: &mut Vec<f64>) {
             $to.switching_functions(t, x, values);
         }
-        fn at_switch(&$self, index: usize, t: f64, x: &$crate::VelocityPoint<N>, rising: bool) -> $crate::Control<N> {
+        fn at_switch(&$self, index: usize, t: f64, x: &$crate::VelocityPoint<N>, rising: bool) -> $crate::switching::Control<N> {
             $to.at_switch(index, t, x, rising)
+        }
+        fn at_accumulation(&$self, index: usize, t: f64, x: &$crate::VelocityPoint<N>) -> $crate::switching::Control<N> {
+            $to.at_accumulation(index, t, x)
         }
         fn breaks(&$self) -> &[f64] {
             $to.breaks()

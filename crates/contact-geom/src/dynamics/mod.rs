@@ -3,11 +3,13 @@
 
 mod action;
 pub(crate) mod blocks;
+mod breaks;
 mod control;
 mod derivatives;
 mod force;
 mod hamiltonian;
 mod herglotz;
+mod impact;
 mod lagrangian;
 pub(crate) mod probe;
 mod rounding;
@@ -15,6 +17,7 @@ mod structure;
 mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
+pub use breaks::Breaks;
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
 pub use force::{Force, ForceStructure, Forced};
@@ -27,6 +30,7 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
+pub use impact::{Impact, Impacts, Surface};
 pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
 pub use probe::check_closed_derivatives;
 pub use rounding::gradient_rounding;

@@ -9,6 +9,7 @@ pub(crate) mod interrupt;
 mod order_conditions;
 pub(crate) mod plan_entry;
 pub(crate) mod problem;
+mod reset;
 pub(crate) mod scheme;
 pub(crate) mod stepper;
 
@@ -18,5 +19,6 @@ pub use integrator::{BatchKernel, Integrator, MethodInfo, StepperOptions};
 pub use interrupt::{INTERRUPTION, Interrupt};
 pub use plan_entry::PlanEntry;
 pub use problem::{Problem, Start};
+pub use reset::{Piece, Reset};
 pub use scheme::SplittingScheme;
 pub use stepper::{StepFailure, Stepper, SuspectInterval};

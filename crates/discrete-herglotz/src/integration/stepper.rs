@@ -1,5 +1,6 @@
 //! Steppers: a method applied to one motion.
 
+use crate::integration::{Piece, Reset};
 use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -74,6 +75,21 @@ pub trait Stepper<const N: usize> {
     /// Restores the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they
     /// are not valid.
     fn restore(&mut self, _words: &[u64]) -> bool {
+        false
+    }
+
+    /// The resets in the steps of the last call of [`advance`](Self::advance), in their order.
+    fn resets(&self) -> &[Reset<N>] {
+        &[]
+    }
+
+    /// The pieces of the last step between its resets; empty for a step without resets.
+    fn pieces(&self) -> &[Piece<N>] {
+        &[]
+    }
+
+    /// Whether a reset so far was not conformally contact, so that the energy changed by an unknown amount.
+    fn has_changed_energy(&self) -> bool {
         false
     }
 

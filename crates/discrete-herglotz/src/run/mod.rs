@@ -32,6 +32,7 @@ pub use observers::observer::{Observer, Terminal};
 pub use observers::output_request::{OutputRequest, RunInfo};
 pub use observers::progress::Progress;
 pub use observers::quotient::Quotient;
+pub use observers::resets::Resets;
 pub(crate) use observers::rows;
 pub use observers::rows::{Row, Rows};
 pub use observers::step_view::{StepView, Stop};

@@ -18,7 +18,7 @@ pub fn jumps_between<const N: usize>(
         TimedState { t, state, v: x.v, rests: StepStart::ZERO }
     };
     let curve = StepCurve { from: of(from), to: of(to), dense: None };
-    let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
+    let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1, curve.span());
     let max_displacement = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
     let parts = curve.parts();
     for part in 1..=parts {

@@ -5,7 +5,7 @@ use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, herglotz_field};
 use std::convert::Infallible;
 
 /// The number of parts in which a step without dense output is searched for sign changes: twice those of a search for
@@ -20,7 +20,14 @@ const MAX_HALVINGS: i32 = 30;
 /// zero lies: an error of 1e-8, by the central difference, is enough for Newton's method.
 const SLOPE_DISTANCE: f64 = 1e-4;
 
-/// Whether a Lagrangian has switching functions.
+/// The relative round-off of the numbers of a point: the sums of a step and the root search.
+const POINT_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+
+/// The part of a step over which a motion on a surface is followed, forward and backward, to find the side to which it
+/// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
+const DEPARTURE: f64 = 1e-5;
+
+/// Whether a Lagrangian has switching functions or breaks.
 ///
 /// # Errors
 /// [`InputError::SwitchingUnstated`] where it has some that its `HINTS` do not state.
@@ -31,7 +38,7 @@ pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
 ) -> Result<bool, InputError> {
     let mut values = Vec::new();
     lagrangian.switching_functions(t, x, &mut values);
-    match values.is_empty() {
+    match values.is_empty() && lagrangian.breaks().is_empty() {
         true => Ok(false),
         false if const { L::HINTS.switching_functions } => Ok(true),
         false => Err(InputError::SwitchingUnstated),
@@ -98,6 +105,15 @@ pub(super) struct SignChange {
     pub slope: f64,
 }
 
+/// How a motion leaves a surface on which it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Departure {
+    /// The sign that the function takes.
+    pub side: f64,
+    /// Whether the function has a rate there; otherwise it changes by its second derivative.
+    pub with_rate: bool,
+}
+
 /// The switching functions of a Lagrangian, with the side of each surface on which the motion is.
 #[derive(Clone, Debug)]
 pub(super) struct Surfaces {
@@ -107,11 +123,91 @@ pub(super) struct Surfaces {
 }
 
 impl Surfaces {
-    pub fn at<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> Self {
+    /// The sides of a point from which a motion starts with a time step h. A function that is zero up to round-off has
+    /// the sign that it takes next along the motion.
+    pub fn at<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) -> Self {
         let mut values = Vec::new();
         lagrangian.switching_functions(t, x, &mut values);
         let sides = values.iter().map(|g| sign(*g)).collect();
-        Surfaces { sides, values }
+        let mut surfaces = Surfaces { sides, values };
+        surfaces.leave(lagrangian, t, x, h);
+        surfaces
+    }
+
+    /// The sides after a reset.
+    pub fn reset<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
+        *self = Surfaces::at(lagrangian, t, x, h);
+    }
+
+    /// The round-off of a function at a point that is reached by steps of length h: its change when each number of the
+    /// point, and the time along the motion, change by their round-off.
+    pub fn rounding<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        index: usize,
+        (t, x): (f64, &VelocityPoint<N>),
+        h: f64,
+    ) -> f64 {
+        let here = self.value(lagrangian, index, (t, x));
+        let mut change = |t: f64, x: VelocityPoint<N>| {
+            let there = self.value(lagrangian, index, (t, &x));
+            if there.is_finite() { (there - here).abs() } else { 0.0 }
+        };
+        let (dt, v) = (POINT_ROUND_OFF * t.abs().max(h.abs()), POINT_ROUND_OFF * x.v.amax());
+        let q = POINT_ROUND_OFF * x.q.amax().max((x.v * h).amax());
+        let mut sum = change(t + dt, VelocityPoint { q: x.q + x.v * dt, ..*x })
+            + change(t, VelocityPoint { z: x.z * (1.0 + POINT_ROUND_OFF), ..*x });
+        for i in 0..N {
+            let mut moved = *x;
+            moved.q[i] += q;
+            sum += change(t, moved);
+            let mut moved = *x;
+            moved.v[i] += v;
+            sum += change(t, moved);
+        }
+        sum
+    }
+
+    /// Gives each function that is zero up to round-off the sign that it takes next along the motion.
+    fn leave<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
+        for index in 0..self.sides.len() {
+            let departure = self.departure(lagrangian, index, (t, x), h);
+            if let (Some(Departure { side, .. }), Some(of)) = (departure, self.sides.get_mut(index)) {
+                *of = side;
+            }
+        }
+    }
+
+    /// The side to which a motion that is on a surface up to round-off goes next; `None` if it is not on the surface, or
+    /// stays on it to second order. `h` is the length of a step.
+    pub fn departure<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        index: usize,
+        (t, x): (f64, &VelocityPoint<N>),
+        h: f64,
+    ) -> Option<Departure> {
+        let here = self.value(lagrangian, index, (t, x));
+        if here.is_nan() || here.abs() > self.rounding(lagrangian, index, (t, x), h) {
+            return None;
+        }
+        let (a, l) = match herglotz_field(lagrangian, t, x) {
+            Ok(field) => (field.y, field.z),
+            Err(_) => (SVector::zeros(), 0.0),
+        };
+        let mut after = |dt: f64| {
+            let later = VelocityPoint { q: x.q + (x.v + a * (0.5 * dt)) * dt, v: x.v + a * dt, z: x.z + l * dt };
+            self.value(lagrangian, index, (t + dt, &later)) - here
+        };
+        let dt = DEPARTURE * h;
+        let (later, earlier) = (after(dt), after(-dt));
+        let (odd, even) = (0.5 * (later - earlier), 0.5 * (later + earlier));
+        let rounding = self.rounding(lagrangian, index, (t, x), dt);
+        match (odd.abs() > rounding, even.abs() > 0.0) {
+            (true, _) => Some(Departure { side: sign(odd), with_rate: true }),
+            (false, true) => Some(Departure { side: sign(even), with_rate: false }),
+            (false, false) => None,
+        }
     }
 
     /// The value of a function; NaN for an index without a function.

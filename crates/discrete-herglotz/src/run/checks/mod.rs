@@ -167,6 +167,9 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
         {
             return Some(status(defect));
         }
+        if step.stepper.has_changed_energy() {
+            self.energy = None;
+        }
         if let Some(energy) = &mut self.energy
             && (step.taken >= next_energy || step.over)
         {

@@ -122,29 +122,18 @@ impl<'f, const N: usize> Events<'f, N> {
                 .at(first.t, &first.state)
                 .is_ok_and(|value| event.departure_from(motion, (first.t, &first.state), value).is_some())
     }
-}
 
-impl<const N: usize> Observer<N> for Events<'_, N> {
-    fn needs(&self) -> OutputRequest {
-        self.needs
-    }
-
-    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
-        self.scales = TimeScales::of(info);
+    /// Takes the signs at the start of the run, or after a reset.
+    fn start_at(&mut self, at: &StepView<'_, N>, (t, state): (f64, PhasePoint<N>)) -> ControlFlow<Stop<N>> {
         self.last_signs.clear();
-        self.crossings.clear();
         self.rates = None;
-        Ok(())
-    }
-
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
         for event in &mut self.events {
-            match event.at(at.t, &at.state) {
+            match event.at(t, &state) {
                 Ok(value) => {
-                    let departure = event.departure_from(motion, (at.t, &at.state), value);
+                    let departure = event.departure_from(motion, (t, &state), value);
                     let side = departure.map_or(value, |departure| departure.value);
-                    let zero = (side == 0.0).then_some((at.t, at.state));
+                    let zero = (side == 0.0).then_some((t, state));
                     let sign = if side == 0.0 { 0.0 } else { side.signum() };
                     self.last_signs.push(LastSign { value, sign, zero, departure });
                 }
@@ -154,13 +143,14 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         ControlFlow::Continue(())
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
+    /// Finds the sign changes in a step, or in a piece of one.
+    fn piece(&mut self, at: &StepView<'_, N>, step: LastStep<'_, N>) -> ControlFlow<Stop<N>> {
         let from = step.span().0;
         let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));
         let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
         let (found, cause) = self.in_step(&mut step, motion);
-        self.rates = step.rates_at_end().map(|rates| (at.t, rates));
+        let to = step.span().1;
+        self.rates = step.rates_at_end().map(|rates| (to, rates));
         let mut end: Option<Crossing<N>> = None;
         for crossing in found {
             // An event has only one crossing at the time at which it ends the run.
@@ -179,6 +169,35 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
             Some(cause) => ControlFlow::Break(Stop::failed(cause)),
             None => ControlFlow::Continue(()),
         }
+    }
+}
+
+impl<const N: usize> Observer<N> for Events<'_, N> {
+    fn needs(&self) -> OutputRequest {
+        self.needs
+    }
+
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.scales = TimeScales::of(info);
+        self.last_signs.clear();
+        self.crossings.clear();
+        self.rates = None;
+        Ok(())
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        self.start_at(at, (at.t, at.state))
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
+        for (k, piece) in step.pieces().into_iter().enumerate() {
+            if k > 0 {
+                self.start_at(at, piece.ends().0)?;
+            }
+            self.piece(at, piece)?;
+        }
+        ControlFlow::Continue(())
     }
 
     fn terminal(&self) -> Option<Terminal<'_, N>> {

@@ -1,5 +1,6 @@
 //! The last step of a run, with dense output.
 
+use crate::integration::Piece;
 use crate::run::motion::Motion;
 use crate::{DenseStep, StepError, Stepper};
 use contact_geom::PhasePoint;
@@ -41,6 +42,8 @@ impl<const N: usize> TaylorPolynomial<N> {
 
 /// A step, with dense output between its ends.
 pub struct LastStep<'r, const N: usize> {
+    /// The start of the whole step, from which steps to points within it are taken.
+    origin: (f64, PhasePoint<N>),
     from: (f64, PhasePoint<N>),
     to: (f64, PhasePoint<N>),
     motion: &'r dyn Motion<N>,
@@ -58,7 +61,26 @@ impl<'r, const N: usize> LastStep<'r, N> {
         motion: &'r dyn Motion<N>,
         stepper: &'r dyn Stepper<N>,
     ) -> Self {
-        LastStep { from, to, motion, stepper, curve: None, rates: [None; 2] }
+        LastStep { origin: from, from, to, motion, stepper, curve: None, rates: [None; 2] }
+    }
+
+    /// The pieces of this step between its resets, in their order; the step itself if it has none.
+    pub(crate) fn pieces(self) -> Vec<Self> {
+        let pieces = self.stepper.pieces();
+        if pieces.is_empty() {
+            return vec![self];
+        }
+        let LastStep { origin, motion, stepper, .. } = self;
+        let of = |Piece { from, to, dense }: &Piece<N>| LastStep {
+            origin,
+            from: *from,
+            to: *to,
+            motion,
+            stepper,
+            curve: Some(*dense),
+            rates: [None; 2],
+        };
+        pieces.iter().map(of).collect()
     }
 
     /// The times of the step's start and end.
@@ -87,12 +109,12 @@ impl<'r, const N: usize> LastStep<'r, N> {
 
     /// The same state with the `sigma_d` of the step that ends there; always computed by a step, except at the start.
     pub(crate) fn step_to(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
-        let curve = self.curve.as_ref().and_then(Option::as_ref);
         if t == self.from.0 {
-            Ok((self.from.1, 1.0))
-        } else {
-            self.motion.state_within_step(&self.from, t, self.stepper.last_velocity(), curve)
+            return Ok((self.from.1, 1.0));
         }
+        let is_whole = self.origin.0 == self.from.0;
+        let curve = self.curve.as_ref().and_then(Option::as_ref).filter(|_| is_whole);
+        self.motion.state_within_step(&self.origin, t, self.stepper.last_velocity(), curve)
     }
 
     /// The same step with the time derivatives at its start, as computed for the preceding step.

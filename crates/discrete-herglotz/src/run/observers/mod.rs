@@ -13,5 +13,6 @@ pub(crate) mod observer;
 pub(crate) mod output_request;
 pub(crate) mod progress;
 pub(crate) mod quotient;
+pub(crate) mod resets;
 pub(crate) mod rows;
 pub(crate) mod step_view;

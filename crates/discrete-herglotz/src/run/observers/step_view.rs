@@ -4,7 +4,7 @@ use crate::run::findings::Findings;
 use crate::run::motion::Motion;
 use crate::run::observers::last_step::LastStep;
 use crate::run::resume_state::ResumeState;
-use crate::{StepError, Stepper};
+use crate::{Reset, StepError, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
@@ -89,6 +89,11 @@ impl<'r, const N: usize> StepView<'r, N> {
         let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.step_to(t)?;
         let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
         Ok(StepView { t, state, sigma, log_factor, before: None, ..*self })
+    }
+
+    /// The resets in the steps since the last view, in their order.
+    pub fn resets(&self) -> &'r [Reset<N>] {
+        self.stepper.resets()
     }
 
     /// The energy `E_L = v.p - L`.

@@ -1,5 +1,6 @@
 //! The steps of any integrator, divided at the zeros of switching functions.
 
+pub(crate) mod accumulation;
 pub(crate) mod as_stepper;
 pub(crate) mod evaluation_range;
 pub(crate) mod of_integrator;
@@ -8,7 +9,9 @@ mod run;
 
 use crate::error::step_error;
 use crate::gauss::StepStart;
+use crate::integration::{Piece, Reset};
 use crate::status::first;
+use crate::switching::stepper::accumulation::Accumulation;
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
@@ -42,6 +45,11 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     /// The steppers of the parts of the last step that had parts, if they are kept.
     parts: Option<Vec<S>>,
     switched: bool,
+    /// The resets in the last steps, and the pieces of the last step between them.
+    resets: Vec<Reset<N>>,
+    pieces: Vec<Piece<N>>,
+    accumulation: Accumulation,
+    changed_energy: bool,
 }
 
 impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
@@ -63,13 +71,17 @@ where
             origin: here,
             before: 0,
             here,
-            surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start),
+            surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start, h),
             max_defect: f64::INFINITY,
             sigma: 1.0,
             spent: 0,
             unresolved: None,
             parts: None,
             switched: false,
+            resets: Vec::new(),
+            pieces: Vec::new(),
+            accumulation: Accumulation::default(),
+            changed_energy: false,
         })
     }
 
@@ -121,12 +133,47 @@ where
         Ok(TimedState { t, state, v, rests })
     }
 
+    /// Whether a break lies in a step, or so close to it that the integrator may evaluate L on its other side.
+    fn has_break_near(&self, from: f64, to: f64) -> bool {
+        let breaks = self.problem.lagrangian.breaks();
+        if breaks.is_empty() {
+            return false;
+        }
+        let margin = match self.range {
+            EvaluationRange::Within => 0.0,
+            EvaluationRange::Extended(part) => part * (to - from).abs(),
+        };
+        let (first, last) = (from.min(to) - margin, from.max(to) + margin);
+        let next = breaks.get(breaks.partition_point(|b| *b <= first));
+        match self.range {
+            EvaluationRange::Within => next.is_some_and(|b| *b < last),
+            EvaluationRange::Extended(_) => {
+                next.is_some_and(|b| *b <= last) || breaks.binary_search_by(|b| b.total_cmp(&first)).is_ok()
+            }
+        }
+    }
+
+    /// The first break after a time in the direction of the run, at a distance of more than `spacing`, or the end.
+    fn next_end(&self, t: f64, t_end: f64, spacing: f64) -> f64 {
+        let breaks = self.problem.lagrangian.breaks();
+        let forward = t_end > t;
+        let next = if forward {
+            breaks.get(breaks.partition_point(|b| *b <= t + spacing)).filter(|b| **b < t_end - spacing)
+        } else {
+            let before = breaks.partition_point(|b| *b < t - spacing);
+            before.checked_sub(1).and_then(|i| breaks.get(i)).filter(|b| **b > t_end + spacing)
+        };
+        next.copied().unwrap_or(t_end)
+    }
+
     /// The next step.
     fn step(&mut self) -> Result<(), StepError> {
         let from = self.here;
         let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
         self.switched = false;
-        if self.base.stepper_mut().advance(1).is_ok()
+        self.pieces.clear();
+        if !self.has_break_near(from.t, t)
+            && self.base.stepper_mut().advance(1).is_ok()
             && let Ok(to) = self.reached(&self.base, t, &from)
         {
             let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
@@ -148,7 +195,7 @@ where
         if let Some(parts) = &mut self.parts {
             parts.clear();
         }
-        let sides = self.surfaces.clone();
+        let (sides, resets) = ((self.surfaces.clone(), self.accumulation), self.resets.len());
         match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h, false)?))) {
             Ok((to, sigma, base)) => {
                 (self.here, self.sigma, self.base) = (to, sigma, base);
@@ -156,7 +203,9 @@ where
                 Ok(())
             }
             Err(cause) => {
-                self.surfaces = sides;
+                (self.surfaces, self.accumulation) = sides;
+                self.resets.truncate(resets);
+                self.pieces.clear();
                 // The state is that before the step.
                 if let Ok(base) = self.stepper_at(&from, self.h, false) {
                     (self.base, self.origin, self.before) = (base, from, self.k);

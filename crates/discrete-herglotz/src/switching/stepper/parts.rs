@@ -1,16 +1,18 @@
 //! The parts of a step that end on the zeros of switching functions, or whose defect is within a bound.
 
-use crate::StepError;
 use crate::gauss::StepStart;
+use crate::integration::{Piece, Reset};
 use crate::solve::roots::bracketed_root;
 use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::accumulation::Accumulation;
 use crate::switching::stepper::as_stepper::AsStepper;
-use crate::switching::surfaces::{SignChange, StepCurve, TimedState};
-use crate::{InputError, Problem, theory::legendre_inverse};
+use crate::switching::surfaces::{Departure, SignChange, StepCurve, TimedState};
+use crate::{DenseStep, InputError, Problem, StepError, theory::legendre_inverse};
 use contact_geom::{
-    Lagrangian, PhasePoint,
+    Derivatives, Lagrangian, PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
+    switching::Control,
 };
 
 /// The largest number of parts of a step; a step with more fails with [`StepError::Switching`] or
@@ -21,9 +23,28 @@ const MAX_PARTS: usize = 4096;
 /// pushed to a surface from both sides has infinitely many.
 const MAX_CHANGES_AT_ONE_POINT: usize = 16;
 
+/// The length of the first part after a reset, in units of the time since the reset before it at the same surface:
+/// longer than the flights of a bouncing motion, which decrease or stay the same.
+const FLIGHTS_PER_PART: f64 = 4.0;
+
 /// The largest number of Newton iterations for a zero before it is bracketed: they converge quadratically from a zero
 /// of the curve of the step.
 const MAX_NEWTON_ITERATIONS: usize = 8;
+
+/// A piece of a step since the last reset.
+struct OpenPiece<const N: usize> {
+    from: TimedState<N>,
+    /// The number of its parts, and the dense output of the last one.
+    parts: usize,
+    dense: Option<DenseStep<N>>,
+}
+
+impl<const N: usize> OpenPiece<N> {
+    fn add(&mut self, part: &impl AsStepper<N>) {
+        self.parts += 1;
+        self.dense = part.stepper().dense();
+    }
+}
 
 /// A part of a step.
 struct Part<S, const N: usize> {
@@ -53,12 +74,14 @@ where
         let span = t_end - from.t;
         let spacing = 4.0 * f64::EPSILON * max_or_nan(max_or_nan(from.t.abs(), t_end.abs()), span.abs());
         let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
+        let mut piece = OpenPiece { from, parts: 0, dense: None };
         for _ in 0..MAX_PARTS {
-            let rest = t_end - at.t;
-            if rest * span <= 0.0 {
+            if (t_end - at.t) * span <= 0.0 {
+                self.end_piece(&mut piece, &at);
                 return Ok((at, sigma));
             }
-            let t = if rest.abs() <= longest { t_end } else { at.t + longest.copysign(span) };
+            let until = self.next_end(at.t, t_end, spacing);
+            let t = if (until - at.t).abs() <= longest { until } else { at.t + longest.copysign(span) };
             if longest <= spacing {
                 return Err(if too_long { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } });
             }
@@ -79,6 +102,7 @@ where
             }
             let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
+                piece.add(&stepper);
                 self.keep(stepper);
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
@@ -96,6 +120,7 @@ where
                 }
                 Some(stepper) => {
                     sigma *= stepper.stepper().sigma();
+                    piece.add(&stepper);
                     self.keep(stepper);
                     changes_at_point = 0;
                 }
@@ -104,8 +129,16 @@ where
             if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
-            at = self.through(to, change.index, span)?;
-            (longest, switches) = (span.abs(), true);
+            let resets = self.resets.len();
+            let (next, factor) = self.through(to, change.index, span, spacing)?;
+            if self.resets.len() > resets {
+                self.end_piece(&mut piece, &to);
+                piece = OpenPiece { from: next, parts: 0, dense: None };
+            }
+            (at, sigma) = (next, sigma * factor);
+            // The curve of a part that is much longer than the next flight would round it away.
+            longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
+            switches = true;
         }
         let divides = self.max_defect < f64::INFINITY && !switches;
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
@@ -117,14 +150,36 @@ where
         }
     }
 
-    /// The state at a zero, on the side where the motion continues.
-    fn through(&mut self, at: TimedState<N>, index: usize, span: f64) -> Result<TimedState<N>, StepError> {
+    /// Ends the piece of a step that has resets.
+    fn end_piece(&mut self, piece: &mut OpenPiece<N>, to: &TimedState<N>) {
+        if !self.resets.is_empty() {
+            let dense = piece.dense.filter(|_| piece.parts == 1);
+            self.pieces.push(Piece { from: (piece.from.t, piece.from.state), to: (to.t, to.state), dense });
+        }
+    }
+
+    /// The state after a zero, on the side where the motion continues, and the conformal factor of the passage.
+    fn through(
+        &mut self,
+        at: TimedState<N>,
+        index: usize,
+        span: f64,
+        spacing: f64,
+    ) -> Result<(TimedState<N>, f64), StepError> {
         let max_displacement = max_abs_or_nan(at.v.iter().map(|v| v * span));
         let lagrangian = self.problem.lagrangian;
+        let to = match lagrangian.at_switch(index, at.t, &at.point(), self.surfaces.side(index) < 0.0) {
+            Control::Replace(to) => Some((to, None)),
+            Control::Conformal { to, factor } => Some((to, Some(factor))),
+            _ => None,
+        };
+        if let Some((to, factor)) = to {
+            return self.reset(at, index, (to, factor), spacing).map(|at| (at, factor.unwrap_or(1.0)));
+        }
         let p = match corner(lagrangian, &mut self.surfaces, index, &at, max_displacement)? {
             Corner::Continuous => {
                 self.surfaces.cross(index);
-                return Ok(at);
+                return Ok((at, 1.0));
             }
             Corner::Refracted(p) => {
                 self.surfaces.cross(index);
@@ -134,7 +189,44 @@ where
         };
         let state = PhasePoint { p, ..at.state };
         let v = legendre_inverse(lagrangian, at.t, &state, &at.v)?.v;
-        Ok(TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at })
+        Ok((TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at }, 1.0))
+    }
+
+    /// The state after a reset.
+    fn reset(
+        &mut self,
+        at: TimedState<N>,
+        index: usize,
+        (mut to, factor): (VelocityPoint<N>, Option<f64>),
+        spacing: f64,
+    ) -> Result<TimedState<N>, StepError> {
+        let (lagrangian, side, mut t) = (self.problem.lagrangian, self.surfaces.side(index), at.t);
+        let mut limit = self.accumulation.add(index, t, self.h, spacing);
+        // A state that is stopped on the surface and pushed through it is the limit of impacts too.
+        let departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h);
+        if departure.is_some_and(|Departure { side: next, with_rate }| !with_rate && next * side < 0.0) {
+            limit = Some(t);
+        }
+        if let Some(limit) = limit {
+            match lagrangian.at_accumulation(index, limit, &to) {
+                Control::Replace(rest) => (to, t) = (rest, limit),
+                _ => return Err(StepError::Accumulation { t: limit }),
+            }
+            self.accumulation = Accumulation::default();
+        }
+        let p = lagrangian.gradient(t, &to).y;
+        let state = PhasePoint { q: to.q, p, z: to.z };
+        if state.check().is_err() || to.v.iter().any(|v| !v.is_finite()) {
+            return Err(StepError::ResetUndefined { t });
+        }
+        let value = self.surfaces.value(lagrangian, index, (t, &to));
+        if side * value < -self.surfaces.rounding(lagrangian, index, (t, &to), self.h) {
+            return Err(StepError::ResetBeyond { t });
+        }
+        self.surfaces.reset(lagrangian, t, &to, self.h);
+        self.changed_energy |= factor.is_none();
+        self.resets.push(Reset { t, index, before: at.state, after: state });
+        Ok(TimedState { t, state, v: to.v, rests: StepStart::ZERO })
     }
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.

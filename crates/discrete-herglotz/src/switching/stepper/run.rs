@@ -6,7 +6,8 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::surfaces::TimedState;
 use crate::{
-    DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, UnresolvedStep,
+    integration::{Piece, Reset, SuspectInterval},
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
@@ -18,6 +19,7 @@ where
     M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
+        self.resets.clear();
         for taken in 0..steps {
             self.step().map_err(|cause| StepFailure { taken, cause })?;
             self.k += 1;
@@ -49,11 +51,23 @@ where
         if self.switched { None } else { self.base.stepper().dense() }
     }
 
+    fn resets(&self) -> &[Reset<N>] {
+        &self.resets
+    }
+
+    fn pieces(&self) -> &[Piece<N>] {
+        &self.pieces
+    }
+
+    fn has_changed_energy(&self) -> bool {
+        self.changed_energy
+    }
+
     fn work_summary(&self) -> Vec<PlanEntry> {
         let mut items = self.base.stepper().work_summary();
         items.push(PlanEntry::computed(
             "switching functions",
-            "L has kinks or jumps: steps end where the motion crosses them",
+            "steps end at kinks and jumps, at resets, and at named times",
         ));
         items
     }
@@ -63,6 +77,8 @@ where
         [self.k, self.before].save(&mut words);
         [self.origin, self.here].save(&mut words);
         self.surfaces.sides.save(&mut words);
+        self.accumulation.save(&mut words);
+        u64::from(self.changed_energy).save(&mut words);
         (self.sigma, self.spent).save(&mut words);
         save_option(self.unresolved.as_ref(), &mut words);
         words.extend(self.base.stepper().save()?);
@@ -99,6 +115,10 @@ where
         let mut states = [self.origin, self.here];
         states.load(from)?;
         self.surfaces.sides.load(from)?;
+        self.accumulation.load(from)?;
+        let mut changed_energy = 0u64;
+        changed_energy.load(from)?;
+        self.changed_energy = changed_energy != 0;
         let mut numbers = (self.sigma, self.spent);
         numbers.load(from)?;
         self.unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;

@@ -1,0 +1,59 @@
+//! Named times of kinks and jumps.
+
+use crate::dynamics::lagrangian::forward_lagrangian;
+use crate::switching::Control;
+use crate::{GeometryError, Hints, Lagrangian, VelocityPoint};
+use nalgebra::{SMatrix, SVector};
+
+/// A Lagrangian, or a Lagrangian with a force, that has a kink or a jump in time at each of these times: steps end
+/// there, whatever the integrator.
+///
+/// ```
+/// use contact_geom::{Lagrangian, switching::Breaks, systems::Pendulum};
+/// let driven = Breaks::new(Pendulum { gamma: -0.1 }, vec![3.0, 1.0])?;
+/// assert_eq!(Lagrangian::<1>::breaks(&driven), [1.0, 3.0]);
+/// # Ok::<(), contact_geom::GeometryError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Breaks<L> {
+    lagrangian: L,
+    times: Vec<f64>,
+}
+
+impl<L> Breaks<L> {
+    /// The Lagrangian with these times, in any order.
+    ///
+    /// # Errors
+    /// [`GeometryError::NonFinite`] for a time that is not finite.
+    pub fn new(lagrangian: L, mut times: Vec<f64>) -> Result<Self, GeometryError> {
+        if let Some((index, &value)) = times.iter().enumerate().find(|(_, t)| !t.is_finite()) {
+            return Err(GeometryError::NonFinite { what: "breaks", index, value });
+        }
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        Ok(Breaks { lagrangian, times })
+    }
+}
+
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Breaks<L> {
+    const HINTS: Hints = Hints { switching_functions: true, ..L::HINTS };
+
+    forward_lagrangian!(of_value, self => self.lagrangian);
+    forward_lagrangian!(of_force, self => self.lagrangian);
+
+    fn structure(&self) -> crate::Structure {
+        self.lagrangian.structure()
+    }
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        self.lagrangian.switching_functions(t, x, values);
+    }
+    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
+        self.lagrangian.at_switch(index, t, x, rising)
+    }
+    fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
+        self.lagrangian.at_accumulation(index, t, x)
+    }
+    fn breaks(&self) -> &[f64] {
+        &self.times
+    }
+}

@@ -1,0 +1,181 @@
+//! Impacts on surfaces.
+
+use crate::dynamics::lagrangian::forward_lagrangian;
+use crate::number::linear::solve;
+use crate::switching::Control;
+use crate::{ChartVector, Derivatives, Dual, Hints, Lagrangian, Scalar, VelocityPoint};
+use nalgebra::{SMatrix, SVector};
+
+/// The largest number of Newton iterations for the state after an impact. The energy is convex along the normal, so
+/// that they converge from the reflected velocity; bisection would need as many.
+const MAX_ITERATIONS: usize = 60;
+
+/// The number of iterations after the velocity has converged, each of which gives one more order of derivatives of dual
+/// numbers: two for second derivatives, and one for the round-off.
+const MAX_EXTRA_ITERATIONS: usize = 3;
+
+/// A surface `g(t, q) = 0` that bounds the motions with `g >= 0`, written once as a generic function.
+pub trait Surface<const N: usize> {
+    /// The value `g(t, q)`, positive where motions are admitted.
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>) -> T;
+
+    /// The normal `g_q` and the rate `g_t`.
+    fn normal<T: Scalar>(&self, t: T, q: &SVector<T, N>) -> (SVector<T, N>, T) {
+        let mut moving = q.map(Dual::<T, ChartVector<N, T>>::constant);
+        let mut time = Dual::<T, ChartVector<N, T>>::constant(t);
+        for i in 0..N {
+            moving[i].d.x[i] = T::one();
+        }
+        time.d.z = T::one();
+        let g = self.value(time, &moving);
+        (g.d.x, g.d.z)
+    }
+}
+
+/// The law of an impact on a surface `g(t, q) = 0`.
+///
+/// At an impact the position is continuous, and the momentum changes along the normal. With `lambda` the factor of the
+/// law,
+///
+/// `p+ = lambda p- + mu g_q`, `z+ = lambda z-`,
+///
+/// and mu follows from the energy or from the normal velocity. For the first and the third law the form `dz - p dq +
+/// H dt` on the surface is multiplied by lambda: on it `g_q . dq + g_t dt = 0`, so that
+/// `-p+ . dq + H+ dt = lambda (-p- . dq + H- dt)` if and only if `H+ = lambda H- - mu g_t`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Impact {
+    /// The energy is conserved on a surface at rest, `H+ = H- - mu g_t`: strictly contact, `lambda = 1`.
+    Elastic,
+    /// Newton's law: the normal velocity relative to the surface is multiplied by `-e`, the tangential momentum is
+    /// conserved. Not contact unless e = 1.
+    Restitution(f64),
+    /// The conformally contact law with the factor `lambda` between 0 and 1, `H+ = lambda H- - mu g_t`. On a surface at
+    /// rest where the potential vanishes, the restitution is `sqrt(lambda)` at normal incidence.
+    Conformal(f64),
+}
+
+impl Impact {
+    /// The factor by which the law multiplies the contact form; `None` if it is not contact.
+    pub fn factor(self) -> Option<f64> {
+        match self {
+            Impact::Elastic => Some(1.0),
+            Impact::Restitution(e) => (e == 1.0).then_some(1.0),
+            Impact::Conformal(factor) => Some(factor),
+        }
+    }
+
+    /// The state after an impact on a surface with the normal `g_q` and the rate `g_t`. `None` if there is no state with
+    /// which the motion leaves the surface: the law takes more energy than the motion has, `L_vv` is singular, or a
+    /// number is not finite.
+    pub fn after<T: Scalar, const N: usize>(
+        self,
+        lagrangian: &impl Lagrangian<N>,
+        t: T,
+        x: &VelocityPoint<N, T>,
+        (normal, rate): (&SVector<T, N>, T),
+    ) -> Option<VelocityPoint<N, T>> {
+        let (factor, restitution) = match self {
+            Impact::Elastic => (1.0, 1.0),
+            Impact::Restitution(e) => (1.0, e),
+            Impact::Conformal(factor) => (factor, factor.sqrt()),
+        };
+        let by_energy = !matches!(self, Impact::Restitution(_));
+        let (before, slope) = lagrangian.with_gradient(t, x);
+        let p = slope.y;
+        let energy = x.v.dot(&p) - before;
+        let approach = normal.dot(&x.v) + rate;
+        let z = x.z * factor;
+        let divided = |w: &SMatrix<T, N, N>, by: &SVector<T, N>| {
+            let (mut w, mut by) = (*w, *by);
+            solve(&mut w, &mut by).ok().map(|_| by)
+        };
+        // The reflected velocity, for the mass matrix before the impact.
+        let across = divided(&lagrangian.mass_matrix(t, x), normal)?;
+        let mut mu = -approach * (restitution + factor) / normal.dot(&across);
+        let mut y = VelocityPoint { q: x.q, v: x.v * T::from(factor) + across * mu, z };
+        let (mut converged, mut last) = (0, f64::INFINITY);
+        for _ in 0..MAX_ITERATIONS {
+            let (value, slope) = lagrangian.with_gradient(t, &y);
+            let w = lagrangian.mass_matrix(t, &y);
+            let residual = slope.y - p * T::from(factor) - normal * mu;
+            let (along, across) = (divided(&w, &residual)?, divided(&w, normal)?);
+            let (of_law, direction, of_mu) = if by_energy {
+                (y.v.dot(&slope.y) - value - energy * factor + mu * rate, w * y.v, rate)
+            } else {
+                (normal.dot(&y.v) + rate + approach * restitution, *normal, T::zero())
+            };
+            let change = (direction.dot(&along) - of_law) / (direction.dot(&across) + of_mu);
+            let step = across * change - along;
+            (mu, y.v) = (mu + change, y.v + step);
+            let [size, of] = [&step, &y.v].map(|v| v.iter().fold(0.0, |m: f64, v| m.max(v.pivot_size())));
+            if !(size.is_finite() && mu.extent().is_finite()) {
+                return None;
+            }
+            if size <= f64::EPSILON * of || size >= last && size <= 64.0 * f64::EPSILON * of {
+                converged += 1;
+            }
+            if converged == MAX_EXTRA_ITERATIONS {
+                let departure = normal.dot(&y.v) + rate;
+                return (departure.re() * approach.re() <= 0.0).then_some(y);
+            }
+            last = size;
+        }
+        None
+    }
+}
+
+/// A Lagrangian whose motions are bounded by a [`Surface`], on which they rebound by the law of an [`Impact`].
+#[derive(Clone, Copy, Debug)]
+pub struct Impacts<L, S> {
+    /// The Lagrangian.
+    pub lagrangian: L,
+    /// The surface.
+    pub surface: S,
+    /// The law.
+    pub law: Impact,
+}
+
+impl<L, S> Impacts<L, S> {
+    /// A Lagrangian with impacts on a surface.
+    pub fn new(lagrangian: L, surface: S, law: Impact) -> Self {
+        Impacts { lagrangian, surface, law }
+    }
+}
+
+impl<const N: usize, L: Lagrangian<N>, S: Surface<N>> Lagrangian<N> for Impacts<L, S> {
+    const HINTS: Hints = Hints { switching_functions: true, ..L::HINTS };
+
+    forward_lagrangian!(of_value, self => self.lagrangian);
+    forward_lagrangian!(of_force, self => self.lagrangian);
+
+    fn structure(&self) -> crate::Structure {
+        self.lagrangian.structure()
+    }
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        values.push(self.surface.value(t, &x.q));
+        self.lagrangian.switching_functions(t, x, values);
+    }
+    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
+        let Some(index) = index.checked_sub(1) else {
+            if rising {
+                return Control::Continue;
+            }
+            let (normal, rate) = self.surface.normal(t, &x.q);
+            // A state that does not exist is refused as one that is not finite.
+            let to = self.law.after(&self.lagrangian, t, x, (&normal, rate));
+            let to = to.unwrap_or(VelocityPoint { v: SVector::repeat(f64::NAN), ..*x });
+            return match self.law.factor() {
+                Some(factor) => Control::Conformal { to, factor },
+                None => Control::Replace(to),
+            };
+        };
+        self.lagrangian.at_switch(index, t, x, rising)
+    }
+    fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
+        index.checked_sub(1).map_or(Control::Continue, |index| self.lagrangian.at_accumulation(index, t, x))
+    }
+    fn breaks(&self) -> &[f64] {
+        self.lagrangian.breaks()
+    }
+}
