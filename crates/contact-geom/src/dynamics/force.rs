@@ -93,6 +93,13 @@ pub struct Forced<L, F> {
     pub force: F,
 }
 
+impl<L, F> Forced<L, F> {
+    /// A Lagrangian with a force.
+    pub fn new(lagrangian: L, force: F) -> Self {
+        Forced { lagrangian, force }
+    }
+}
+
 impl<const N: usize, L: Lagrangian<N>, F: Force<N>> Lagrangian<N> for Forced<L, F> {
     const HINTS: Hints = Hints { forced: true, ..L::HINTS };
 

@@ -1,7 +1,7 @@
 //! Lagrangians L(t, q, v, z).
 
 use crate::switching::Control;
-use crate::{ChartVector, Force, ForceStructure, Forced, Hessian, Scalar, Structure, VelocityPoint};
+use crate::{ChartVector, ForceStructure, Hessian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -128,14 +128,6 @@ pub trait Lagrangian<const N: usize> {
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> SVector<T, N> {
         SVector::from_fn(|_, _| T::zero())
-    }
-
-    /// This Lagrangian with an applied force.
-    fn with_force<F: Force<N>>(self, force: F) -> Forced<Self, F>
-    where
-        Self: Sized,
-    {
-        Forced { lagrangian: self, force }
     }
 
     /// What integrators may rely on about the applied force. By default nothing, if [`Hints::forced`] is set, and
