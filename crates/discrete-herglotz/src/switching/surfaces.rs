@@ -110,7 +110,9 @@ pub(super) struct SignChange {
 pub(super) struct Departure {
     /// The sign that the function takes.
     pub side: f64,
-    /// Whether the function has a rate there; otherwise it changes by its second derivative.
+    /// The rate of the function.
+    pub rate: f64,
+    /// Whether the rate is not zero up to round-off; otherwise the function changes by its second derivative.
     pub with_rate: bool,
 }
 
@@ -134,9 +136,29 @@ impl Surfaces {
         surfaces
     }
 
-    /// The sides after a reset.
-    pub fn reset<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
-        *self = Surfaces::at(lagrangian, t, x, h);
+    /// The sides after a reset from one point to another at the surface `index`, which the motion leaves as given. The
+    /// motion stays on its side of every other surface on which the reset leaves it.
+    pub fn reset<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        (index, departure): (usize, Option<Departure>),
+        t: f64,
+        [from, to]: [&VelocityPoint<N>; 2],
+        h: f64,
+    ) {
+        let old = self.clone();
+        *self = Surfaces::at(lagrangian, t, to, h);
+        for i in 0..self.sides.len() {
+            let mut is_on = |x: &VelocityPoint<N>| {
+                let rounding = self.rounding(lagrangian, i, (t, x), h);
+                self.value(lagrangian, i, (t, x)).abs() <= rounding
+            };
+            let side = if i == index { departure.map(|departure| departure.side) } else { None };
+            let stays = i != index && is_on(from) && is_on(to);
+            if let Some(of) = self.sides.get_mut(i) {
+                *of = side.unwrap_or(if stays { old.side(i) } else { *of });
+            }
+        }
     }
 
     /// The round-off of a function at a point that is reached by steps of length h: its change when each number of the
@@ -171,24 +193,26 @@ impl Surfaces {
     /// Gives each function that is zero up to round-off the sign that it takes next along the motion.
     fn leave<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
         for index in 0..self.sides.len() {
-            let departure = self.departure(lagrangian, index, (t, x), h);
+            let tolerance = self.rounding(lagrangian, index, (t, x), h);
+            let departure = self.departure(lagrangian, index, (t, x), h, tolerance);
             if let (Some(Departure { side, .. }), Some(of)) = (departure, self.sides.get_mut(index)) {
                 *of = side;
             }
         }
     }
 
-    /// The side to which a motion that is on a surface up to round-off goes next; `None` if it is not on the surface, or
-    /// stays on it to second order. `h` is the length of a step.
+    /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
+    /// not on the surface, or stays on it to second order. `h` is the length of a step.
     pub fn departure<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
         index: usize,
         (t, x): (f64, &VelocityPoint<N>),
         h: f64,
+        tolerance: f64,
     ) -> Option<Departure> {
         let here = self.value(lagrangian, index, (t, x));
-        if here.is_nan() || here.abs() > self.rounding(lagrangian, index, (t, x), h) {
+        if here.is_nan() || here.abs() > tolerance {
             return None;
         }
         let (a, l) = match herglotz_field(lagrangian, t, x) {
@@ -204,8 +228,8 @@ impl Surfaces {
         let (odd, even) = (0.5 * (later - earlier), 0.5 * (later + earlier));
         let rounding = self.rounding(lagrangian, index, (t, x), dt);
         match (odd.abs() > rounding, even.abs() > 0.0) {
-            (true, _) => Some(Departure { side: sign(odd), with_rate: true }),
-            (false, true) => Some(Departure { side: sign(even), with_rate: false }),
+            (true, _) => Some(Departure { side: sign(odd), rate: odd / dt, with_rate: true }),
+            (false, true) => Some(Departure { side: sign(even), rate: 0.0, with_rate: false }),
             (false, false) => None,
         }
     }

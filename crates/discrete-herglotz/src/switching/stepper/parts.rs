@@ -5,7 +5,7 @@ use crate::integration::{Piece, Reset};
 use crate::solve::roots::bracketed_root;
 use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::stepper::accumulation::Accumulation;
+use crate::switching::stepper::accumulation::{Accumulation, Resolution};
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::surfaces::{Departure, SignChange, StepCurve, TimedState};
 use crate::{DenseStep, InputError, Problem, StepError, theory::legendre_inverse};
@@ -201,15 +201,22 @@ where
         spacing: f64,
     ) -> Result<TimedState<N>, StepError> {
         let (lagrangian, side, mut t) = (self.problem.lagrangian, self.surfaces.side(index), at.t);
-        let mut limit = self.accumulation.add(index, t, self.h, spacing);
+        let from = at.point();
+        let tolerance = self.surfaces.rounding(lagrangian, index, (t, &from), self.h);
+        let mut departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h, tolerance);
+        let rate = departure.map_or(0.0, |departure| departure.rate);
+        let resolution = Resolution { h: self.h, spacing, rate, rounding: tolerance };
+        let mut limit = self.accumulation.add(index, t, &resolution);
         // A state that is stopped on the surface and pushed through it is the limit of impacts too.
-        let departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h);
-        if departure.is_some_and(|Departure { side: next, with_rate }| !with_rate && next * side < 0.0) {
+        if departure.is_some_and(|Departure { side: next, with_rate, .. }| !with_rate && next * side < 0.0) {
             limit = Some(t);
         }
         if let Some(limit) = limit {
             match lagrangian.at_accumulation(index, limit, &to) {
-                Control::Replace(rest) => (to, t) = (rest, limit),
+                Control::Replace(rest) => {
+                    (to, t) = (rest, limit);
+                    departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h, tolerance);
+                }
                 _ => return Err(StepError::Accumulation { t: limit }),
             }
             self.accumulation = Accumulation::default();
@@ -220,10 +227,10 @@ where
             return Err(StepError::ResetUndefined { t });
         }
         let value = self.surfaces.value(lagrangian, index, (t, &to));
-        if side * value < -self.surfaces.rounding(lagrangian, index, (t, &to), self.h) {
+        if side * value < -max_or_nan(tolerance, self.surfaces.rounding(lagrangian, index, (t, &to), self.h)) {
             return Err(StepError::ResetBeyond { t });
         }
-        self.surfaces.reset(lagrangian, t, &to, self.h);
+        self.surfaces.reset(lagrangian, (index, departure), t, [&from, &to], self.h);
         self.changed_energy |= factor.is_none();
         self.resets.push(Reset { t, index, before: at.state, after: state });
         Ok(TimedState { t, state, v: to.v, rests: StepStart::ZERO })
