@@ -14,7 +14,25 @@ pub enum FormulaError {
     /// The text is not a formula.
     #[error(transparent)]
     Parse(#[from] ParseError),
-    /// The name of a coordinate or of a parameter is invalid.
+    /// The text that names a coordinate for a force is not the name of one, or the coordinate has a force.
+    #[error(transparent)]
+    Target(ParseError),
+    /// Two forces on a coordinate.
+    #[error("the force on `{coordinate}` is given twice; give one sum")]
+    ForceTwice {
+        /// The coordinate.
+        coordinate: String,
+    },
+    /// An identifier of a node that the graph of the formula does not have.
+    #[error("a node does not belong to the graph of the formula; build forces and resets in the graph of L")]
+    ForeignNode,
+    /// The formula has a part that cannot be written in Rust.
+    #[error("the formula has {what}, which the Rust source of a Lagrangian does not contain; use the formula itself")]
+    NotInRust {
+        /// The part.
+        what: &'static str,
+    },
+    /// The name of a coordinate, a parameter or a table is invalid.
     #[error("the name {name:?} {why}")]
     Name {
         /// The name.
@@ -79,6 +97,13 @@ pub enum FormulaError {
         /// The bound.
         limit: usize,
     },
+}
+
+impl FormulaError {
+    /// An error on a whole text that names what is assigned.
+    pub(crate) fn target(text: &str, message: impl Into<String>) -> Self {
+        FormulaError::Target(ParseError::at(text, (0, text.len()), message))
+    }
 }
 
 /// A position in a text that cannot be parsed, with the reason. `Display` shows the line, with the position marked

@@ -1,5 +1,6 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
+use crate::forces::Forces;
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser, ValueName};
 use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
@@ -24,6 +25,7 @@ pub struct Formula {
     pub(crate) graph: Graph,
     pub(crate) root: Id,
     pub(crate) values: Vec<f64>,
+    pub(crate) forces: Forces,
 }
 
 impl Formula {
@@ -36,9 +38,9 @@ impl Formula {
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let names = Names::new(coordinates, parameters)?;
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph, ValueName::Lagrangian)?;
+        let (root, forces) = Parser::parse_formula(text, &names, &mut graph)?;
         let values = parameters.iter().map(|(_, value)| *value).collect();
-        Ok(Formula { names, graph, root, values })
+        Ok(Formula { names, graph, root, values, forces })
     }
 
     /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
@@ -72,7 +74,7 @@ impl Formula {
             return Err(FormulaError::TooLarge { limit: MOST_NODES });
         }
         graph.check(names.dimension, names.parameters.len())?;
-        Ok(Formula { names, graph, root, values })
+        Ok(Formula { names, graph, root, values, forces: Forces::default() })
     }
 
     /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for
@@ -132,14 +134,19 @@ impl Formula {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
     }
 
-    /// The parameters on which the expression depends, in their order.
+    /// The parameters on which the Lagrangian or a force depends, in their order.
     pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
-        let needed = self.graph.needed(self.root);
+        let needed = self.graph.needed_by(&self.roots());
         let is_used = move |i: usize| {
             let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(id, _)| Id(id as u32));
             nodes.any(|id| self.graph.node(id) == Node::Parameter(i as u32))
         };
         self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
+    }
+
+    /// The nodes of all that the formula consists of.
+    fn roots(&self) -> Vec<Id> {
+        std::iter::once(self.root).chain(self.forces.roots()).collect()
     }
 
     /// Sets the value of a parameter.

@@ -58,9 +58,11 @@
 
 mod derivatives;
 mod derived;
+mod drag;
 mod error;
 mod evaluation;
 mod expression;
+mod forces;
 mod formula;
 mod functions;
 mod graph;

@@ -22,11 +22,12 @@ pub(crate) struct Names {
     pub blocks: Vec<Block>,
     pub dimension: usize,
     pub parameters: Vec<String>,
+    pub tables: Vec<String>,
 }
 
 impl Names {
     pub fn new(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let mut names = Names { blocks: Vec::new(), dimension: 0, parameters: Vec::new() };
+        let mut names = Names { blocks: Vec::new(), dimension: 0, parameters: Vec::new(), tables: Vec::new() };
         for coordinate in coordinates {
             let (name, count) = match coordinate.split_once('[') {
                 None => (*coordinate, None),
@@ -64,7 +65,8 @@ impl Names {
         if is_reserved(name) {
             return Err(bad(name, "is reserved; choose another name"));
         }
-        if self.blocks.iter().any(|b| b.name == name) || self.parameters.iter().any(|p| p == name) {
+        let taken = self.parameters.iter().chain(&self.tables).any(|other| other == name);
+        if taken || self.blocks.iter().any(|b| b.name == name) {
             return Err(bad(name, "is given twice"));
         }
         Ok(())
@@ -81,6 +83,7 @@ impl Names {
     pub fn nearest(&self, name: &str, others: &[String]) -> Option<String> {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
         let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
+        let known = known.chain(self.tables.iter().map(String::as_str));
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
         // A known name that is invalid at this position is not suggested as its own correction.
         nearest_name(name, known.filter(|other| *other != name)).map(str::to_owned)

@@ -100,6 +100,22 @@ impl Symbols {
         }
         Formula::named(shared.graph.clone(), lagrangian.id, self.names.clone(), self.values.clone())
     }
+
+    /// The same with forces, in the order of the coordinates. Those that are left out are 0.
+    ///
+    /// # Errors
+    /// Those of [`formula`](Self::formula), and [`FormulaError::Unknown`] if there are more forces than coordinates.
+    pub fn formula_with_forces(
+        &self,
+        lagrangian: &Symbol,
+        forces: &[Option<&Symbol>],
+    ) -> Result<Formula, FormulaError> {
+        if forces.iter().flatten().any(|force| !Rc::ptr_eq(&self.shared, &force.shared)) {
+            return Err(FormulaError::Mixed);
+        }
+        let forces: Vec<Option<Id>> = forces.iter().map(|force| force.map(|force| force.id)).collect();
+        self.formula(lagrangian)?.with_force_nodes(&forces)
+    }
 }
 
 /// An expression of [`Symbols`], with the operators and functions of numbers. Cloning is inexpensive.

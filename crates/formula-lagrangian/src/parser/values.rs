@@ -100,7 +100,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Consumes a prime, if there is one.
-    fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
+    pub(super) fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
         let sign = Token::Sign('\'');
         if self.word(0).token != sign {
             return Ok(false);
@@ -118,7 +118,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The index of an entry in brackets, as that of a coordinate. It is a number at parse time.
-    fn index(&mut self, block: &Block) -> Parsed<u32> {
+    pub(super) fn index(&mut self, block: &Block) -> Parsed<u32> {
         let (name, count) = (&block.name, block.count.unwrap_or(1));
         let open = self.word(0);
         if open.token != Token::Sign('[') {
