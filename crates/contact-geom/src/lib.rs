@@ -56,9 +56,9 @@ pub mod support {
 
 pub use dynamics::{
     Control, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints,
-    Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
-    TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
-    legendre_jacobian, regularity,
+    Interpolation, Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity,
+    Structure, Symmetry, Table, TableError, TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives,
+    herglotz_field, legendre, legendre_jacobian, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{
