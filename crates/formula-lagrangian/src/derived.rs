@@ -1,11 +1,12 @@
 //! The derivatives of a formula for any number of coordinates. This code does not depend on the dimension at compile
 //! time, so that it is compiled once, with this crate.
 
+use crate::breaks::Kinks;
 use crate::drag::ProvedForce;
 use crate::formula::index;
 use crate::node::Inputs;
 use crate::parser::MOST_NODES;
-use crate::structure::{Partials, kinks, proved, switching_functions};
+use crate::structure::{Partials, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Structure;
@@ -42,6 +43,9 @@ pub(crate) struct Derived {
     pub second: Tape,
     /// The functions at whose zeros L or a force has kinks and jumps.
     pub switching: Tape,
+    pub kinks: Kinks,
+    /// The times of kinks and jumps, in ascending order.
+    pub breaks: Vec<f64>,
     /// The force on each coordinate of the formula; `None` if there is none.
     pub applied: Option<Tape>,
     /// The nodes of these forces.
@@ -103,8 +107,8 @@ impl Derived {
         let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
         let cyclic = (0..n).map(&mut free).collect();
         let smooth = sources.iter().all(|id| kinks(&graph, *id) == Inputs::NONE);
-        let switching = switching_functions(&mut graph, &sources);
-        let switching = Tape::new(&graph, &switching, n).ok_or(too_large.clone())?;
+        let kinks = Kinks::of(&mut graph, &sources)?;
+        let switching = Tape::new(&graph, &kinks.functions, n).ok_or(too_large.clone())?;
         let applied = match applied_nodes.as_slice() {
             [] => None,
             forces => Some(Tape::new(&graph, forces, n).ok_or(too_large.clone())?),
@@ -126,6 +130,8 @@ impl Derived {
             mass,
             second,
             switching,
+            kinks,
+            breaks: Vec::new(),
             applied,
             applied_nodes,
             proved_force,
@@ -156,6 +162,7 @@ impl Derived {
             applied.set_constants(&constants);
         }
         self.proved_force.set_constants(&constants);
+        self.breaks = self.kinks.times(&self.formula.graph, &constants, &self.formula.breaks);
         let rate = self.partials.last().filter(|_| self.unforced.constant_rate);
         let rate = rate.and_then(|z| constants.get(z.index()));
         let unforced = Structure { z_free: rate == Some(&0.0), ..self.unforced };

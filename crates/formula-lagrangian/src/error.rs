@@ -26,6 +26,23 @@ pub enum FormulaError {
     /// An identifier of a node that the graph of the formula does not have.
     #[error("a node does not belong to the graph of the formula; build forces and resets in the graph of L")]
     ForeignNode,
+    /// A time at which steps are to end is not finite.
+    #[error("a break of the motion is at the time {time}; it must be a finite number")]
+    Break {
+        /// The time.
+        time: f64,
+    },
+    /// A table with very many samples has an argument that depends on the state, or not linearly on time.
+    #[error(
+        "a table of {found} samples has an argument that is not of the form `a*t + b`; there it can have at most \
+         {limit} samples"
+    )]
+    TableOfState {
+        /// The number of samples.
+        found: usize,
+        /// The bound.
+        limit: usize,
+    },
     /// The formula has a part that cannot be written in Rust.
     #[error("the formula has {what}, which the Rust source of a Lagrangian does not contain; use the formula itself")]
     NotInRust {

@@ -37,7 +37,7 @@ pub struct Expression {
 impl Expression {
     pub(crate) fn parse(formula: &Formula, text: &str, value_name: ValueName) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
-        let mut graph = Graph::new();
+        let mut graph = Graph::with_tables_of(&formula.graph);
         let root = Parser::new(text, &names, &mut graph, value_name)?.beside(formula).program()?;
         let log_factor = graph.has_log_factor(root, names.dimension);
         let width = names.dimension + usize::from(log_factor);

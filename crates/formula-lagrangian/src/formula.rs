@@ -26,6 +26,8 @@ pub struct Formula {
     pub(crate) root: Id,
     pub(crate) values: Vec<f64>,
     pub(crate) forces: Forces,
+    /// The times at which steps end, as given by the user.
+    pub(crate) breaks: Vec<f64>,
 }
 
 impl Formula {
@@ -36,11 +38,24 @@ impl Formula {
     /// [`FormulaError::Parse`] with the position in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
     /// [`FormulaError::ParameterValue`] if a name, the number of coordinates or a value is invalid.
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let names = Names::new(coordinates, parameters)?;
-        let mut graph = Graph::new();
-        let (root, forces) = Parser::parse_formula(text, &names, &mut graph)?;
+        Self::unparsed(coordinates, parameters)?.parsed(text)
+    }
+
+    /// A formula over some names, the Lagrangian of which is 0.
+    pub(crate) fn unparsed(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let values = parameters.iter().map(|(_, value)| *value).collect();
-        Ok(Formula { names, graph, root, values, forces })
+        Ok(Self::new(Graph::new(), Id(0), Names::new(coordinates, parameters)?, values))
+    }
+
+    /// The formula with the Lagrangian and the forces of a text.
+    pub(crate) fn parsed(mut self, text: &str) -> Result<Self, FormulaError> {
+        let Formula { names, graph, root, forces, .. } = &mut self;
+        (*root, *forces) = Parser::parse_formula(text, names, graph)?;
+        Ok(self)
+    }
+
+    fn new(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Self {
+        Formula { names, graph, root, values, forces: Forces::default(), breaks: Vec::new() }
     }
 
     /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
@@ -74,7 +89,7 @@ impl Formula {
             return Err(FormulaError::TooLarge { limit: MOST_NODES });
         }
         graph.check(names.dimension, names.parameters.len())?;
-        Ok(Formula { names, graph, root, values, forces: Forces::default() })
+        Ok(Self::new(graph, root, names, values))
     }
 
     /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for

@@ -232,7 +232,8 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         self.derived.applied.is_some()
     }
 
-    /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`.
+    /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`, in L and in the
+    /// forces. Those that are affine functions of time are [breaks](Lagrangian::breaks) instead.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
         let (tape, first) = (&self.derived.switching, values.len());
         if !tape.results.is_empty() {
@@ -240,5 +241,12 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
             let results = values.get_mut(first..).unwrap_or(&mut []);
             tape.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [results]);
         }
+    }
+
+    /// The zeros of switching functions that are affine functions of time with coefficients from the parameters, as of
+    /// `t - 5` in `if(t > 5, 1, 0)`; the samples of tables at such arguments; and the times of
+    /// [`Formula::with_breaks`].
+    fn breaks(&self) -> &[f64] {
+        &self.derived.breaks
     }
 }

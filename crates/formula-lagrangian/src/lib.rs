@@ -56,6 +56,7 @@
 //! [`MOST_NODES`] nodes. There are at most [`MOST_COORDINATES`] coordinates. Steps do not allocate if a formula needs
 //! at most 256 registers, including its `2 n + 2` inputs.
 
+mod breaks;
 mod derivatives;
 mod derived;
 mod drag;
@@ -76,6 +77,7 @@ mod rotation;
 mod rust_source;
 mod structure;
 mod symbol;
+mod tables;
 mod tape;
 mod token;
 mod translation;

@@ -156,7 +156,8 @@ impl<'a> Parser<'a> {
     fn define(&mut self, name: &'a str, word: Word<'a>, value: Id) -> Parsed<()> {
         let taken = is_reserved(name)
             || self.names.blocks.iter().any(|b| b.name == name)
-            || self.names.parameters.iter().chain(&self.names.tables).any(|p| p == name)
+            || self.names.parameters.iter().any(|p| p == name)
+            || self.names.table(name).is_some()
             || self.locals.iter().any(|(local, _)| *local == name);
         if taken {
             return Err(

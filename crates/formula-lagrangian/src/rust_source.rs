@@ -34,7 +34,8 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// ```
     ///
     /// # Errors
-    /// [`FormulaError::Name`] if `name` is not a valid name of a type.
+    /// [`FormulaError::Name`] if `name` is not a valid name of a type; [`FormulaError::NotInRust`] if the formula has
+    /// tables.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
@@ -43,6 +44,9 @@ impl<const N: usize> FormulaLagrangian<N> {
                 name: name.to_owned(),
                 why: "is not a valid name of a Rust type, such as `MySystem`",
             });
+        }
+        if !self.derived.formula.graph.tables().is_empty() {
+            return Err(FormulaError::NotInRust { what: "tables" });
         }
         let mut text = String::new();
         // Writing to a string does not fail.

@@ -70,28 +70,9 @@ pub(crate) fn kinks(graph: &Graph, of: Id) -> Inputs {
         // `atan2` jumps on a half-axis, and neither has a derivative at the origin.
         Node::Binary(Operation::Atan2 | Operation::Hypot, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
         Node::Select([a, b, ..]) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
+        Node::Table { argument, .. } => kinks.and(graph.inputs(argument)),
         _ => kinks,
     })
-}
-
-/// The functions at whose zeros one of some nodes has a kink or a jump: the arguments of `abs` and `sign`, and the differences
-/// whose sign decides `min`, `max` and `if`. Each is listed once, also if it occurs with both signs; constants are
-/// omitted, since they do not change sign.
-pub(crate) fn switching_functions(graph: &mut Graph, of: &[Id]) -> Vec<Id> {
-    let needed = graph.needed_by(of);
-    let mut functions: Vec<Id> = Vec::new();
-    for id in (0..needed.len()).filter(|i| needed[*i]).map(|i| Id(i as u32)) {
-        let function = match graph.node(id) {
-            Node::Unary(f, a) if !f.is_smooth() => a,
-            Node::Binary(Operation::Min | Operation::Max, a, b) | Node::Select([a, b, ..]) => graph.sub(a, b),
-            _ => continue,
-        };
-        let opposite = graph.neg(function);
-        if !graph.is_constant(function) && !functions.contains(&function) && !functions.contains(&opposite) {
-            functions.push(function);
-        }
-    }
-    functions
 }
 
 impl Graph {
@@ -135,6 +116,7 @@ impl Graph {
                     self.powi(a, n)
                 }
                 Node::Select(all) => self.select(all.map(image)),
+                Node::Table { table, order, argument } => self.lookup(table, order, image(argument)),
                 _ => id,
             };
             images.push(at_rest);

@@ -2,6 +2,7 @@
 
 use crate::names::Names;
 use crate::{Formula, FormulaError, Function, Graph, Id, Operation};
+use contact_geom::Table;
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
@@ -207,6 +208,11 @@ impl Symbol {
     /// `sqrt(self^2 + other^2)` without overflow.
     pub fn hypot(&self, other: impl Operand) -> Symbol {
         self.operate(Operation::Hypot, &other)
+    }
+
+    /// The value of a table at it; see [`Graph::interpolate`].
+    pub fn interpolate(&self, table: &Table) -> Symbol {
+        self.with(|graph| graph.interpolate(table, self.id))
     }
 
     /// `then` if the symbol is less than `than`, else `otherwise`.

@@ -97,8 +97,7 @@ impl<'a> Parser<'a> {
 
     /// Whether a name has no meaning, so that it may be that of an index.
     fn is_free(&self, name: &str) -> bool {
-        !(is_reserved(name) || self.is_value(name) || matches!(name, "q" | "v"))
-            && !self.names.tables.iter().any(|table| table == name)
+        !(is_reserved(name) || self.is_value(name) || matches!(name, "q" | "v")) && self.names.table(name).is_none()
     }
 
     fn no_coordinate(&self, name: &str, word: Word<'a>) -> ParseError {

@@ -52,6 +52,9 @@ impl<'a> Parser<'a> {
             }
             "if" => Err(self.error(word, format!("`if` is a function: {CHOICE}"))),
             "sum" => Err(self.error(word, "`sum` is a function: write `sum(i, 0, n-1, q[i]^2)`")),
+            _ if self.names.table(name).is_some() => {
+                Err(self.error(word, format!("`{name}` is a table, a function: write `{name}(t)`")))
+            }
             _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
             _ => self.quantity(name, word),
         }
