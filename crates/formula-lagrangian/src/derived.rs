@@ -6,6 +6,7 @@ use crate::drag::ProvedForce;
 use crate::formula::index;
 use crate::node::Inputs;
 use crate::parser::MOST_NODES;
+use crate::resets::DerivedReset;
 use crate::structure::{Partials, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
@@ -41,9 +42,11 @@ pub(crate) struct Derived {
     pub mass: Tape,
     /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
     pub second: Tape,
-    /// The functions at whose zeros L or a force has kinks and jumps.
+    /// The functions at whose zeros L or a force has kinks and jumps, and those of resets.
     pub switching: Tape,
     pub kinks: Kinks,
+    /// The resets, whose functions are the last ones in `switching`.
+    pub resets: Vec<DerivedReset>,
     /// The times of kinks and jumps, in ascending order.
     pub breaks: Vec<f64>,
     /// The force on each coordinate of the formula; `None` if there is none.
@@ -108,7 +111,11 @@ impl Derived {
         let cyclic = (0..n).map(&mut free).collect();
         let smooth = sources.iter().all(|id| kinks(&graph, *id) == Inputs::NONE);
         let kinks = Kinks::of(&mut graph, &sources)?;
-        let switching = Tape::new(&graph, &kinks.functions, n).ok_or(too_large.clone())?;
+        let triggers = formula.resets.iter().map(|reset| reset.when);
+        let functions: Vec<Id> = kinks.functions.iter().copied().chain(triggers).collect();
+        let switching = Tape::new(&graph, &functions, n).ok_or(too_large.clone())?;
+        let resets = formula.resets.iter().map(|reset| DerivedReset::new(&graph, reset, n)).collect::<Option<_>>();
+        let resets = resets.ok_or(too_large.clone())?;
         let applied = match applied_nodes.as_slice() {
             [] => None,
             forces => Some(Tape::new(&graph, forces, n).ok_or(too_large.clone())?),
@@ -131,6 +138,7 @@ impl Derived {
             second,
             switching,
             kinks,
+            resets,
             breaks: Vec::new(),
             applied,
             applied_nodes,
@@ -161,6 +169,7 @@ impl Derived {
         if let Some(applied) = &mut self.applied {
             applied.set_constants(&constants);
         }
+        self.resets.iter_mut().for_each(|reset| reset.values.set_constants(&constants));
         self.proved_force.set_constants(&constants);
         self.breaks = self.kinks.times(&self.formula.graph, &constants, &self.formula.breaks);
         let rate = self.partials.last().filter(|_| self.unforced.constant_rate);

@@ -14,7 +14,8 @@ pub enum FormulaError {
     /// The text is not a formula.
     #[error(transparent)]
     Parse(#[from] ParseError),
-    /// The text that names a coordinate for a force is not the name of one, or the coordinate has a force.
+    /// The text that names the coordinate of a force, or a variable that a reset assigns, is not the name of one, or
+    /// names it a second time.
     #[error(transparent)]
     Target(ParseError),
     /// Two forces on a coordinate.
@@ -26,6 +27,12 @@ pub enum FormulaError {
     /// An identifier of a node that the graph of the formula does not have.
     #[error("a node does not belong to the graph of the formula; build forces and resets in the graph of L")]
     ForeignNode,
+    /// A reset that is not one.
+    #[error("a reset {why}")]
+    Reset {
+        /// The reason.
+        why: &'static str,
+    },
     /// A time at which steps are to end is not finite.
     #[error("a break of the motion is at the time {time}; it must be a finite number")]
     Break {

@@ -3,7 +3,7 @@
 use crate::forces::Forces;
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser, ValueName};
-use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
+use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node, ResetNodes};
 
 /// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
 /// parameters, with names chosen by the user.
@@ -28,6 +28,7 @@ pub struct Formula {
     pub(crate) forces: Forces,
     /// The times at which steps end, as given by the user.
     pub(crate) breaks: Vec<f64>,
+    pub(crate) resets: Vec<ResetNodes>,
 }
 
 impl Formula {
@@ -55,7 +56,7 @@ impl Formula {
     }
 
     fn new(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Self {
-        Formula { names, graph, root, values, forces: Forces::default(), breaks: Vec::new() }
+        Formula { names, graph, root, values, forces: Forces::default(), breaks: Vec::new(), resets: Vec::new() }
     }
 
     /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
@@ -149,7 +150,7 @@ impl Formula {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
     }
 
-    /// The parameters on which the Lagrangian or a force depends, in their order.
+    /// The parameters on which the Lagrangian, a force or a reset depends, in their order.
     pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
         let needed = self.graph.needed_by(&self.roots());
         let is_used = move |i: usize| {
@@ -161,7 +162,8 @@ impl Formula {
 
     /// The nodes of all that the formula consists of.
     fn roots(&self) -> Vec<Id> {
-        std::iter::once(self.root).chain(self.forces.roots()).collect()
+        let of_resets = self.resets.iter().flat_map(ResetNodes::roots);
+        std::iter::once(self.root).chain(self.forces.roots()).chain(of_resets).collect()
     }
 
     /// Sets the value of a parameter.

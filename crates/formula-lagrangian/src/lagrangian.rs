@@ -7,7 +7,7 @@ use crate::forces::Work;
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint,
+    ChartVector, Control, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint,
 };
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with gradient and second derivatives in closed form and with
@@ -77,6 +77,17 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.derived.smooth
     }
 
+    /// The number of resets.
+    pub fn resets(&self) -> usize {
+        self.derived.resets.len()
+    }
+
+    /// The number of the reset to which a [switching function](Lagrangian::switching_functions) belongs; `None` for the
+    /// functions of kinks and jumps, which come first.
+    pub fn reset_of(&self, index: usize) -> Option<usize> {
+        index.checked_sub(self.derived.kinks.functions.len()).filter(|reset| *reset < self.resets())
+    }
+
     /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
     pub fn constant_rate(&self) -> Option<f64> {
         let Derived { formula, structure, partials, .. } = &self.derived;
@@ -89,10 +100,13 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// products and areas, such as `x^2 + y^2`; and common translations and rotations of bodies, whose coordinates are
     /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order. With forces, they are those along
     /// which the forces do no work, as far as their expressions show: the forces on the coordinates that are moved are
-    /// 0, or cancel as `F` and `-F`.
+    /// 0, or cancel as `F` and `-F`. With resets, which change momenta, there are none.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along =
             |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
+        if self.resets() > 0 {
+            return Vec::new();
+        }
         let n = self.derived.formula.dimension();
         let Formula { graph, root, .. } = &self.derived.formula;
         let mut work = Work::new(graph, &self.derived.applied_nodes);
@@ -233,7 +247,8 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     }
 
     /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`, in L and in the
-    /// forces. Those that are affine functions of time are [breaks](Lagrangian::breaks) instead.
+    /// forces; those that are affine functions of time are [breaks](Lagrangian::breaks) instead. Then those of the
+    /// resets.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
         let (tape, first) = (&self.derived.switching, values.len());
         if !tape.results.is_empty() {
@@ -241,6 +256,12 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
             let results = values.get_mut(first..).unwrap_or(&mut []);
             tape.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [results]);
         }
+    }
+
+    /// The state after the reset to which the function belongs, if it has this direction. A new value may be NaN.
+    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
+        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        reset.and_then(|reset| reset.after(t, x, rising)).map_or(Control::Continue, Control::Replace)
     }
 
     /// The zeros of switching functions that are affine functions of time with coefficients from the parameters, as of

@@ -24,7 +24,8 @@ const ATANH: &str = include_str!("rust_source/atanh.txt");
 
 impl<const N: usize> FormulaLagrangian<N> {
     /// The source of a file with this Lagrangian as a type. The parameters are its fields; value, gradient, force and
-    /// structure are exactly those of the formula. It needs the crate `contact-geom`.
+    /// structure are exactly those of the formula. Switching functions and breaks are not written. It needs the crate
+    /// `contact-geom`.
     ///
     /// ```
     /// use formula_lagrangian::Formula;
@@ -35,7 +36,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     ///
     /// # Errors
     /// [`FormulaError::Name`] if `name` is not a valid name of a type; [`FormulaError::NotInRust`] if the formula has
-    /// tables.
+    /// tables or resets.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
@@ -47,6 +48,9 @@ impl<const N: usize> FormulaLagrangian<N> {
         }
         if !self.derived.formula.graph.tables().is_empty() {
             return Err(FormulaError::NotInRust { what: "tables" });
+        }
+        if self.resets() > 0 {
+            return Err(FormulaError::NotInRust { what: "resets" });
         }
         let mut text = String::new();
         // Writing to a string does not fail.

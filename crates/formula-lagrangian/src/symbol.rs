@@ -210,6 +210,12 @@ impl Symbol {
         self.operate(Operation::Hypot, &other)
     }
 
+    /// Its node in the graph of the formulas that are made of its [`Symbols`] later, such as for
+    /// [`Formula::with_reset_nodes`].
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
     /// The value of a table at it; see [`Graph::interpolate`].
     pub fn interpolate(&self, table: &Table) -> Symbol {
         self.with(|graph| graph.interpolate(table, self.id))
