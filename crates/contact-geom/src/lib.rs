@@ -54,6 +54,11 @@ pub mod support {
     pub use crate::number::{KernelDual, legendre_polynomials, linear};
 }
 
+/// Functions of time by samples.
+pub mod table {
+    pub use crate::dynamics::{Interpolation, Table, TableError};
+}
+
 /// Surfaces at which a motion is interrupted: impacts, resets, and the times of kinks and jumps.
 pub mod switching {
     pub use crate::dynamics::{Breaks, Control, Impact, Impacts, Surface};

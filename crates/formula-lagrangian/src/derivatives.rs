@@ -165,6 +165,11 @@ impl Graph {
                 let part = self.mul(adjoint, slope);
                 give(self, a, part);
             }
+            Node::Table { table, order, argument } => {
+                let slope = self.lookup(table, order.saturating_add(1), argument);
+                let part = self.mul(adjoint, slope);
+                give(self, argument, part);
+            }
             Node::Powi(a, n) => {
                 let (below, factor) = (self.powi(a, n.saturating_sub(1)), self.number(f64::from(n)));
                 let part = self.mul(adjoint, below);

@@ -1,9 +1,13 @@
 //! The derivatives of a formula for any number of coordinates. This code does not depend on the dimension at compile
 //! time, so that it is compiled once, with this crate.
 
+use crate::breaks::Kinks;
+use crate::drag::ProvedForce;
 use crate::formula::index;
+use crate::node::Inputs;
 use crate::parser::MOST_NODES;
-use crate::structure::{Partials, kinks, proved, switching_functions};
+use crate::resets::DerivedReset;
+use crate::structure::{Partials, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Structure;
@@ -38,8 +42,20 @@ pub(crate) struct Derived {
     pub mass: Tape,
     /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
     pub second: Tape,
-    /// The functions at whose zeros L has kinks and jumps.
+    /// The functions at whose zeros L or a force has kinks and jumps, and those of resets.
     pub switching: Tape,
+    pub kinks: Kinks,
+    /// The resets, whose functions are the last ones in `switching`.
+    pub resets: Vec<DerivedReset>,
+    /// The times of kinks and jumps, in ascending order.
+    pub breaks: Vec<f64>,
+    /// The force on each coordinate of the formula; `None` if there is none.
+    pub applied: Option<Tape>,
+    /// The nodes of these forces.
+    pub applied_nodes: Vec<Id>,
+    pub proved_force: ProvedForce,
+    /// The proved structure of the Lagrangian without the forces.
+    pub unforced: Structure,
 }
 
 impl Derived {
@@ -59,6 +75,9 @@ impl Derived {
         }
         let too_large = FormulaError::TooLarge { limit: MOST_NODES_WITH_GRADIENT };
         let variables = variables(&mut graph, n);
+        let applied_nodes = formula.forces.total(&mut graph, formula.dimension(), MOST_NODES_WITH_GRADIENT);
+        let applied_nodes = applied_nodes.ok_or(too_large.clone())?;
+        let sources: Vec<Id> = std::iter::once(root).chain(formula.forces.roots()).collect();
         let partials = graph.gradient(root, &variables, MOST_NODES_WITH_GRADIENT).ok_or(too_large.clone())?;
         let tape = |graph: &Graph, nodes: &[Id]| Tape::new(graph, nodes, n).ok_or(too_large.clone());
         let (value, force) = (tape(&graph, &[root])?, tape(&graph, partials.get(..n).unwrap_or(&[]))?);
@@ -86,14 +105,22 @@ impl Derived {
             proved(&mut graph, &partials, &constants)
         };
         let (mass, second) = (Tape::new(&graph, &mass, n), Tape::new(&graph, &all, n));
-        let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large) };
+        let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large.clone()) };
         let needed = graph.needed(root);
         let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
         let cyclic = (0..n).map(&mut free).collect();
-        let smooth = kinks(&graph, root) == crate::node::Inputs::NONE;
-        let switching = switching_functions(&mut graph, root);
-        let switching =
-            Tape::new(&graph, &switching, n).ok_or(FormulaError::TooLarge { limit: MOST_NODES_WITH_GRADIENT })?;
+        let smooth = sources.iter().all(|id| kinks(&graph, *id) == Inputs::NONE);
+        let kinks = Kinks::of(&mut graph, &sources)?;
+        let triggers = formula.resets.iter().map(|reset| reset.when);
+        let functions: Vec<Id> = kinks.functions.iter().copied().chain(triggers).collect();
+        let switching = Tape::new(&graph, &functions, n).ok_or(too_large.clone())?;
+        let resets = formula.resets.iter().map(|reset| DerivedReset::new(&graph, reset, n)).collect::<Option<_>>();
+        let resets = resets.ok_or(too_large.clone())?;
+        let applied = match applied_nodes.as_slice() {
+            [] => None,
+            forces => Some(Tape::new(&graph, forces, n).ok_or(too_large.clone())?),
+        };
+        let proved_force = ProvedForce::of(&mut graph, &applied_nodes, n, MOST_NODES_WITH_HESSIAN);
         let formula = Formula { graph, ..formula.clone() };
         let mut derived = Derived {
             formula,
@@ -110,6 +137,13 @@ impl Derived {
             mass,
             second,
             switching,
+            kinks,
+            resets,
+            breaks: Vec::new(),
+            applied,
+            applied_nodes,
+            proved_force,
+            unforced: structure,
         };
         derived.set_constants();
         Ok(derived)
@@ -132,9 +166,16 @@ impl Derived {
         for tape in [value, force, with_force, gradient, rate, with_gradient, mass, second, switching] {
             tape.set_constants(&constants);
         }
-        let rate = self.partials.last().filter(|_| self.structure.constant_rate);
+        if let Some(applied) = &mut self.applied {
+            applied.set_constants(&constants);
+        }
+        self.resets.iter_mut().for_each(|reset| reset.values.set_constants(&constants));
+        self.proved_force.set_constants(&constants);
+        self.breaks = self.kinks.times(&self.formula.graph, &constants, &self.formula.breaks);
+        let rate = self.partials.last().filter(|_| self.unforced.constant_rate);
         let rate = rate.and_then(|z| constants.get(z.index()));
-        self.structure.z_free = rate == Some(&0.0);
+        let unforced = Structure { z_free: rate == Some(&0.0), ..self.unforced };
+        self.structure = self.proved_force.structure(unforced);
     }
 }
 

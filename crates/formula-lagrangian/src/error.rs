@@ -14,7 +14,49 @@ pub enum FormulaError {
     /// The text is not a formula.
     #[error(transparent)]
     Parse(#[from] ParseError),
-    /// The name of a coordinate or of a parameter is invalid.
+    /// The text that names the coordinate of a force, or a variable that a reset assigns, is not the name of one, or
+    /// names it a second time.
+    #[error(transparent)]
+    Target(ParseError),
+    /// Two forces on a coordinate.
+    #[error("the force on `{coordinate}` is given twice; give one sum")]
+    ForceTwice {
+        /// The coordinate.
+        coordinate: String,
+    },
+    /// An identifier of a node that the graph of the formula does not have.
+    #[error("a node does not belong to the graph of the formula; build forces and resets in the graph of L")]
+    ForeignNode,
+    /// A reset that is not one.
+    #[error("a reset {why}")]
+    Reset {
+        /// The reason.
+        why: &'static str,
+    },
+    /// A time at which steps are to end is not finite.
+    #[error("a break of the motion is at the time {time}; it must be a finite number")]
+    Break {
+        /// The time.
+        time: f64,
+    },
+    /// A table with very many samples has an argument that depends on the state, or not linearly on time.
+    #[error(
+        "a table of {found} samples has an argument that is not of the form `a*t + b`; there it can have at most \
+         {limit} samples"
+    )]
+    TableOfState {
+        /// The number of samples.
+        found: usize,
+        /// The bound.
+        limit: usize,
+    },
+    /// The formula has a part that cannot be written in Rust.
+    #[error("the formula has {what}, which the Rust source of a Lagrangian does not contain; use the formula itself")]
+    NotInRust {
+        /// The part.
+        what: &'static str,
+    },
+    /// The name of a coordinate, a parameter or a table is invalid.
     #[error("the name {name:?} {why}")]
     Name {
         /// The name.
@@ -79,6 +121,13 @@ pub enum FormulaError {
         /// The bound.
         limit: usize,
     },
+}
+
+impl FormulaError {
+    /// An error on a whole text that names what is assigned.
+    pub(crate) fn target(text: &str, message: impl Into<String>) -> Self {
+        FormulaError::Target(ParseError::at(text, (0, text.len()), message))
+    }
 }
 
 /// A position in a text that cannot be parsed, with the reason. `Display` shows the line, with the position marked

@@ -3,8 +3,8 @@
 use crate::Function;
 use crate::functions::{atan2, hypot};
 use crate::tape::{Code, InputRegisters, Instruction, PREVIOUS, Tape};
-use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
+use contact_geom::{Scalar, table::Table};
 
 /// The sizes of the register arrays on the stack; a tape that needs more registers has them on the heap. The registers
 /// are cleared before each evaluation, so that a short tape has a small array.
@@ -72,7 +72,7 @@ impl Tape {
         }
         self.enter(at, registers);
         if !self.code.is_empty() {
-            run_apart(&self.code, registers);
+            run_apart(&self.code, &self.tables, registers);
         }
         self.leave(registers, results);
     }
@@ -85,7 +85,7 @@ impl Tape {
             #[inline(always)]
             || {
                 self.enter(at, registers);
-                run(&self.code, registers);
+                run(&self.code, &self.tables, registers);
                 self.leave(registers, results);
             },
         );
@@ -124,20 +124,20 @@ impl Tape {
 
 /// Performs only the instructions, as a separate function.
 #[inline(always)]
-fn run_apart<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
+fn run_apart<T: Scalar>(code: &[Instruction], tables: &[Table], registers: &mut [T]) {
     T::apart(
         #[inline(always)]
-        || run(code, registers),
+        || run(code, tables, registers),
     );
 }
 
 /// Performs the instructions. It returns nothing: a return value would occupy the memory of the previous result, which
 /// would then not be kept in a register.
 #[inline(always)]
-fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
+fn run<T: Scalar>(code: &[Instruction], tables: &[Table], registers: &mut [T]) {
     let mut previous = T::zero();
     for instruction in code {
-        previous = perform(instruction, registers, previous);
+        previous = perform(instruction, tables, registers, previous);
         set(registers, instruction.to, previous);
     }
 }
@@ -181,7 +181,7 @@ fn set<T: Scalar>(registers: &mut [T], register: u16, value: T) {
 
 /// The result of one instruction.
 #[inline(always)]
-fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -> T {
+fn perform<T: Scalar>(instruction: &Instruction, tables: &[Table], registers: &[T], previous: T) -> T {
     let k = instruction.constant();
     let r = |i: u16| if i == PREVIOUS { previous } else { get(registers, i) };
     let a = || r(instruction.a);
@@ -228,6 +228,15 @@ fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -
         ),
         Code::Powi => a().powi(instruction.extra as u32 as i32),
         Code::Select => a().if_less(b(), r(c), r(d)),
+        Code::Table => {
+            let (table, order) = instruction.table_and_order();
+            let table = tables.get(table);
+            apart(
+                a(),
+                #[inline(always)]
+                move |x| table.map_or_else(|| T::from(f64::NAN), |table| table.derivative(order, x)),
+            )
+        }
         Code::Constant => T::from(k),
     }
 }

@@ -37,8 +37,8 @@ pub struct Expression {
 impl Expression {
     pub(crate) fn parse(formula: &Formula, text: &str, value_name: ValueName) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
-        let mut graph = Graph::new();
-        let root = Parser::parse_beside(Some(formula), text, &names, &mut graph, value_name)?;
+        let mut graph = Graph::with_tables_of(&formula.graph);
+        let root = Parser::new(text, &names, &mut graph, value_name)?.beside(formula).program()?;
         let log_factor = graph.has_log_factor(root, names.dimension);
         let width = names.dimension + usize::from(log_factor);
         let tape = Tape::new(&graph, &[root], width).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;

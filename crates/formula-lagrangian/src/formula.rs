@@ -1,8 +1,9 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
+use crate::forces::Forces;
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser, ValueName};
-use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
+use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node, ResetNodes};
 
 /// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
 /// parameters, with names chosen by the user.
@@ -24,6 +25,10 @@ pub struct Formula {
     pub(crate) graph: Graph,
     pub(crate) root: Id,
     pub(crate) values: Vec<f64>,
+    pub(crate) forces: Forces,
+    /// The times at which steps end, as given by the user.
+    pub(crate) breaks: Vec<f64>,
+    pub(crate) resets: Vec<ResetNodes>,
 }
 
 impl Formula {
@@ -34,11 +39,24 @@ impl Formula {
     /// [`FormulaError::Parse`] with the position in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
     /// [`FormulaError::ParameterValue`] if a name, the number of coordinates or a value is invalid.
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let names = Names::new(coordinates, parameters)?;
-        let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph, ValueName::Lagrangian)?;
+        Self::unparsed(coordinates, parameters)?.parsed(text)
+    }
+
+    /// A formula over some names, the Lagrangian of which is 0.
+    pub(crate) fn unparsed(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let values = parameters.iter().map(|(_, value)| *value).collect();
-        Ok(Formula { names, graph, root, values })
+        Ok(Self::new(Graph::new(), Id(0), Names::new(coordinates, parameters)?, values))
+    }
+
+    /// The formula with the Lagrangian and the forces of a text.
+    pub(crate) fn parsed(mut self, text: &str) -> Result<Self, FormulaError> {
+        let Formula { names, graph, root, forces, .. } = &mut self;
+        (*root, *forces) = Parser::parse_formula(text, names, graph)?;
+        Ok(self)
+    }
+
+    fn new(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Self {
+        Formula { names, graph, root, values, forces: Forces::default(), breaks: Vec::new(), resets: Vec::new() }
     }
 
     /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
@@ -72,7 +90,7 @@ impl Formula {
             return Err(FormulaError::TooLarge { limit: MOST_NODES });
         }
         graph.check(names.dimension, names.parameters.len())?;
-        Ok(Formula { names, graph, root, values })
+        Ok(Self::new(graph, root, names, values))
     }
 
     /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for
@@ -132,14 +150,20 @@ impl Formula {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
     }
 
-    /// The parameters on which the expression depends, in their order.
+    /// The parameters on which the Lagrangian, a force or a reset depends, in their order.
     pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
-        let needed = self.graph.needed(self.root);
+        let needed = self.graph.needed_by(&self.roots());
         let is_used = move |i: usize| {
             let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(id, _)| Id(id as u32));
             nodes.any(|id| self.graph.node(id) == Node::Parameter(i as u32))
         };
         self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
+    }
+
+    /// The nodes of all that the formula consists of.
+    fn roots(&self) -> Vec<Id> {
+        let of_resets = self.resets.iter().flat_map(ResetNodes::roots);
+        std::iter::once(self.root).chain(self.forces.roots()).chain(of_resets).collect()
     }
 
     /// Sets the value of a parameter.

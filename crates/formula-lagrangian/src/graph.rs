@@ -2,6 +2,7 @@
 
 use crate::FormulaError;
 use crate::node::{Function, Id, Inputs, Node, Operation};
+use contact_geom::table::Table;
 use std::collections::HashMap;
 
 /// Hash-consed expressions: an expression that is built twice is one node. Each is simplified as it is built, in ways
@@ -25,12 +26,27 @@ pub struct Graph {
     inputs: Vec<Inputs>,
     shapes: Vec<Shape>,
     index: HashMap<Node, Id>,
+    tables: Vec<Table>,
 }
 
 impl Graph {
     /// A graph without nodes.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A graph without nodes, with the tables of another one.
+    pub(crate) fn with_tables_of(other: &Graph) -> Self {
+        Graph { tables: other.tables.clone(), ..Self::default() }
+    }
+
+    /// The tables to which nodes refer by their index.
+    pub fn tables(&self) -> &[Table] {
+        &self.tables
+    }
+
+    pub(crate) fn push_table(&mut self, table: Table) {
+        self.tables.push(table);
     }
 
     /// The number of nodes.
@@ -66,7 +82,7 @@ impl Graph {
         }
     }
 
-    fn intern(&mut self, node: Node) -> Id {
+    pub(crate) fn intern(&mut self, node: Node) -> Id {
         if let Some(id) = self.index.get(&node) {
             return *id;
         }
@@ -109,6 +125,7 @@ impl Graph {
             Node::Binary(..) => false,
             Node::Powi(a, n) => n > 0 && shape(a).bounded,
             Node::Select(all) => all.iter().all(|a| shape(*a).bounded),
+            Node::Table { argument, .. } => shape(argument).bounded,
             _ => true,
         };
         let sum_of = |known: fn(Shape) -> bool, factor: &dyn Fn(Id) -> bool| match node {
@@ -448,6 +465,10 @@ impl Graph {
                 Node::Binary(o, a, b) => o.value(of(a), of(b)),
                 Node::Powi(a, n) => of(a).powi(n),
                 Node::Select([a, b, c, d]) => contact_geom::Scalar::if_less(of(a), of(b), of(c), of(d)),
+                Node::Table { table, order, argument } => {
+                    let table = self.tables.get(table as usize);
+                    table.map_or(f64::NAN, |table| table.derivative(usize::from(order), of(argument)))
+                }
                 _ => 0.0,
             };
             values.push(value);

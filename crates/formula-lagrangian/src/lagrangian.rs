@@ -1,10 +1,15 @@
 //! Formulas as Lagrangians.
 
 use crate::derived::Derived;
+use crate::drag::ProvedForce;
 use crate::evaluation::{At, whole, whole_vector};
+use crate::forces::Work;
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint};
+use contact_geom::switching::Control;
+use contact_geom::{
+    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint,
+};
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with gradient and second derivatives in closed form and with
 /// a proved structure. All formulas of one dimension have the same type, so that integrators are compiled for it once.
@@ -62,15 +67,26 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.derived.set(parameter, value)
     }
 
-    /// The proved structure of L; the same as [`structure`](Lagrangian::structure).
+    /// The proved structure of L with its forces; the same as [`structure`](Lagrangian::structure).
     pub fn proved(&self) -> &Structure {
         &self.derived.structure
     }
 
-    /// Whether L has neither kinks nor jumps: it contains none of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`.
+    /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`.
     /// Integrators reach their order where the motion does not meet a kink or a jump.
     pub fn is_smooth(&self) -> bool {
         self.derived.smooth
+    }
+
+    /// The number of resets.
+    pub fn resets(&self) -> usize {
+        self.derived.resets.len()
+    }
+
+    /// The number of the reset to which a [switching function](Lagrangian::switching_functions) belongs; `None` for the
+    /// functions of kinks and jumps, which come first.
+    pub fn reset_of(&self, index: usize) -> Option<usize> {
+        index.checked_sub(self.derived.kinks.functions.len()).filter(|reset| *reset < self.resets())
     }
 
     /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
@@ -83,23 +99,31 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// The detected symmetries, whose momenta are multiplied by the conformal factor: translations along a coordinate
     /// on which L does not depend; rotations of two coordinates that occur in L only in squares of lengths, scalar
     /// products and areas, such as `x^2 + y^2`; and common translations and rotations of bodies, whose coordinates are
-    /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order.
+    /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order. With forces, they are those along
+    /// which the forces do no work, as far as their expressions show: the forces on the coordinates that are moved are
+    /// 0, or cancel as `F` and `-F`. With resets, which change momenta, there are none.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along =
             |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
+        if self.resets() > 0 {
+            return Vec::new();
+        }
         let n = self.derived.formula.dimension();
         let Formula { graph, root, .. } = &self.derived.formula;
+        let mut work = Work::new(graph, &self.derived.applied_nodes);
         let bodies = graph.sets_of_differences(*root, n);
         let mut seen = Vec::new();
-        seen.extend((0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true)).map(|i| along(&[i])));
-        seen.extend(bodies.iter().filter(|set| graph.moves_into_itself(*root, set)).map(|set| along(set)));
+        let cyclic = (0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true));
+        seen.extend(cyclic.filter(|i| work.vanishes_along(&[*i])).map(|i| along(&[i])));
+        let moving = bodies.iter().filter(|set| graph.moves_into_itself(*root, set));
+        seen.extend(moving.filter(|set| work.vanishes_along(set)).map(|set| along(set)));
         let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, &[(*i, *j)]);
-        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j)));
-        seen.extend(pairs.filter(turns).map(|(i, j)| Symmetry::Rotation(i, j)));
+        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j))).filter(turns);
+        seen.extend(pairs.filter(|pair| work.vanishes_around(&[*pair])).map(|(i, j)| Symmetry::Rotation(i, j)));
         for (k, second) in bodies.iter().enumerate() {
             for first in bodies.iter().take(k).filter(|first| first.len() == second.len()) {
                 let planes: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
-                if graph.turns_into_itself(*root, &planes) {
+                if graph.turns_into_itself(*root, &planes) && work.vanishes_around(&planes) {
                     seen.extend(Symmetry::rotations(&planes));
                 }
             }
@@ -122,7 +146,8 @@ fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> ChartVector
 }
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
-    const HINTS: Hints = Hints { switching_functions: true, proved: true, interpreted: true, ..Hints::NONE };
+    const HINTS: Hints =
+        Hints { switching_functions: true, proved: true, interpreted: true, forced: true, ..Hints::NONE };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
@@ -191,7 +216,40 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         self.derived.structure
     }
 
-    /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`.
+    #[inline(always)]
+    fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        let mut force = SVector::<T, N>::from_fn(|_, _| T::zero());
+        match &self.derived.applied {
+            None => force,
+            Some(tape) => {
+                tape.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
+                whole_vector(&force)
+            }
+        }
+    }
+
+    /// Proved from the expressions of the forces. Quadratic drag is recognised if it is written as `-k*x'*abs(x')` for
+    /// one coordinate, or as `-k*x'*sqrt(x'^2 + y'^2)` or with `hypot(x', y')` for each of several, with the same k; or
+    /// if it follows from a Rayleigh function such as `k/3*(x'^2 + y'^2)^1.5`.
+    fn force_structure(&self) -> ForceStructure<N> {
+        match &self.derived.proved_force {
+            ProvedForce::None => ForceStructure::None,
+            ProvedForce::General => ForceStructure::General,
+            ProvedForce::Drag { linear, quadratic } => ForceStructure::Drag {
+                linear: SVector::from_fn(|i, _| linear.get(i).map_or(0.0, |c| c.value)),
+                quadratic: quadratic.value,
+            },
+        }
+    }
+
+    #[inline(always)]
+    fn has_force(&self) -> bool {
+        self.derived.applied.is_some()
+    }
+
+    /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`, in L and in the
+    /// forces; those that are affine functions of time are [breaks](Lagrangian::breaks) instead. Then those of the
+    /// resets.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
         let (tape, first) = (&self.derived.switching, values.len());
         if !tape.results.is_empty() {
@@ -199,5 +257,18 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
             let results = values.get_mut(first..).unwrap_or(&mut []);
             tape.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [results]);
         }
+    }
+
+    /// The state after the reset to which the function belongs, if it has this direction. A new value may be NaN.
+    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
+        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        reset.and_then(|reset| reset.after(t, x, rising)).map_or(Control::Continue, Control::Replace)
+    }
+
+    /// The zeros of switching functions that are affine functions of time with coefficients from the parameters, as of
+    /// `t - 5` in `if(t > 5, 1, 0)`; the samples of tables at such arguments; and the times of
+    /// [`Formula::with_breaks`].
+    fn breaks(&self) -> &[f64] {
+        &self.derived.breaks
     }
 }

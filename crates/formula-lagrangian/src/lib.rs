@@ -56,11 +56,14 @@
 //! [`MOST_NODES`] nodes. There are at most [`MOST_COORDINATES`] coordinates. Steps do not allocate if a formula needs
 //! at most 256 registers, including its `2 n + 2` inputs.
 
+mod breaks;
 mod derivatives;
 mod derived;
+mod drag;
 mod error;
 mod evaluation;
 mod expression;
+mod forces;
 mod formula;
 mod functions;
 mod graph;
@@ -70,10 +73,12 @@ mod names;
 mod node;
 mod parser;
 mod quantities;
+mod resets;
 mod rotation;
 mod rust_source;
 mod structure;
 mod symbol;
+mod tables;
 mod tape;
 mod token;
 mod translation;
@@ -86,4 +91,5 @@ pub use lagrangian::FormulaLagrangian;
 pub use names::nearest_name;
 pub use node::{Function, Id, Node, Operation};
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
+pub use resets::{Direction, Reset, ResetNodes, Variable};
 pub use symbol::{Operand, Symbol, Symbols};

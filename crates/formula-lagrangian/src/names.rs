@@ -1,6 +1,7 @@
 //! The names that a formula may use.
 
 use crate::functions::{FUNCTIONS, OPERATIONS};
+use crate::tables::NamedTable;
 use crate::{FormulaError, MOST_COORDINATES};
 
 /// The names with a fixed meaning.
@@ -16,17 +17,18 @@ pub(crate) struct Block {
     pub count: Option<usize>,
 }
 
-/// The coordinates and parameters of a formula.
+/// The coordinates, parameters and tables of a formula.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Names {
     pub blocks: Vec<Block>,
     pub dimension: usize,
     pub parameters: Vec<String>,
+    pub tables: Vec<NamedTable>,
 }
 
 impl Names {
     pub fn new(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let mut names = Names { blocks: Vec::new(), dimension: 0, parameters: Vec::new() };
+        let mut names = Names { blocks: Vec::new(), dimension: 0, parameters: Vec::new(), tables: Vec::new() };
         for coordinate in coordinates {
             let (name, count) = match coordinate.split_once('[') {
                 None => (*coordinate, None),
@@ -56,7 +58,7 @@ impl Names {
     }
 
     /// Checks that a new name is valid and not in use.
-    fn check(&self, name: &str) -> Result<(), FormulaError> {
+    pub fn check(&self, name: &str) -> Result<(), FormulaError> {
         let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
         if !(first && name.chars().all(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_')) {
             return Err(bad(name, "must be a letter or `_` followed by letters, digits and `_`"));
@@ -64,7 +66,8 @@ impl Names {
         if is_reserved(name) {
             return Err(bad(name, "is reserved; choose another name"));
         }
-        if self.blocks.iter().any(|b| b.name == name) || self.parameters.iter().any(|p| p == name) {
+        let taken = self.parameters.iter().any(|p| p == name) || self.table(name).is_some();
+        if taken || self.blocks.iter().any(|b| b.name == name) {
             return Err(bad(name, "is given twice"));
         }
         Ok(())
@@ -77,10 +80,16 @@ impl Names {
         })
     }
 
+    /// The index of the table with this name.
+    pub fn table(&self, name: &str) -> Option<u32> {
+        self.tables.iter().find(|table| table.name == name).map(|table| table.index)
+    }
+
     /// The name that is nearest to an unknown one, among the known names and `others`.
     pub fn nearest(&self, name: &str, others: &[String]) -> Option<String> {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
         let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
+        let known = known.chain(self.tables.iter().map(|table| table.name.as_str()));
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
         // A known name that is invalid at this position is not suggested as its own correction.
         nearest_name(name, known.filter(|other| *other != name)).map(str::to_owned)

@@ -101,13 +101,22 @@ pub enum Node {
     Powi(Id, i32),
     /// `c` if `a < b`, else `d`, in the order `[a, b, c, d]`.
     Select([Id; 4]),
+    /// A derivative of a table.
+    Table {
+        /// The index of the table among those of the graph.
+        table: u32,
+        /// The order of the derivative, 0 for the value.
+        order: u8,
+        /// Where it is evaluated.
+        argument: Id,
+    },
 }
 
 impl Node {
     /// The operands of the node.
     pub fn operands(&self) -> impl Iterator<Item = Id> + use<> {
         let (operands, count) = match *self {
-            Node::Unary(_, a) | Node::Powi(a, _) => ([a; 4], 1),
+            Node::Unary(_, a) | Node::Powi(a, _) | Node::Table { argument: a, .. } => ([a; 4], 1),
             Node::Binary(_, a, b) => ([a, b, b, b], 2),
             Node::Select(all) => (all, 4),
             _ => ([Id(0); 4], 0),

@@ -2,9 +2,14 @@
 
 mod calls;
 mod expressions;
+mod forces;
 mod messages;
+mod targets;
 mod values;
 
+pub(crate) use targets::{Kind, Target};
+
+use crate::forces::Forces;
 use crate::names::{Names, is_reserved};
 use crate::token::{Token, Word, words};
 use crate::{Formula, Graph, Id, ParseError};
@@ -44,31 +49,21 @@ pub(crate) struct Parser<'a> {
     value_name: ValueName,
     /// The Lagrangian of an expression, whose energy, momenta and conformal factor the expression may use.
     beside: Option<&'a Formula>,
+    /// The forces of the text; `None` for a text that can have none.
+    forces: Option<Forces>,
 }
 
 type Parsed<T> = Result<T, ParseError>;
 
 impl<'a> Parser<'a> {
-    /// Parses a text into a node of a graph. The text consists of definitions, one per line, and the value at the end,
-    /// with or without a name.
-    pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph, value_name: ValueName) -> Parsed<Id> {
-        Self::parse_beside(None, text, names, graph, value_name)
-    }
-
-    /// The same for an expression that may use the energy, momenta and conformal factor of a Lagrangian.
-    pub fn parse_beside(
-        beside: Option<&'a Formula>,
-        text: &'a str,
-        names: &'a Names,
-        graph: &'a mut Graph,
-        value_name: ValueName,
-    ) -> Parsed<Id> {
+    /// A parser of a text, before its first word.
+    pub fn new(text: &'a str, names: &'a Names, graph: &'a mut Graph, value_name: ValueName) -> Parsed<Self> {
         if text.len() > LONGEST_TEXT {
             let message = format!("the text has {} bytes; it can have at most {LONGEST_TEXT}", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
-        let mut parser = Parser {
+        Ok(Parser {
             text,
             words,
             at: 0,
@@ -79,15 +74,44 @@ impl<'a> Parser<'a> {
             read: 0,
             brackets: 0,
             value_name,
-            beside,
-        };
-        parser.program()
+            beside: None,
+            forces: None,
+        })
     }
 
-    fn program(&mut self) -> Parsed<Id> {
+    /// Parses the text of a Lagrangian, which may also have lines with forces.
+    pub fn parse_formula(text: &'a str, names: &'a Names, graph: &'a mut Graph) -> Parsed<(Id, Forces)> {
+        let mut parser = Self::new(text, names, graph, ValueName::Lagrangian)?;
+        parser.forces = Some(Forces::default());
+        let root = parser.program()?;
+        Ok((root, parser.forces.take().unwrap_or_default()))
+    }
+
+    /// Permits the energy, momenta and conformal factor of a Lagrangian.
+    pub fn beside(mut self, formula: &'a Formula) -> Self {
+        self.beside = Some(formula);
+        self
+    }
+
+    /// Gives an integer a name, if there is one.
+    pub fn with_index(mut self, index: Option<(&'a str, u32)>) -> Self {
+        if let Some((name, i)) = index {
+            let number = self.graph.number(f64::from(i));
+            self.locals.push((name, number));
+        }
+        self
+    }
+
+    /// Parses the text, which consists of definitions and forces, one per line, and the value at the end, with or without
+    /// a name. Returns the value.
+    pub fn program(&mut self) -> Parsed<Id> {
         loop {
             self.skip_lines();
             let (first, second) = (self.word(0), self.word(1));
+            if self.begins_force(first, second) {
+                self.force()?;
+                continue;
+            }
             if let (Token::Name(name), Token::Sign('=')) = (first.token, second.token) {
                 self.at += 2;
                 // A named value is the last one, unless more lines follow.
@@ -103,6 +127,7 @@ impl<'a> Parser<'a> {
                     return Ok(value);
                 }
                 self.define(name, first, value)?;
+                self.note_rayleigh(name, value);
                 continue;
             }
             let value = self.expression(0)?;
@@ -132,6 +157,7 @@ impl<'a> Parser<'a> {
         let taken = is_reserved(name)
             || self.names.blocks.iter().any(|b| b.name == name)
             || self.names.parameters.iter().any(|p| p == name)
+            || self.names.table(name).is_some()
             || self.locals.iter().any(|(local, _)| *local == name);
         if taken {
             return Err(

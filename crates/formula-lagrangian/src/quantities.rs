@@ -96,6 +96,13 @@ impl Graph {
                 Node::Binary(operation, a, b) => self.binary(operation, of(a), of(b)),
                 Node::Powi(a, n) => self.powi(of(a), n),
                 Node::Select(all) => self.select(all.map(of)),
+                Node::Table { table, order, argument } => match from.tables().get(table as usize) {
+                    Some(table) => {
+                        let (index, argument) = (self.add_table(table), of(argument));
+                        self.lookup(index, order, argument)
+                    }
+                    None => self.number(f64::NAN),
+                },
             };
         }
         copies.last().copied().unwrap_or(zero)

@@ -1,6 +1,7 @@
 //! Output of a Lagrangian as Rust source.
 
 use crate::derived::Derived;
+use crate::drag::ProvedForce;
 use crate::node::Inputs;
 use crate::{FormulaError, FormulaLagrangian, Function, Graph, Id, Node, Operation};
 use contact_geom::Structure;
@@ -22,8 +23,9 @@ const ACOSH: &str = include_str!("rust_source/acosh.txt");
 const ATANH: &str = include_str!("rust_source/atanh.txt");
 
 impl<const N: usize> FormulaLagrangian<N> {
-    /// The source of a file with this Lagrangian as a type. The parameters are its fields; value, gradient and
-    /// structure are exactly those of the formula. It needs the crate `contact-geom`.
+    /// The source of a file with this Lagrangian as a type. The parameters are its fields; value, gradient, force and
+    /// structure are exactly those of the formula. Switching functions and breaks are not written. It needs the crate
+    /// `contact-geom`.
     ///
     /// ```
     /// use formula_lagrangian::Formula;
@@ -33,7 +35,8 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// ```
     ///
     /// # Errors
-    /// [`FormulaError::Name`] if `name` is not a valid name of a type.
+    /// [`FormulaError::Name`] if `name` is not a valid name of a type; [`FormulaError::NotInRust`] if the formula has
+    /// tables or resets.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
@@ -42,6 +45,12 @@ impl<const N: usize> FormulaLagrangian<N> {
                 name: name.to_owned(),
                 why: "is not a valid name of a Rust type, such as `MySystem`",
             });
+        }
+        if !self.derived.formula.graph.tables().is_empty() {
+            return Err(FormulaError::NotInRust { what: "tables" });
+        }
+        if self.resets() > 0 {
+            return Err(FormulaError::NotInRust { what: "resets" });
         }
         let mut text = String::new();
         // Writing to a string does not fail.
@@ -60,7 +69,12 @@ impl Derived {
             "//! A Lagrangian of the coordinates {coordinates}, made from its formula by formula-lagrangian.\n"
         )?;
         writeln!(out, "use contact_geom::nalgebra::SVector;")?;
-        writeln!(out, "use contact_geom::{{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint}};\n")?;
+        let forced = self.applied.is_some();
+        let [structure, hints] = if forced { ["ForceStructure, ", "Hints, "] } else { [""; 2] };
+        writeln!(
+            out,
+            "use contact_geom::{{ChartVector, {structure}{hints}Lagrangian, Scalar, Structure, VelocityPoint}};\n"
+        )?;
         writeln!(out, "/// The Lagrangian with its parameters.\n#[derive(Clone, Copy, Debug, PartialEq)]")?;
         if fields.is_empty() {
             writeln!(out, "pub struct {name};\n")?;
@@ -71,7 +85,11 @@ impl Derived {
             }
             writeln!(out, "}}\n")?;
         }
-        writeln!(out, "impl Lagrangian<{n}> for {name} {{\n    #[inline(always)]")?;
+        writeln!(out, "impl Lagrangian<{n}> for {name} {{")?;
+        if forced {
+            writeln!(out, "    const HINTS: Hints = Hints {{ forced: true, ..Hints::NONE }};\n")?;
+        }
+        writeln!(out, "    #[inline(always)]")?;
         let vector = format!("&SVector<T, {n}>");
         let value = Body { graph, results: &[root], fields: &fields, point: "" };
         let [t, q, v, z] = value.names(&["t", "q", "v", "z"]);
@@ -100,8 +118,9 @@ impl Derived {
         )?;
         writeln!(out, "        Some(ChartVector {{ x: l_q, y: l_v, z: {z} }})\n    }}\n")?;
 
-        let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } = self.structure;
+        let Structure { autonomous, z_affine, constant_rate, quadratic, constant_mass, .. } = self.structure;
         // The present values of parameters are not used here, since the fields can be changed.
+        let separable = self.unforced.separable && self.proved_force.is_always_of_positions(graph);
         let z_free = !graph.inputs(root).meets(Inputs::ACTION);
         writeln!(out, "    fn structure(&self) -> Structure {{\n        Structure {{")?;
         let claims = [
@@ -116,8 +135,13 @@ impl Derived {
         for (claim, _) in claims.iter().filter(|(_, made)| *made) {
             writeln!(out, "            {claim}: true,")?;
         }
-        writeln!(out, "            ..Structure::default()\n        }}\n    }}\n}}")?;
-        let uses = |of: &dyn Fn(Node) -> bool| body.uses(of) || value.uses(of);
+        writeln!(out, "            ..Structure::default()\n        }}\n    }}")?;
+        let force = Body { graph, results: &self.applied_nodes, fields: &fields, point: "x." };
+        if forced {
+            self.write_force(out, &force, n)?;
+        }
+        writeln!(out, "}}")?;
+        let uses = |of: &dyn Fn(Node) -> bool| body.uses(of) || value.uses(of) || force.uses(of);
         let operation = |of| uses(&|node| matches!(node, Node::Binary(o, ..) if o == of));
         let function = |of| uses(&|node| matches!(node, Node::Unary(f, _) if f == of));
         let [asinh, acosh, atanh] = [Function::Asinh, Function::Acosh, Function::Atanh].map(function);
@@ -132,6 +156,36 @@ impl Derived {
             write!(out, "\n{helper}")?;
         }
         Ok(())
+    }
+
+    /// The methods for the applied force.
+    fn write_force(&self, out: &mut String, force: &Body<'_>, n: usize) -> std::fmt::Result {
+        let list = |body: &Body<'_>, of: &dyn Fn(&Body<'_>, Id) -> String| {
+            body.results.iter().map(|id| of(body, *id)).collect::<Vec<_>>().join(", ")
+        };
+        let [t, x, ..] = force.names(&["t", "x", "x", "x"]);
+        writeln!(out, "\n    #[inline(always)]")?;
+        let arguments = format!("&self, {t}: T, {x}: &VelocityPoint<{n}, T>");
+        writeln!(out, "    fn applied_force<T: Scalar>({arguments}) -> SVector<T, {n}> {{")?;
+        write!(out, "{force}")?;
+        writeln!(out, "        SVector::from([{}])\n    }}\n", list(force, &|body, id| body.number(id)))?;
+        if let ProvedForce::Drag { linear, quadratic } = &self.proved_force {
+            let results: Vec<Id> = linear.iter().map(|c| c.node).collect();
+            let (linear, quadratic) = (Body { results: &results, ..*force }, quadratic.node);
+            let all: Vec<Id> = results.iter().copied().chain([quadratic]).collect();
+            writeln!(out, "    fn force_structure(&self) -> ForceStructure<{n}> {{")?;
+            write!(out, "{}", Body { results: &all, ..*force })?;
+            let (linear, quadratic) = (list(&linear, &|body, id| body.operand(id)), force.operand(quadratic));
+            writeln!(
+                out,
+                "        ForceStructure::Drag {{ linear: SVector::from([{linear}]), quadratic: {quadratic} }}\n    }}"
+            )
+        } else {
+            writeln!(
+                out,
+                "    fn force_structure(&self) -> ForceStructure<{n}> {{\n        ForceStructure::General\n    }}"
+            )
+        }
     }
 }
 

@@ -70,38 +70,22 @@ pub(crate) fn kinks(graph: &Graph, of: Id) -> Inputs {
         // `atan2` jumps on a half-axis, and neither has a derivative at the origin.
         Node::Binary(Operation::Atan2 | Operation::Hypot, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
         Node::Select([a, b, ..]) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
+        Node::Table { argument, .. } => kinks.and(graph.inputs(argument)),
         _ => kinks,
     })
-}
-
-/// The functions at whose zeros a node has a kink or a jump: the arguments of `abs` and `sign`, and the differences
-/// whose sign decides `min`, `max` and `if`. Each is listed once, also if it occurs with both signs; constants are
-/// omitted, since they do not change sign.
-pub(crate) fn switching_functions(graph: &mut Graph, of: Id) -> Vec<Id> {
-    let needed = graph.needed(of);
-    let mut functions: Vec<Id> = Vec::new();
-    for id in (0..=of.index()).filter(|i| needed[*i]).map(|i| Id(i as u32)) {
-        let function = match graph.node(id) {
-            Node::Unary(f, a) if !f.is_smooth() => a,
-            Node::Binary(Operation::Min | Operation::Max, a, b) | Node::Select([a, b, ..]) => graph.sub(a, b),
-            _ => continue,
-        };
-        let opposite = graph.neg(function);
-        if !graph.is_constant(function) && !functions.contains(&function) && !functions.contains(&opposite) {
-            functions.push(function);
-        }
-    }
-    functions
 }
 
 impl Graph {
     /// For each node up to `of`, whether `of` contains it.
     pub(crate) fn needed(&self, of: Id) -> Vec<bool> {
-        let mut needed = vec![false; of.index() + 1];
-        if let Some(last) = needed.last_mut() {
-            *last = true;
-        }
-        for i in (0..=of.index()).rev() {
+        self.needed_by(&[of])
+    }
+
+    /// For each node up to the last of some nodes, whether one of them contains it.
+    pub(crate) fn needed_by(&self, of: &[Id]) -> Vec<bool> {
+        let mut needed = vec![false; of.iter().map(|id| id.index() + 1).max().unwrap_or(0)];
+        of.iter().for_each(|id| needed[id.index()] = true);
+        for i in (0..needed.len()).rev() {
             if needed[i] {
                 self.node(Id(i as u32)).operands().for_each(|a| needed[a.index()] = true);
             }
@@ -132,6 +116,7 @@ impl Graph {
                     self.powi(a, n)
                 }
                 Node::Select(all) => self.select(all.map(image)),
+                Node::Table { table, order, argument } => self.lookup(table, order, image(argument)),
                 _ => id,
             };
             images.push(at_rest);

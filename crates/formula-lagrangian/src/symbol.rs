@@ -2,6 +2,7 @@
 
 use crate::names::Names;
 use crate::{Formula, FormulaError, Function, Graph, Id, Operation};
+use contact_geom::table::Table;
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
@@ -100,6 +101,22 @@ impl Symbols {
         }
         Formula::named(shared.graph.clone(), lagrangian.id, self.names.clone(), self.values.clone())
     }
+
+    /// The same with forces, in the order of the coordinates. Those that are left out are 0.
+    ///
+    /// # Errors
+    /// Those of [`formula`](Self::formula), and [`FormulaError::Unknown`] if there are more forces than coordinates.
+    pub fn formula_with_forces(
+        &self,
+        lagrangian: &Symbol,
+        forces: &[Option<&Symbol>],
+    ) -> Result<Formula, FormulaError> {
+        if forces.iter().flatten().any(|force| !Rc::ptr_eq(&self.shared, &force.shared)) {
+            return Err(FormulaError::Mixed);
+        }
+        let forces: Vec<Option<Id>> = forces.iter().map(|force| force.map(|force| force.id)).collect();
+        self.formula(lagrangian)?.with_force_nodes(&forces)
+    }
 }
 
 /// An expression of [`Symbols`], with the operators and functions of numbers. Cloning is inexpensive.
@@ -191,6 +208,17 @@ impl Symbol {
     /// `sqrt(self^2 + other^2)` without overflow.
     pub fn hypot(&self, other: impl Operand) -> Symbol {
         self.operate(Operation::Hypot, &other)
+    }
+
+    /// Its node in the graph of the formulas that are made of its [`Symbols`] later, such as for
+    /// [`Formula::with_reset_nodes`].
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
+    /// The value of a table at it; see [`Graph::interpolate`].
+    pub fn interpolate(&self, table: &Table) -> Symbol {
+        self.with(|graph| graph.interpolate(table, self.id))
     }
 
     /// `then` if the symbol is less than `than`, else `otherwise`.

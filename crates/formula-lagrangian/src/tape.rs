@@ -2,6 +2,7 @@
 
 use crate::node::Inputs;
 use crate::{Function, Graph, Id, Node, Operation};
+use contact_geom::table::Table;
 
 /// One instruction: it writes to the register `to` a function of the registers `a` and `b` and of `extra`, which holds
 /// a constant by its bits, an exponent, or two more registers. An instruction has two machine words, so that reading
@@ -55,6 +56,8 @@ pub(crate) enum Code {
     /// `a^n`, with n in `extra`.
     Powi,
     Select,
+    /// A derivative of a table at `a`, with the index of the table and the order in `extra`.
+    Table,
     /// The constant itself.
     Constant,
 }
@@ -70,6 +73,12 @@ impl Instruction {
     #[inline(always)]
     pub fn constant(&self) -> f64 {
         f64::from_bits(self.extra)
+    }
+
+    /// The index of the table, and the order of its derivative.
+    #[inline(always)]
+    pub fn table_and_order(&self) -> (usize, usize) {
+        (self.extra as u32 as usize, (self.extra >> 32) as usize)
     }
 
     /// Replaces operands by [`PREVIOUS`] if they are the register that the previous instruction has written.
@@ -112,6 +121,8 @@ pub(crate) struct Tape {
     /// The number of registers.
     pub registers: usize,
     pub inputs: InputRegisters,
+    /// The tables of the graph, if one of them is read.
+    pub tables: Vec<Table>,
     /// The indices of the instructions with a constant, and the nodes of these constants.
     constants: Vec<(usize, Id)>,
 }
@@ -392,6 +403,17 @@ impl Builder<'_> {
                     return Some(());
                 }
                 Node::Select(all) => (Code::Select, all.to_vec(), None),
+                Node::Table { table, order, argument } => {
+                    if self.tape.tables.is_empty() {
+                        self.tape.tables = self.graph.tables().to_vec();
+                    }
+                    let from = self.register(argument)?;
+                    self.release(argument);
+                    let to = self.allocate()?;
+                    self.emit(Code::Table, to, [from, 0], u64::from(table) | u64::from(order) << 32);
+                    self.place[id.index()] = Some(to);
+                    return Some(());
+                }
                 _ => return None,
             }
         };

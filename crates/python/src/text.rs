@@ -86,6 +86,7 @@ fn expression(node: &Node, of: &mut dyn FnMut(Id) -> String, names: &Names) -> S
         }
         Node::Powi(a, n) => format!("({}^({n}))", of(a)),
         Node::Select([a, b, c, d]) => format!("if({} < {}, {}, {})", of(a), of(b), of(c), of(d)),
+        Node::Table { table, argument, .. } => format!("table_{table}({})", of(argument)),
     }
 }
 

@@ -159,6 +159,10 @@ impl Scalar for Lanes {
         let (s, c) = self.0.sin_cos();
         (Lanes(s), Lanes(c))
     }
+    fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
+        let found = self.to_array().map(of);
+        std::array::from_fn(|k| Self::new(found.map(|values| values[k])))
+    }
     fn sinh(self) -> Self {
         self.each(f64::sinh)
     }

@@ -14,6 +14,7 @@ mod lagrangian;
 pub(crate) mod probe;
 mod rounding;
 mod structure;
+mod table;
 mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
@@ -35,4 +36,5 @@ pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
 pub use probe::check_closed_derivatives;
 pub use rounding::gradient_rounding;
 pub use structure::{Defect, Defects, Structure};
+pub use table::{Interpolation, Table, TableError};
 pub use time_transformation::TimeTransformation;

@@ -313,6 +313,10 @@ macro_rules! arithmetic {
             fn atan(self) -> Self {
                 self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
             }
+            #[$inline]
+            fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
+                self.re.piecewise(of).map(Self::constant)
+            }
             #[inline]
             fn apart<R>(work: impl FnOnce() -> R) -> R {
                 T::apart(work)

@@ -144,6 +144,12 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// The arc tangent.
     fn atan(self) -> Self;
+    /// Numbers that are piecewise constant functions of this one, such as the coefficients of a [`Table`](crate::Table).
+    /// `of` is applied to the value, in SIMD lanes to that of each lane. The differentials are 0.
+    #[inline(always)]
+    fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
+        of(self.re()).map(Self::from)
+    }
     /// Whether the type is a number with derivatives, which is so large that many of them are better kept on the heap
     /// than on the stack.
     const NESTED: bool = false;

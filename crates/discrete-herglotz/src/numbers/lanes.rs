@@ -281,6 +281,15 @@ impl<S: Simd> Scalar for Lanes<S> {
     fn atan(self) -> Self {
         self.each(f64::atan)
     }
+    fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
+        let mut found = [Self::splat(0.0); K];
+        for (i, x) in self.lanes().iter().enumerate() {
+            for (to, value) in found.iter_mut().zip(of(*x)) {
+                bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut to.0))[i] = value;
+            }
+        }
+        found
+    }
     #[inline(never)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
         struct Work<F>(F);
@@ -354,13 +363,22 @@ mod tests {
     /// Evaluates [`choices`] for pairs of numbers in SIMD lanes.
     struct ChooseLanes<'a>(&'a [f64], &'a [f64]);
 
-    /// `if_less` of a, b and 10, 20; the maximum and minimum of a and b; the absolute value and the sign of a.
-    fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
-        [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
+    /// `if_less` of a, b and 10, 20; the maximum and minimum of a and b; the absolute value and the sign of a, and the
+    /// integer below it.
+    fn choices<T: Scalar>(a: T, b: T) -> [T; 6] {
+        let [_, floor] = a.piecewise(|a| [0.0, a.floor()]);
+        [
+            a.if_less(b, 10.0.into(), 20.0.into()),
+            Scalar::max(a, b),
+            Scalar::min(a, b),
+            Scalar::abs(a),
+            a.signum(),
+            floor,
+        ]
     }
 
     impl WithSimd for ChooseLanes<'_> {
-        type Output = Vec<[f64; 5]>;
+        type Output = Vec<[f64; 6]>;
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {

@@ -145,6 +145,10 @@ impl<T: Scalar> Scalar for Pair<T> {
         let ((s, c), (t, d)) = (self.0.sin_versine(), self.1.sin_versine());
         (Pair(s, t), Pair(c, d))
     }
+    fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
+        let (a, b) = (self.0.piecewise(of), self.1.piecewise(of));
+        std::array::from_fn(|k| Pair(a[k], b[k]))
+    }
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
         T::apart(work)

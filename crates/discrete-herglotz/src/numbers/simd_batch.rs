@@ -243,6 +243,15 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     fn atan(self) -> Self {
         self.each(f64::atan)
     }
+    fn piecewise<const M: usize>(self, of: impl Fn(f64) -> [f64; M] + Copy) -> [Self; M] {
+        let mut found = [Self::splat(0.0); M];
+        for (i, x) in self.lanes().iter().enumerate() {
+            for (to, value) in found.iter_mut().zip(of(*x)) {
+                to.lanes_mut()[i] = value;
+            }
+        }
+        found
+    }
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
         Lanes::<S>::apart(work)

@@ -20,7 +20,8 @@ impl<'a> Parser<'a> {
         let function = FUNCTIONS.iter().find(|f| f.0 == name).map(|f| f.1);
         let operation = OPERATIONS.iter().find(|o| o.0 == name).map(|o| o.1);
         let inverse = matches!(name, "asin" | "acos");
-        if function.is_none() && operation.is_none() && !inverse {
+        let table = self.names.table(name);
+        if function.is_none() && operation.is_none() && table.is_none() && !inverse {
             return Err(self.unknown(name, word, "function"));
         }
         self.next()?;
@@ -31,6 +32,7 @@ impl<'a> Parser<'a> {
                 others.iter().fold(*first, |least, a| self.graph.binary(operation, least, *a))
             }
             (_, Some(operation), [a, b]) => self.graph.binary(operation, *a, *b),
+            (None, None, [a]) if table.is_some() => self.graph.lookup(table.unwrap_or_default(), 0, *a),
             (None, None, [a]) => self.inverse(name == "asin", *a),
             (_, operation, found) => {
                 let arguments = if operation.is_some() { "two arguments" } else { "one argument" };
@@ -90,7 +92,7 @@ impl<'a> Parser<'a> {
                 format!("expected `,`, found {}: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
             return Err(self.error(self.word(0), message));
         }
-        if is_reserved(index) || self.is_value(index) {
+        if is_reserved(index) || self.is_value(index) || self.names.table(index).is_some() {
             return Err(self.error(word, format!("the name `{index}` is in use; choose another name for the index")));
         }
         self.expect(',')?;

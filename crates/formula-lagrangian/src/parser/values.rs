@@ -52,6 +52,9 @@ impl<'a> Parser<'a> {
             }
             "if" => Err(self.error(word, format!("`if` is a function: {CHOICE}"))),
             "sum" => Err(self.error(word, "`sum` is a function: write `sum(i, 0, n-1, q[i]^2)`")),
+            _ if self.names.table(name).is_some() => {
+                Err(self.error(word, format!("`{name}` is a table, a function: write `{name}(t)`")))
+            }
             _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
             _ => self.quantity(name, word),
         }
@@ -100,7 +103,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Consumes a prime, if there is one.
-    fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
+    pub(super) fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
         let sign = Token::Sign('\'');
         if self.word(0).token != sign {
             return Ok(false);
@@ -118,7 +121,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The index of an entry in brackets, as that of a coordinate. It is a number at parse time.
-    fn index(&mut self, block: &Block) -> Parsed<u32> {
+    pub(super) fn index(&mut self, block: &Block) -> Parsed<u32> {
         let (name, count) = (&block.name, block.count.unwrap_or(1));
         let open = self.word(0);
         if open.token != Token::Sign('[') {

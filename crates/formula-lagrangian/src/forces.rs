@@ -1,0 +1,248 @@
+//! The forces of a formula.
+
+use crate::names::Names;
+use crate::parser::{Kind, MOST_NODES, Parser, Target, ValueName};
+use crate::{Formula, FormulaError, Graph, Id};
+
+/// The name of Rayleigh's function in a text.
+pub(crate) const RAYLEIGH: &str = "rayleigh";
+
+/// The forces on the coordinates, and Rayleigh's function R, whose force is `-dR/dv`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Forces {
+    /// The force on each coordinate, as far as it is given; empty if none is.
+    pub components: Vec<Option<Id>>,
+    pub rayleigh: Option<Id>,
+}
+
+impl Forces {
+    /// Gives the force on a coordinate. Returns whether there was none before.
+    pub fn set(&mut self, i: u32, force: Id, dimension: usize) -> bool {
+        self.components.resize(dimension, None);
+        match self.components.get_mut(i as usize) {
+            Some(component @ None) => *component = Some(force),
+            _ => return false,
+        }
+        true
+    }
+
+    /// The nodes that are given.
+    pub fn roots(&self) -> impl Iterator<Item = Id> {
+        self.components.iter().copied().chain([self.rayleigh]).flatten()
+    }
+
+    /// The total force on each of the coordinates. It is empty if there are no forces, or if all of them are 0; `None`
+    /// if the graph would be too large.
+    pub fn total(&self, graph: &mut Graph, dimension: usize, limit: usize) -> Option<Vec<Id>> {
+        if self.roots().next().is_none() {
+            return Some(Vec::new());
+        }
+        let zero = graph.number(0.0);
+        let mut total: Vec<Id> =
+            (0..dimension).map(|i| self.components.get(i).copied().flatten().unwrap_or(zero)).collect();
+        if let Some(rayleigh) = self.rayleigh {
+            let velocities: Vec<Id> = (0..dimension).map(|i| graph.velocity(i as u32)).collect();
+            let slopes = graph.gradient(rayleigh, &velocities, limit)?;
+            for (force, slope) in total.iter_mut().zip(slopes) {
+                *force = graph.sub(*force, slope);
+            }
+        }
+        if total.iter().all(|force| *force == zero) {
+            total.clear();
+        }
+        Some(total)
+    }
+}
+
+/// The message on a second force on a coordinate.
+pub(crate) fn given_twice(names: &Names, i: u32) -> String {
+    let name = names.coordinates().nth(i as usize).unwrap_or_default();
+    format!("the force on `{name}` is given twice; write one sum")
+}
+
+/// Whether the force does no work along a symmetry, so that the momentum of the symmetry is dissipated as without the
+/// force. It may be so without being detected.
+pub(crate) struct Work<'a> {
+    graph: Graph,
+    total: &'a [Id],
+}
+
+impl<'a> Work<'a> {
+    pub fn new(graph: &Graph, total: &'a [Id]) -> Self {
+        // Without a force nothing is computed in the graph.
+        Work { graph: if total.is_empty() { Graph::new() } else { graph.clone() }, total }
+    }
+
+    fn force(&mut self, i: usize) -> Id {
+        self.total.get(i).copied().unwrap_or_else(|| self.graph.number(0.0))
+    }
+
+    /// Along a common translation of some coordinates.
+    pub fn vanishes_along(&mut self, set: &[usize]) -> bool {
+        if self.total.is_empty() {
+            return true;
+        }
+        let mut sum = self.graph.number(0.0);
+        for i in set {
+            let force = self.force(*i);
+            sum = self.graph.add(sum, force);
+        }
+        self.graph.as_number(sum) == Some(0.0)
+    }
+
+    /// Along a common rotation of pairs of coordinates.
+    pub fn vanishes_around(&mut self, pairs: &[(usize, usize)]) -> bool {
+        if self.total.is_empty() {
+            return true;
+        }
+        let mut sum = self.graph.number(0.0);
+        for (i, j) in pairs {
+            let (x, y) = (self.graph.position(*i as u32), self.graph.position(*j as u32));
+            let (fx, fy) = (self.force(*i), self.force(*j));
+            let [ahead, back] = [(x, fy), (y, fx)].map(|(q, f)| self.graph.mul(q, f));
+            let torque = self.graph.sub(ahead, back);
+            sum = self.graph.add(sum, torque);
+        }
+        self.graph.as_number(sum) == Some(0.0)
+    }
+}
+
+impl Formula {
+    /// The same formula with a force on a coordinate, in addition to what it has: the equations of motion are
+    /// `d/dt L_v - L_q - L_z L_v = f(t, q, v, z)`. The coordinate is given by its name (`x`, `u[2]`, `q[0]`) or by its
+    /// index (`0`). `u[i]` with an unused name as index is each entry of an array; the text then contains the index.
+    /// The text may have definitions of its own, but does not see those of the Lagrangian.
+    ///
+    /// ```
+    /// use contact_geom::{Lagrangian, VelocityPoint};
+    /// use formula_lagrangian::Formula;
+    /// let free = Formula::parse("(x'^2 + y'^2)/2", &["x", "y"], &[("c", 0.5)])?;
+    /// let falling = free.with_force("y", "-9.81 - c*y'")?.with_force("x", "-c*x'")?;
+    /// let x = VelocityPoint::new([0.0, 0.0], [2.0, 0.0], 0.0);
+    /// assert_eq!(falling.lagrangian::<2>()?.applied_force(0.0, &x).as_slice(), [-1.0, -9.81]);
+    /// // The same in the text of the Lagrangian.
+    /// let text = "force[y] = -9.81 - c*y'; force[x] = -c*x'; L = (x'^2 + y'^2)/2";
+    /// assert!(Formula::parse(text, &["x", "y"], &[("c", 0.5)])?.has_forces());
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`]; [`FormulaError::Target`] if there is no such coordinate, or if it has a force;
+    /// [`FormulaError::TooLarge`].
+    pub fn with_force(&self, coordinate: &str, text: &str) -> Result<Self, FormulaError> {
+        self.with_forces(&[(coordinate, text)])
+    }
+
+    /// The same formula with forces on several coordinates; see [`with_force`](Self::with_force).
+    ///
+    /// # Errors
+    /// Those of [`with_force`](Self::with_force).
+    pub fn with_forces(&self, forces: &[(&str, &str)]) -> Result<Self, FormulaError> {
+        let mut formula = self.clone();
+        for (coordinate, text) in forces {
+            let mut graph = Graph::new();
+            let target = self.target(coordinate, &mut graph)?;
+            if target.kind != Kind::Position {
+                return Err(FormulaError::target(
+                    coordinate,
+                    "a force belongs to a coordinate, not to a velocity or z",
+                ));
+            }
+            for (i, index) in target.indices() {
+                let Formula { names, graph, .. } = &mut formula;
+                let force = Parser::new(text, names, graph, ValueName::Any)?.with_index(index).program()?;
+                if !formula.forces.set(i, force, formula.names.dimension) {
+                    return Err(FormulaError::target(coordinate, given_twice(&formula.names, i)));
+                }
+            }
+        }
+        formula.sized()
+    }
+
+    /// The same formula with the force `-dR/dv` of Rayleigh's dissipation function `R(t, q, v, z)`, as by a line
+    /// `rayleigh = ...` in the text of the Lagrangian. It is added to the forces, and to the function that the formula
+    /// has.
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
+    pub fn with_rayleigh(&self, text: &str) -> Result<Self, FormulaError> {
+        let mut formula = self.clone();
+        let Formula { names, graph, .. } = &mut formula;
+        let rayleigh = Parser::new(text, names, graph, ValueName::Any)?.program()?;
+        formula.add_rayleigh(rayleigh);
+        formula.sized()
+    }
+
+    /// A formula [from a graph](Self::from_graph) with forces that are nodes of the same graph, in the order of the
+    /// coordinates. Those that are left out are 0.
+    ///
+    /// ```
+    /// use formula_lagrangian::{Formula, Function, Graph, Operation};
+    /// let mut graph = Graph::new();
+    /// let v = graph.velocity(0);
+    /// let kinetic = graph.binary(Operation::Mul, v, v);
+    /// let drag = graph.unary(Function::Neg, v);
+    /// assert!(Formula::from_graph(graph, kinetic, &["x"], &[])?.with_force_nodes(&[Some(drag)])?.has_forces());
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FormulaError::ForceTwice`]; [`FormulaError::Unknown`] if there are more forces than coordinates;
+    /// [`FormulaError::ForeignNode`].
+    pub fn with_force_nodes(mut self, forces: &[Option<Id>]) -> Result<Self, FormulaError> {
+        let dimension = self.names.dimension;
+        if forces.len() > dimension {
+            return Err(FormulaError::Unknown { what: "force", index: dimension, count: dimension });
+        }
+        for (i, force) in forces.iter().enumerate() {
+            let Some(force) = *force else { continue };
+            self.check_node(force)?;
+            if !self.forces.set(i as u32, force, dimension) {
+                let coordinate = self.names.coordinates().nth(i).unwrap_or_default();
+                return Err(FormulaError::ForceTwice { coordinate });
+            }
+        }
+        Ok(self)
+    }
+
+    /// The same for [Rayleigh's function](Self::with_rayleigh).
+    ///
+    /// # Errors
+    /// [`FormulaError::ForeignNode`].
+    pub fn with_rayleigh_node(mut self, rayleigh: Id) -> Result<Self, FormulaError> {
+        self.check_node(rayleigh)?;
+        self.add_rayleigh(rayleigh);
+        Ok(self)
+    }
+
+    /// Whether it has forces.
+    pub fn has_forces(&self) -> bool {
+        self.forces.roots().next().is_some()
+    }
+
+    /// What a text assigns. Its indices are evaluated in any graph.
+    pub(crate) fn target<'a>(&'a self, text: &'a str, graph: &'a mut Graph) -> Result<Target<'a>, FormulaError> {
+        let target = Parser::new(text, &self.names, graph, ValueName::Any).and_then(Parser::only_target);
+        target.map_err(FormulaError::Target)
+    }
+
+    fn add_rayleigh(&mut self, rayleigh: Id) {
+        self.forces.rayleigh = Some(match self.forces.rayleigh {
+            Some(other) => self.graph.add(other, rayleigh),
+            None => rayleigh,
+        });
+    }
+
+    /// Checks that the graph has a node.
+    pub(crate) fn check_node(&self, id: Id) -> Result<(), FormulaError> {
+        if id.index() < self.graph.len() { Ok(()) } else { Err(FormulaError::ForeignNode) }
+    }
+
+    /// The formula itself, if it is not too large.
+    pub(crate) fn sized(self) -> Result<Self, FormulaError> {
+        if self.graph.len() > MOST_NODES {
+            return Err(FormulaError::TooLarge { limit: MOST_NODES });
+        }
+        Ok(self)
+    }
+}

@@ -1,0 +1,202 @@
+//! Changes of the state where a function of it changes its sign.
+
+use crate::evaluation::At;
+use crate::parser::{Kind, Parser, ValueName};
+use crate::tape::Tape;
+use crate::{Formula, FormulaError, Graph, Id};
+use contact_geom::VelocityPoint;
+
+/// The direction in which a function crosses 0, along the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// From positive to negative values.
+    Falling,
+    /// From negative to positive values.
+    Rising,
+    /// Either way.
+    Both,
+}
+
+impl Direction {
+    fn includes(self, rising: bool) -> bool {
+        match self {
+            Direction::Falling => !rising,
+            Direction::Rising => rising,
+            Direction::Both => true,
+        }
+    }
+}
+
+/// A change of the state where a function of it changes its sign, as by an impact or a kick, in texts over the names of
+/// a formula; see [`Formula::with_reset`].
+#[derive(Clone, Copy, Debug)]
+pub struct Reset<'a> {
+    /// The function whose change of sign triggers the reset.
+    pub when: &'a str,
+    /// The direction of the change.
+    pub direction: Direction,
+    /// The variables that get new values, with expressions of the state before the reset.
+    pub then: &'a [(&'a str, &'a str)],
+}
+
+/// A variable of the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Variable {
+    /// The coordinate with this index.
+    Position(u32),
+    /// The velocity of the coordinate with this index.
+    Velocity(u32),
+    /// The action z.
+    Action,
+}
+
+/// A [`Reset`] whose expressions are nodes of the graph of a formula; see [`Formula::with_reset_nodes`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResetNodes {
+    /// The function whose change of sign triggers the reset.
+    pub when: Id,
+    /// The direction of the change.
+    pub direction: Direction,
+    /// The variables that get new values.
+    pub then: Vec<(Variable, Id)>,
+}
+
+impl ResetNodes {
+    pub(crate) fn roots(&self) -> impl Iterator<Item = Id> {
+        std::iter::once(self.when).chain(self.then.iter().map(|(_, value)| *value))
+    }
+}
+
+/// The new values of a reset as a tape.
+#[derive(Clone, Debug)]
+pub(crate) struct DerivedReset {
+    direction: Direction,
+    variables: Vec<Variable>,
+    pub values: Tape,
+}
+
+impl DerivedReset {
+    /// The tape over `n` coordinates; `None` if it is too large.
+    pub fn new(graph: &Graph, reset: &ResetNodes, n: usize) -> Option<Self> {
+        let (variables, values): (Vec<Variable>, Vec<Id>) = reset.then.iter().copied().unzip();
+        Some(DerivedReset { direction: reset.direction, variables, values: Tape::new(graph, &values, n)? })
+    }
+
+    /// The state after the reset; `None` if the function crosses 0 in the other direction.
+    pub fn after<const N: usize>(&self, t: f64, x: &VelocityPoint<N>, rising: bool) -> Option<VelocityPoint<N>> {
+        if !self.direction.includes(rising) {
+            return None;
+        }
+        let (mut after, mut values) = (*x, vec![0.0; self.variables.len()]);
+        self.values.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [&mut values]);
+        for (variable, value) in self.variables.iter().zip(values) {
+            let place = match variable {
+                Variable::Position(i) => after.q.get_mut(*i as usize),
+                Variable::Velocity(i) => after.v.get_mut(*i as usize),
+                Variable::Action => Some(&mut after.z),
+            };
+            if let Some(place) = place {
+                *place = value;
+            }
+        }
+        Some(after)
+    }
+}
+
+impl Formula {
+    /// The same formula with one more reset. The variables are named as in expressions (`x`, `x'`, `u[2]`, `v[0]`,
+    /// `z`), and `u'[i]` with an unused name as index is each entry of an array. All get their new values at once; those
+    /// that are not named keep theirs. The expressions may contain `energy` and momenta such as `p_x`, as those of
+    /// [`expression`](Self::expression), but not the conformal factor.
+    ///
+    /// The function `when` becomes a [switching function](contact_geom::Lagrangian::switching_functions) after those of
+    /// L and of the forces, also if it depends on time alone; [`FormulaLagrangian::reset_of`] returns the number of the
+    /// reset.
+    ///
+    /// ```
+    /// use contact_geom::{switching::Control, Lagrangian, VelocityPoint};
+    /// use formula_lagrangian::{Direction, Formula, Reset};
+    /// let ball = Formula::parse("x'^2/2 - 9.81*x", &["x"], &[("e", 0.8)])?;
+    /// let bounce = Reset { when: "x", direction: Direction::Falling, then: &[("x'", "-e*x'")] };
+    /// let l = ball.with_reset(bounce)?.lagrangian::<1>()?;
+    /// let bounced = l.at_switch(0, 0.0, &VelocityPoint::new([0.0], [-2.0], 1.0), false);
+    /// assert_eq!(bounced, Control::Replace(VelocityPoint::new([0.0], [1.6], 1.0)));
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`]; [`FormulaError::Target`] if there is no such variable, or if it is assigned twice;
+    /// [`FormulaError::Reset`] if nothing is assigned, if the function is constant, or if an expression contains the
+    /// conformal factor; [`FormulaError::TooLarge`].
+    ///
+    /// [`FormulaLagrangian::reset_of`]: crate::FormulaLagrangian::reset_of
+    pub fn with_reset(&self, reset: Reset<'_>) -> Result<Self, FormulaError> {
+        let mut formula = self.clone();
+        let parse = |graph: &mut Graph, text: &str, index: Option<(&str, u32)>| {
+            let parser = Parser::new(text, &self.names, graph, ValueName::Any)?;
+            let id = parser.beside(self).with_index(index).program()?;
+            if graph.has_log_factor(id, self.names.dimension) {
+                return Err(FormulaError::Reset {
+                    why: "contains the conformal factor, which is no function of the state",
+                });
+            }
+            Ok(id)
+        };
+        let when = parse(&mut formula.graph, reset.when, None)?;
+        let mut then: Vec<(Variable, Id)> = Vec::new();
+        for (name, text) in reset.then {
+            let mut graph = Graph::new();
+            let target = self.target(name, &mut graph)?;
+            for (i, index) in target.indices() {
+                let variable = match target.kind {
+                    Kind::Position => Variable::Position(i),
+                    Kind::Velocity => Variable::Velocity(i),
+                    Kind::Action => Variable::Action,
+                };
+                if then.iter().any(|(other, _)| *other == variable) {
+                    return Err(FormulaError::target(name, "this variable is assigned twice in one reset"));
+                }
+                then.push((variable, parse(&mut formula.graph, text, index)?));
+            }
+        }
+        formula.sized()?.with_reset_nodes(ResetNodes { when, direction: reset.direction, then })
+    }
+
+    /// A formula [from a graph](Self::from_graph) with one more reset, whose expressions are nodes of the same graph.
+    ///
+    /// # Errors
+    /// [`FormulaError::ForeignNode`]; [`FormulaError::Unknown`] if there is no such coordinate; [`FormulaError::Reset`]
+    /// if nothing is assigned, if a variable is assigned twice, or if the function is constant.
+    pub fn with_reset_nodes(mut self, reset: ResetNodes) -> Result<Self, FormulaError> {
+        reset.roots().try_for_each(|id| self.check_node(id))?;
+        let count = self.names.dimension;
+        let mut seen: Vec<Variable> = Vec::new();
+        for (variable, _) in &reset.then {
+            let (what, index) = match variable {
+                Variable::Position(i) => ("coordinate", *i as usize),
+                Variable::Velocity(i) => ("velocity", *i as usize),
+                Variable::Action => ("action", 0),
+            };
+            if index >= count {
+                return Err(FormulaError::Unknown { what, index, count });
+            }
+            if seen.contains(variable) {
+                return Err(FormulaError::Reset { why: "assigns a variable twice" });
+            }
+            seen.push(*variable);
+        }
+        if reset.then.is_empty() {
+            return Err(FormulaError::Reset { why: "assigns nothing; name a variable and its new value" });
+        }
+        if self.graph.is_constant(reset.when) {
+            return Err(FormulaError::Reset { why: "has a constant in place of a function that changes its sign" });
+        }
+        self.resets.push(reset);
+        Ok(self)
+    }
+
+    /// The number of resets.
+    pub fn resets(&self) -> usize {
+        self.resets.len()
+    }
+}
