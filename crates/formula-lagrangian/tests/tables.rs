@@ -4,7 +4,8 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    Derivatives, ForceStructure, Interpolation, Lagrangian, Scalar, Table, VelocityPoint, WithoutClosedDerivatives,
+    Derivatives, ForceStructure, Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives,
+    table::{Interpolation, Table},
 };
 use discrete_herglotz::{AnyIntegrator, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian, Graph, Operation, Symbols};
