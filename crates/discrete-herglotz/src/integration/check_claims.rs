@@ -17,6 +17,18 @@ pub fn check_unforced<L: Lagrangian<N>, const N: usize>(
     if lagrangian.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
 }
 
+/// Refuses a Lagrangian with a force that is no kick, a function of time and positions alone.
+///
+/// # Errors
+/// [`InputError::Forced`].
+pub(crate) fn check_kicks<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    method: &'static str,
+) -> Result<(), InputError> {
+    let kicks = const { !L::HINTS.forced } || lagrangian.force_structure().is_of_positions();
+    if kicks { Ok(()) } else { Err(InputError::Forced { method }) }
+}
+
 /// Whether L is separable with a force of time and positions alone, if any.
 #[inline(always)]
 pub(crate) fn is_separable<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {

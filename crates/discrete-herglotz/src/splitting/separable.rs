@@ -1,7 +1,7 @@
 //! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
 use crate::integration::check_claims::MAX_CLAIM_DEFECT;
-use crate::integration::check_unforced;
+use crate::integration::check_kicks;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -38,7 +38,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        check_unforced(&lagrangian, "a splitting")?;
+        check_kicks(&lagrangian, "a splitting without drag of the velocity")?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -90,17 +90,23 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         Ok(())
     }
 
-    /// `L(t, q, 0, z) = -V + f(z)`, and `L_q`. Only the derivatives in `q` are carried.
+    /// `L(t, q, 0, z) = -V + f(z)`, and `L_q` plus the applied force. Only the derivatives in `q` are carried.
     #[inline(always)]
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
         self.lagrangian.with_force(t, &rest)
     }
 
-    /// `L_q` alone, for steps without the action.
+    /// `L_q` plus the applied force, for steps without the action.
     #[inline(always)]
     pub(crate) fn force(&self, t: f64, q: &SVector<f64, N>, z: f64) -> SVector<f64, N> {
         self.lagrangian.force(t, &VelocityPoint { q: *q, v: SVector::zeros(), z })
+    }
+
+    /// The applied force alone, which depends on time and positions.
+    pub(crate) fn applied_force<T: Scalar>(&self, t: f64, q: &SVector<T, N>, z: T) -> SVector<T, N> {
+        let still = SVector::from_element(T::zero());
+        self.lagrangian.applied_force(T::from(t), &VelocityPoint { q: *q, v: still, z })
     }
 
     /// The value and the force of the kick at an initial state.
