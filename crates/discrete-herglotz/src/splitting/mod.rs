@@ -9,6 +9,8 @@ mod motion;
 mod nonlinear_drag;
 pub(crate) mod separable;
 mod strang;
+mod velocity_drag;
+mod velocity_drag_flow;
 #[cfg(test)]
 mod tests;
 
@@ -17,6 +19,7 @@ pub use action_strang::ActionStrang;
 pub use linear_drag::Splitting;
 pub use nonlinear_drag::ActionSplitting;
 pub use strang::Strang;
+pub use velocity_drag::DragSplitting;
 
 use crate::PlanEntry;
 

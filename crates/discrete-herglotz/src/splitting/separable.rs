@@ -23,6 +23,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Evaluates M, and verifies the claims of the Lagrangian at a state and at a point near it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        check_kicks(&lagrangian, "a splitting without drag of the velocity")?;
         Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
@@ -38,7 +39,6 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        check_kicks(&lagrangian, "a splitting without drag of the velocity")?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -142,6 +142,12 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
             }
         }
         sum
+    }
+
+    /// The diagonal of M; `None` if another entry is not zero.
+    pub(crate) fn diagonal_mass(&self) -> Option<SVector<f64, N>> {
+        let diagonal = (0..N).all(|i| (0..N).all(|j| i == j || self.mass[(i, j)] == 0.0));
+        diagonal.then(|| self.mass.diagonal())
     }
 
     /// `M v`.
