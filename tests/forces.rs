@@ -9,7 +9,7 @@ use crate::common::{relative_distance, slope};
 use contact_geom::systems::{CoupledPlane, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates};
 use contact_geom::{Forced, Lagrangian, PhasePoint, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan};
 use discrete_herglotz::gauss::{GaussRoute, GaussStepper, VirtualWork};
-use discrete_herglotz::{GaussCollocation, Problem, Steps, Stepper, StepperOptions, Until};
+use discrete_herglotz::{GaussCollocation, Problem, Stepper, StepperOptions, Steps, Until};
 
 /// The state after a number of Gauss steps, with the route.
 fn gauss<const N: usize>(
@@ -52,12 +52,10 @@ fn a_fall_with_quadratic_drag() {
     }
     let moving = VelocityPoint::new([0.0], [-2.0], 0.3);
     let work = |system: &dyn Fn() -> VirtualWork<1>| system().defect.max_abs_or_nan();
-    let of_force = work(&|| {
-        VirtualWork::of_step(&forced, 3, 0.1, 0.0, &legendre(&forced, 0.0, &moving), &moving.v).unwrap()
-    });
-    let of_contact = work(&|| {
-        VirtualWork::of_step(&contact, 3, 0.1, 0.0, &legendre(&contact, 0.0, &moving), &moving.v).unwrap()
-    });
+    let of_force =
+        work(&|| VirtualWork::of_step(&forced, 3, 0.1, 0.0, &legendre(&forced, 0.0, &moving), &moving.v).unwrap());
+    let of_contact =
+        work(&|| VirtualWork::of_step(&contact, 3, 0.1, 0.0, &legendre(&contact, 0.0, &moving), &moving.v).unwrap());
     assert!(of_force > 0.05 && of_contact <= 1e-14, "{of_force:e} {of_contact:e}");
 }
 

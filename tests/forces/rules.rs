@@ -31,10 +31,8 @@ fn rules_and_compositions_keep_their_orders() {
         let forced = Forced { lagrangian: system, force: AnyForce };
         let (truth, start) = (reference(&forced, t, x, 1.0), legendre(&forced, t, &x));
         let check = |name: &str, order: u32, steps: &[usize], run: &dyn Fn(f64, usize) -> PhasePoint<N>| {
-            let points: Vec<_> = steps
-                .iter()
-                .map(|n| (1.0 / *n as f64, relative_distance(run(1.0 / *n as f64, *n), truth)))
-                .collect();
+            let points: Vec<_> =
+                steps.iter().map(|n| (1.0 / *n as f64, relative_distance(run(1.0 / *n as f64, *n), truth))).collect();
             let observed = slope(&points);
             assert!((observed - f64::from(order)).abs() < 0.15, "{} {name}: {observed:.3} {points:?}", system.name());
         };

@@ -5,13 +5,11 @@ use crate::common::{relative_distance, slope};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
-use discrete_herglotz::{
-    Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until,
-};
+use discrete_herglotz::{Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until};
 
 /// The state after a time by an integrator.
-fn run<'a, L: Lagrangian<N>, I: Integrator<'a, L, N> + 'a, const N: usize>(
-    lagrangian: &'a L,
+fn run<L: Lagrangian<N>, I: for<'a> Integrator<'a, L, N> + 'static, const N: usize>(
+    lagrangian: &L,
     x: VelocityPoint<N>,
     by: I,
     span: f64,
@@ -144,7 +142,11 @@ fn ensembles_take_forces() {
     of(&Forced { lagrangian: pendulum, force: Swirl }, SplittingScheme::BLANES_MOAN_6, bound);
     of(&Forced { lagrangian: pendulum, force: Swirl }, GaussCollocation { stages: 6 }, bound);
     of(&Forced { lagrangian: pendulum, force: SwirlAndDrag(Drag { c: 0.2, k: 0.1 }) }, SplittingScheme::YOSHIDA_4, 0.0);
-    of(&Forced { lagrangian: pendulum, force: SwirlAndDrag(Drag { c: 0.2, k: 0.1 }) }, GaussCollocation { stages: 4 }, 0.0);
+    of(
+        &Forced { lagrangian: pendulum, force: SwirlAndDrag(Drag { c: 0.2, k: 0.1 }) },
+        GaussCollocation { stages: 4 },
+        0.0,
+    );
 }
 
 /// A Lagrangian `v.Mv/2` with a mass matrix.

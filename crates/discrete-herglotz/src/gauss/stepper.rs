@@ -143,8 +143,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             }
         } else {
             let mass = Mass::new(&structure, inverse);
-            let (physical, z_drives) =
-                (Extension::new(Physical, t0, 0.0), depends_on_action(lagrangian, &structure));
+            let (physical, z_drives) = (Extension::new(Physical, t0, 0.0), depends_on_action(lagrangian, &structure));
             Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, z_drives, &state, &start.v))
         };
         let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };

@@ -38,8 +38,7 @@ pub(crate) fn is_separable<L: Lagrangian<N>, const N: usize>(lagrangian: &L, str
 /// Whether the action may act on the motion by more than a rate that depends on time alone.
 #[inline(always)]
 pub(crate) fn depends_on_action<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {
-    !structure.is_affine_in_z()
-        || const { L::HINTS.forced } && lagrangian.force_structure() == ForceStructure::General
+    !structure.is_affine_in_z() || const { L::HINTS.forced } && lagrangian.force_structure() == ForceStructure::General
 }
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units

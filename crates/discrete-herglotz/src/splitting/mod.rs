@@ -9,10 +9,10 @@ mod motion;
 mod nonlinear_drag;
 pub(crate) mod separable;
 mod strang;
-mod velocity_drag;
-mod velocity_drag_flow;
 #[cfg(test)]
 mod tests;
+mod velocity_drag;
+mod velocity_drag_flow;
 
 pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
 pub use action_strang::ActionStrang;

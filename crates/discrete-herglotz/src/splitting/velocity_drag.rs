@@ -45,10 +45,7 @@ const CLOSING: usize = 2;
 ///
 /// # Errors
 /// [`InputError::Forced`].
-pub(super) fn check_force<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    nystrom: bool,
-) -> Result<(), InputError> {
+pub(super) fn check_force<L: Lagrangian<N>, const N: usize>(lagrangian: &L, nystrom: bool) -> Result<(), InputError> {
     if const { !L::HINTS.forced } {
         return Ok(());
     }

@@ -58,9 +58,7 @@ impl<const N: usize> DragLaw<N> {
                 shift: SVector::from_fn(|i, _| length(rate(i), s) / mass[i]),
                 damping: SVector::from_fn(|i, _| (rate(i) * s).exp_m1()),
                 // e^(gamma s) times the integral of e^((2 rate - gamma) s) / (2 m).
-                lift: SVector::from_fn(|i, _| {
-                    (0.5 * (1.0 + growth) / mass[i]) * length(2.0 * rate(i) - gamma, s)
-                }),
+                lift: SVector::from_fn(|i, _| (0.5 * (1.0 + growth) / mass[i]) * length(2.0 * rate(i) - gamma, s)),
             };
         }
         let (m, rate, g) = (mass[0], rate(0), Coefficients::of(QUADRATURE_NODES));
@@ -140,7 +138,8 @@ mod tests {
             }
             let s = 1e-4;
             let (ahead, back) = (step(start, s), step(start, -s));
-            let rate = |i: usize| gamma * p[i] - (linear[i] / mass[i] + quadratic * p.norm() / (mass[i] * mass[i])) * p[i];
+            let rate =
+                |i: usize| gamma * p[i] - (linear[i] / mass[i] + quadratic * p.norm() / (mass[i] * mass[i])) * p[i];
             for i in 0..2 {
                 assert!(((ahead.0 - back.0)[i] / (2.0 * s) - p[i] / mass[i]).abs() <= 1e-7);
                 assert!(((ahead.1 - back.1)[i] / (2.0 * s) - rate(i)).abs() <= 1e-7);

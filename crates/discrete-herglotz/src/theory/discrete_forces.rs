@@ -33,11 +33,7 @@ pub fn discrete_forces<const N: usize>(
     let lifted: DiscretePoint<N, Lifted<N>> = seed(&ChartVector::from(*x)).into();
     let [minus, plus] = ld.forces(t, &lifted)?;
     let slopes = |f: &SVector<Lifted<N>, N>| {
-        (
-            SMatrix::from_fn(|i, j| f[i].d.x[j]),
-            SMatrix::from_fn(|i, j| f[i].d.y[j]),
-            SVector::from_fn(|i, _| f[i].d.z),
-        )
+        (SMatrix::from_fn(|i, j| f[i].d.x[j]), SMatrix::from_fn(|i, j| f[i].d.y[j]), SVector::from_fn(|i, _| f[i].d.z))
     };
     let (minus_slopes, plus_slopes) = (slopes(&minus), slopes(&plus));
     Ok(DiscreteForces { minus: minus.map(|f| f.re), plus: plus.map(|f| f.re), minus_slopes, plus_slopes })

@@ -8,8 +8,8 @@ use crate::theory::statements::measures::pull;
 use crate::theory::{discrete_forces, discrete_momentum, hamiltonian_flow_jacobian, legendre_minus, legendre_plus};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ChartVector, ContactForm, Darboux, DiscretePoint, GeometryError, Lagrangian, OneParameterGroup, Statement, Symmetry,
-    VelocityPoint, legendre,
+    ChartVector, ContactForm, Darboux, DiscretePoint, GeometryError, Lagrangian, OneParameterGroup, Statement,
+    Symmetry, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},
 };
 
@@ -37,9 +37,8 @@ pub fn forced_residual<const N: usize>(
     x: &VelocityPoint<N>,
 ) -> Result<Option<f64>, GeometryError> {
     let undefined = |_| GeometryError::Undefined { what: "the step" };
-    let gauss = |stages| {
-        VirtualWork::of_step(lagrangian, stages, h, t, &legendre(lagrangian, t, x), &x.v).map_err(undefined)
-    };
+    let gauss =
+        |stages| VirtualWork::of_step(lagrangian, stages, h, t, &legendre(lagrangian, t, x), &x.v).map_err(undefined);
     if !FORCED_STATEMENTS.contains(&statement) || statement == Statement::ForcedMomentum && symmetries.is_empty() {
         return Ok(None);
     }
@@ -103,9 +102,8 @@ fn contact_defect<const N: usize>(
     let forward = ld.forward(t, &from, &guess, &mut solver)?.end;
     let backward = ld.backward(t, &to, &guess, &mut solver)?.end;
     // The momentum is computed from rounded positions, on which it depends through W/h.
-    let size = |state| {
-        ChartVector::from(state).max_abs_or_nan().max_or_nan(jet.d12.max_abs_or_nan() * x.q1.max_abs_or_nan())
-    };
+    let size =
+        |state| ChartVector::from(state).max_abs_or_nan().max_or_nan(jet.d12.max_abs_or_nan() * x.q1.max_abs_or_nan());
     let of = |a, b| ChartVector::from(a).minus(ChartVector::from(b)).max_abs_or_nan() / size(b);
     Ok(defect.max_or_nan(of(forward, to)).max_or_nan(of(backward, from)))
 }
