@@ -15,6 +15,7 @@ mod conformal_steppers;
 mod dense_output;
 mod events;
 mod every_run;
+mod forces;
 mod gauss;
 mod gauss_catalogue;
 mod gauss_stress;

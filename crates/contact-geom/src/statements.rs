@@ -1,4 +1,4 @@
-//! Residuals of the statements of the paper's section 2: each statement is evaluated at a point of a system, relative
+//! Residuals of the statements of the paper's section 2, and of the one on energy and forces: each statement is evaluated at a point of a system, relative
 //! to the size of its terms.
 //!
 //! The residual of a true statement is round-off times the condition numbers of the matrices involved. Tolerances are
@@ -23,8 +23,12 @@ use crate::{
 };
 use nalgebra::SVector;
 
-/// The statements of section 2 that [`residual`] evaluates.
-pub const STATEMENTS: [Statement; 10] = [
+mod forces;
+
+pub use forces::AnyForce;
+
+/// The statements of section 2, and on forces, that [`residual`] evaluates.
+pub const STATEMENTS: [Statement; 11] = [
     Statement::Volume,
     Statement::ReebField,
     Statement::HamiltonianField,
@@ -35,9 +39,10 @@ pub const STATEMENTS: [Statement; 10] = [
     Statement::LegendreTransformation,
     Statement::DissipatedQuantities,
     Statement::Noether,
+    Statement::ForcedEnergy,
 ];
 
-/// The residual of a statement of section 2 for a system at a time and a point of TQ x R; `None` where the statement's
+/// The residual of a statement of section 2, or on energy and forces, for a system at a time and a point of TQ x R; `None` where the statement's
 /// hypotheses do not apply, as for Noether's theorem without a symmetry, or where it is not one of [`STATEMENTS`].
 ///
 /// # Errors
@@ -59,6 +64,7 @@ pub fn residual<const N: usize>(
         Statement::LegendreTransformation => Some(legendre_is_contact(system, t, x)?),
         Statement::DissipatedQuantities => Some(dissipated_quantities(system, t, x)?),
         Statement::Noether => noether(system, t, x)?,
+        Statement::ForcedEnergy => Some(forces::forced_energy(system, t, x)?),
         _ => None,
     })
 }

@@ -184,10 +184,10 @@ pub enum InputError {
         "the method requires a Lagrangian that declares a time transformation (`Hints::time_transformation`, `dt_dtau`); choose another integrator or another Lagrangian"
     )]
     NoTimeTransformation,
-    /// The problem has an applied force, which the method does not take.
+    /// The problem has an applied force that the method does not take.
     #[error(
-        "the problem has a force, and {method} takes none; choose contact Gauss collocation (`GaussCollocation`), or \
-         write the force into the Lagrangian"
+        "the problem has a force that {method} does not take; choose contact Gauss collocation (`GaussCollocation`), \
+         which takes every force, or write the force into the Lagrangian"
     )]
     Forced {
         /// The method.
