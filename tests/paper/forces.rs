@@ -1,4 +1,4 @@
-//! Forces, which the paper does not treat: energy, contact defects and momenta. Statements 42 to 45.
+//! Forces and impacts, which the paper does not treat: energy, contact defects and momenta. Statements 42 to 47.
 
 use crate::common::{TOLERANCE, on_some, step_from, visit_kinds};
 use crate::table::{Row, at_points_of_every_system};
@@ -11,6 +11,10 @@ use discrete_herglotz::theory::statements::forced_residual;
 /// The statement about motions at a point of a system.
 pub const AT_POINTS: &[Row] = &[Row::new(Statement::ForcedEnergy, TOLERANCE)];
 
+/// The statements about impacts. The velocity after an impact is known up to the condition of W.
+pub const AT_IMPACTS: &[Row] =
+    &[Row::new(Statement::ElasticImpact, TOLERANCE), Row::new(Statement::ConformalImpact, TOLERANCE)];
+
 /// The statements about steps with a force. The contact defect of a Gauss step is a sum of some ten terms, each with a
 /// few units of round-off; the other bounds are those without forces.
 pub const WITH_FORCES: &[Row] = &[
@@ -22,6 +26,7 @@ pub const WITH_FORCES: &[Row] = &[
 #[test]
 fn statements_at_points_of_every_system() {
     at_points_of_every_system(AT_POINTS);
+    at_points_of_every_system(AT_IMPACTS);
 }
 
 /// Evaluates the statements at random points of one system of each kind of structure.
