@@ -304,7 +304,7 @@ mod tests {
             assert!(matches!(roots(degree, &|x| (1e7 * x).sin() + 0.1).0, Separation::Unresolved(_)));
             // Faster and faster towards a point, which is not that of the largest number of parts.
             let place = roots(degree, &|x| (10.0 * (x - 0.3).abs().ln()).sin() + 0.5).0;
-            let is_near = |x: f64| (x - 0.3).abs() <= 2.0 * f64::powi(2.0, -MAX_BISECTIONS);
+            let is_near = |x: f64| (x - 0.3).abs() <= 16.0 * f64::powi(2.0, -MAX_BISECTIONS);
             assert!(matches!(place, Separation::Unresolved(x) if is_near(x)), "{place:?}");
             assert_eq!(roots(degree, &|x| if x < 0.7 { 0.3 - x } else { f64::NAN }).0, Separation::Undefined);
         }
