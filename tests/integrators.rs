@@ -13,6 +13,7 @@ mod common;
 mod accuracy;
 mod conformal_steppers;
 mod dense_output;
+mod event_roots;
 mod events;
 mod every_run;
 mod forces;

@@ -336,6 +336,15 @@ pub enum StepError {
         /// The time.
         t: f64,
     },
+    /// The sign changes of the function of an event cannot be told apart: it varies too fast within a step.
+    #[error(
+        "the function of an event varies so fast after t = {t} that its sign changes within the step cannot be told \
+         apart; take shorter steps, or use a smoother function"
+    )]
+    EventUnresolved {
+        /// The time up to which all sign changes are found.
+        t: f64,
+    },
     /// A formula branches on a value that differs between SIMD lanes.
     #[error(
         "the Lagrangian or the time transformation branches on a value (by `re`, `extent` or `==`) that differs \
