@@ -3,7 +3,7 @@
 use crate::common::forces::{AnyForce, Drag, Fall, G, Swirl};
 use crate::common::{relative_distance, slope};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until};
 
