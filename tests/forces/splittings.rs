@@ -33,7 +33,8 @@ impl<const N: usize> Force<N> for SwirlAndDrag {
     }
 }
 
-/// The order of a scheme on a problem, in q, p and z together.
+/// The order of a scheme on a problem, in q, p and z together. With a scheme of order 10 the error reaches round-off
+/// before its slope is asymptotic; it is then bounded by 0.7.
 fn assert_order<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     x: VelocityPoint<N>,
@@ -41,18 +42,16 @@ fn assert_order<const N: usize>(
     counts: &[usize],
 ) {
     let truth = run(lagrangian, x, GaussCollocation { stages: 12 }, 2.0, 64);
-    let points: Vec<_> = counts
-        .iter()
-        .map(|n| (2.0 / *n as f64, relative_distance(run(lagrangian, x, scheme, 2.0, *n), truth)))
-        .filter(|(_, error)| *error > 2e-14)
-        .collect();
-    let observed = slope(&points);
-    assert!(points.len() >= 3, "{}: {points:?}", scheme.name());
-    assert!((observed - f64::from(scheme.order())).abs() < 0.15, "{}: {observed:.3} {points:?}", scheme.name());
+    let error = |n: usize| relative_distance(run(lagrangian, x, scheme, 2.0, n), truth);
+    let points: Vec<_> = counts.iter().map(|n| (2.0 / *n as f64, error(*n))).collect();
+    let (observed, order) = (slope(&points), f64::from(scheme.order()));
+    let bound = if scheme.order() < 10 { 0.15 } else { 0.7 };
+    assert!((observed - order).abs() < bound, "{}: {observed:.3} {points:?}", scheme.name());
 }
 
 /// Schemes keep their orders with kicks by a force of time and positions, with linear and with quadratic drag, and with
-/// all of them; those of Runge-Kutta-Nyström type with linear drag.
+/// all of them; those of Runge-Kutta-Nyström type with linear drag. The speed of the orbit does not vanish; that of the
+/// pendulum does, where a quadratic drag has no second derivative, so that no method has a higher order.
 #[test]
 fn schemes_keep_their_orders() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.2 });
@@ -60,21 +59,22 @@ fn schemes_keep_their_orders() {
     let kepler = Kepler::<2> { gamma: -0.1, mu: 1.0 };
     let orbit = VelocityPoint::new([1.0, 0.2], [-0.1, 0.9], 0.1);
     for (scheme, counts) in [
-        (SplittingScheme::STRANG, &[128, 180, 256, 360][..]),
+        (SplittingScheme::STRANG, &[32, 48, 64, 96][..]),
+        (SplittingScheme::YOSHIDA_6, &[32, 40, 48, 64]),
+        (SplittingScheme::KAHAN_LI_8, &[12, 16, 20]),
+        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[8, 12]),
         (SplittingScheme::BLANES_MOAN_4, &[24, 32, 48, 64]),
-        (SplittingScheme::BLANES_MOAN_6, &[12, 16, 24, 32]),
-        (SplittingScheme::YOSHIDA_6, &[64, 80, 96, 128]),
-        (SplittingScheme::KAHAN_LI_8, &[20, 24, 28, 32]),
-        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[12, 14, 16, 18]),
+        (SplittingScheme::BLANES_MOAN_6, &[12, 16, 20, 24]),
+        (SplittingScheme::BLANES_CASAS_8, &[8, 12, 16]),
     ] {
         for (c, k) in [(0.0, 0.0), (0.4, 0.0), (0.0, 0.3), (0.4, 0.3)] {
             if k != 0.0 && scheme.is_nystrom() {
                 continue;
             }
             let force = SwirlAndDrag(Drag { c, k });
-            assert_order(&Forced { lagrangian: &pendulum, force: &force }, x, scheme, counts);
-            if scheme.order() <= 4 {
-                assert_order(&Forced { lagrangian: &kepler, force: &force }, orbit, scheme, counts);
+            assert_order(&Forced { lagrangian: &kepler, force: &force }, orbit, scheme, counts);
+            if k == 0.0 {
+                assert_order(&Forced { lagrangian: &pendulum, force: &force }, x, scheme, counts);
             }
         }
     }

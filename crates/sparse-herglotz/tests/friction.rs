@@ -26,7 +26,8 @@ fn friction() -> SVector<f64, SITES> {
 /// times.
 #[test]
 fn steps_are_those_of_small_systems() {
-    let (q, v) = (SVector::from_fn(|i, _| (1.7 * i as f64).sin()), SVector::from_fn(|i, _| (0.9 * i as f64).cos()));
+    let q = SVector::<f64, SITES>::from_fn(|i, _| (1.7 * i as f64).sin());
+    let v = SVector::<f64, SITES>::from_fn(|i, _| (0.9 * i as f64).cos());
     for gamma in [0.0, -0.1] {
         let forced = Forced {
             lagrangian: Chain::<SITES> { ends: Ends::Fixed, beta: 0.5, gamma },
