@@ -72,8 +72,8 @@ impl<const N: usize> FormulaLagrangian<N> {
         &self.derived.structure
     }
 
-    /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`.
-    /// Integrators reach their order where the motion does not meet a kink or a jump.
+    /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`,
+    /// `atan2`, `hypot`, and no tables. Integrators reach their order where the motion does not meet a kink or a jump.
     pub fn is_smooth(&self) -> bool {
         self.derived.smooth
     }

@@ -105,9 +105,9 @@ impl DerivedReset {
 
 impl Formula {
     /// The same formula with one more reset. The variables are named as in expressions (`x`, `x'`, `u[2]`, `v[0]`,
-    /// `z`), and `u'[i]` with an unused name as index is each entry of an array. All get their new values at once; those
-    /// that are not named keep theirs. The expressions may contain `energy` and momenta such as `p_x`, as those of
-    /// [`expression`](Self::expression), but not the conformal factor.
+    /// `z`), and `u'[i]` with an unused name as index is each entry of an array. All get their new values at once;
+    /// those that are not named keep theirs. The expressions may contain `energy` and momenta such as `p_x`, as those
+    /// of [`expression`](Self::expression), but not the conformal factor.
     ///
     /// The function `when` becomes a [switching function](contact_geom::Lagrangian::switching_functions) after those of
     /// L and of the forces, also if it depends on time alone; [`FormulaLagrangian::reset_of`] returns the number of the

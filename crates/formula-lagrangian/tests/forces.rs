@@ -305,6 +305,7 @@ fn errors_in_a_text() {
         ("force[x] = 1", 13, "expected the Lagrangian after the forces; it is the last line"),
         ("rayleigh = x'^2", 16, "expected a value after the definition of `rayleigh`"),
         ("rayleigh = x'^2; rayleigh = 1; x'^2", 18, "the name `rayleigh` is in use; choose another name for this"),
+        ("forces[x] = 1; x'^2", 1, "unknown name `forces`; did you mean `force`?"),
         ("force[] = 1; x'^2", 7, "expected a value, found `]`"),
         ("force[x] 1; x'^2", 10, "expected `=`, found the number 1"),
     ] {
