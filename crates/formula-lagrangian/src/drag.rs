@@ -103,13 +103,12 @@ fn drag(graph: &mut Graph, forces: &[Id], n: usize, limit: usize) -> Option<Prov
             }
         }
     }
-    // The speed is that of all coordinates.
-    let quadratic = common.filter(|quadratic| *quadratic == zero || forces.len() == n)?;
-    Some(ProvedForce::Drag { linear, quadratic: coefficient(quadratic) })
+    Some(ProvedForce::Drag { linear, quadratic: coefficient(common?) })
 }
 
 impl Graph {
-    /// The coefficient k of the terms `-k |v| v_i` of a sum, and the sum of its other terms.
+    /// The coefficient k of the terms `-k |v| v_i` of a sum, and the sum of its other terms. The speed is that of all n
+    /// coordinates, so that there is no such term where a formula has fewer.
     fn without_quadratic_drag(&mut self, sum: Id, i: usize, n: usize) -> Option<(Id, Id)> {
         let zero = self.number(0.0);
         let (mut coefficient, mut rest, mut found) = (zero, zero, false);
