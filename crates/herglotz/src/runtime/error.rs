@@ -141,6 +141,10 @@ pub fn in_words(error: &InputError) -> String {
             format!("the integrator requires {hypothesis}; choose another integrator")
         }
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
+        InputError::Forced { method } => format!(
+            "there is a force, and {method} takes none; choose a Gauss method such as \"gauss_8\", or write the force \
+             into the Lagrangian"
+        ),
         InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),
         InputError::NoSteps => "neither steps nor an accuracy is given; give one of them".to_owned(),
         error => error.to_string(),

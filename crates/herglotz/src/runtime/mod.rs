@@ -45,7 +45,7 @@ pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
 pub use error::{RuntimeError, in_words};
 pub use geometry::Geometry;
 pub use interrupt::Interrupt;
-pub use outcome::{Crossing, Outcome, Plan, RunMonitor};
+pub use outcome::{AfterReset, Crossing, Outcome, Plan, RunMonitor};
 pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};

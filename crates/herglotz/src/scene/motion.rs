@@ -202,7 +202,7 @@ impl Scene {
 
     /// The numbers of a sign change in these columns; `None` in columns of other events.
     pub fn numbers_of_event(&self, crossing: &Crossing) -> Vec<Option<f64>> {
-        let Crossing { t, event, q, v, p, z, columns } = crossing;
+        let Crossing { t, event, q, v, p, z, columns, .. } = crossing;
         let of_state = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(Some);
         let EventColumns { names, of_event } = &self.event_columns;
         let own = of_event.get(*event).map(Vec::as_slice).unwrap_or_default();

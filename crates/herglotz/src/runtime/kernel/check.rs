@@ -4,7 +4,7 @@ use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
 use crate::runtime::{Check, Interrupt, MomentumSample, Motion, RuntimeError, Sample, StatementResidual, StepControl};
 use contact_geom::{
-    ChartVector, OneParameterGroup, PhasePoint,
+    ChartVector, Lagrangian, OneParameterGroup, PhasePoint,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until};
@@ -136,6 +136,10 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
     let stages = plan.integrator.collocation.unwrap_or(DEFAULT_STAGES);
     let mut shorter = h;
     let stated = loop {
+        if Lagrangian::has_force(lagrangian) {
+            // The theorems are about discrete Lagrangians, which do not exist with a force.
+            break Vec::new();
+        }
         if interrupted() {
             return Err(InputError::Interrupted.into());
         }
