@@ -103,6 +103,7 @@ mod formula;
 mod functions;
 mod graph;
 mod hints;
+mod impacts;
 mod lagrangian;
 mod names;
 mod node;

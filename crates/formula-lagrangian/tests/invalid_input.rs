@@ -87,7 +87,8 @@ fn attack(text: &str) -> bool {
             // The same text as that of a force and of a reset.
             let then = [("x'", text)];
             let _ = formula.with_force(text, text);
-            let _ = formula.with_reset(Reset { when: text, direction: Direction::Both, then: &then });
+            let _ =
+                formula.with_reset(Reset { when: text, direction: Direction::Both, then: &then, rest: Some(&then) });
             true
         }
         Err(error) => {

@@ -1,6 +1,7 @@
 //! The check whether a map of (q, p, z) is a contact transformation.
 
 use crate::arrays::{matrix, number, numbers, value_error, vector};
+use crate::table::Table;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, Darboux, Dual, support::conformality_with_jacobian};
 use herglotz::runtime::Formula;
@@ -16,6 +17,7 @@ type Found = (f64, f64, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
 pub fn conformality(
     py: Python<'_>,
     components: Vec<String>,
+    tables: Vec<(String, Bound<'_, Table>)>,
     at: (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>),
 ) -> PyResult<Found> {
     let (q, p, z) = (numbers("q", &at.0)?, numbers("p", &at.1)?, number("z", &at.2)?);
@@ -24,7 +26,10 @@ pub fn conformality(
         return Err(value_error(format!("`p` has {} numbers, but `q` has {n}", p.len())));
     }
     let names = format!("q[{n}]");
-    let formula = Formula::parse("0", &[names.as_str()], &[]).map_err(value_error)?;
+    let mut formula = Formula::parse("0", &[names.as_str()], &[]).map_err(value_error)?;
+    for (name, table) in &tables {
+        formula = formula.with_table(name, &table.get().inner).map_err(value_error)?;
+    }
     let size = 2 * n + 1;
     let (mut image, mut jacobian) = (Vec::with_capacity(size), DMatrix::zeros(size, size));
     for (i, text) in components.iter().enumerate().take(size) {

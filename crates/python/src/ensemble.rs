@@ -1,7 +1,9 @@
 //! Ensembles: many motions of one formula.
 
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
-use crate::motion::{self, GivenEvent, GivenStepControl};
+use crate::events::GivenEvent;
+use crate::motion::{self, GivenStepControl};
+use crate::run::{After, after};
 use crate::signals::with_signals;
 use crate::system::System;
 use herglotz::runtime::{
@@ -70,7 +72,7 @@ impl EnsembleMonitor for RowStore {
                 (Status::Completed | Status::Stopped { .. }, unresolved) => {
                     unresolved.map(|unresolved| unresolved.to_string())
                 }
-                (status, _) => Some(status.to_string()),
+                (status, _) => Some(crate::run::in_words(status)),
             },
         };
         let reached = |status| match status {
@@ -106,8 +108,8 @@ impl EnsembleMonitor for RowStore {
     }
 }
 
-/// The index of the member, the index of the event, t, q, v, p and z.
-type Found = (usize, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+/// The index of the member, the index of the event, t, q, v, p and z, and q, v, p and z after a reset.
+type Found = (usize, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64, After);
 
 /// The final states of many motions, or their rows one after the other.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
@@ -122,7 +124,7 @@ pub struct EnsembleRecord {
     success: Py<PyArray1<bool>>,
     /// Errors and warnings, by the index of the member.
     troubles: Vec<(usize, String)>,
-    /// The sign changes of events: the member, the index of the event, t, q, v, p and z.
+    /// The sign changes of events.
     crossings: Vec<Found>,
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
@@ -177,9 +179,9 @@ pub fn run_ensemble(
     columns.extend((0..n).map(Column::Momentum));
     columns.push(Column::Action);
     for text in &observed {
-        columns.push(Column::parse(text, system.inner.formula()).map_err(value_error)?);
+        columns.push(Column::parse(text, &system.formula).map_err(value_error)?);
     }
-    let events = motion::events(events, system.inner.formula())?;
+    let (with_resets, events) = crate::events::events(events, system)?;
     let mut kept = RowStore {
         n,
         rows: rows.as_ref().map(Vec::len),
@@ -217,7 +219,7 @@ pub fn run_ensemble(
             events: &events,
             threads,
         };
-        system.inner.ensemble(&ensemble, &mut kept)
+        with_resets.ensemble(&ensemble, &mut kept)
     };
     let (tally, raised) = with_signals(py, run)?;
     let tally = match tally {
@@ -229,6 +231,10 @@ pub fn run_ensemble(
         kept.fill(count);
     }
     let [q, v, p, z, columns] = kept.parts;
+    let found = |(member, mut c): (usize, Crossing)| {
+        let after = after(&mut c);
+        (member, c.event, c.t, c.q, c.v, c.p, c.z, after)
+    };
     Ok(EnsembleRecord {
         t: vector(py, kept.t),
         q: matrix(py, q, n)?,
@@ -239,7 +245,7 @@ pub fn run_ensemble(
         steps: PyArray1::from_vec(py, kept.steps).unbind(),
         success: PyArray1::from_vec(py, kept.success).unbind(),
         troubles: kept.troubles,
-        crossings: kept.crossings.into_iter().map(|(i, c)| (i, c.event, c.t, c.q, c.v, c.p, c.z)).collect(),
+        crossings: kept.crossings.into_iter().map(found).collect(),
         times: rows.map(|rows| vector(py, rows)),
         batch_kernel: tally.batch_kernel,
         interrupted: raised.map(|raised| raised.into_value(py).into_any()),

@@ -7,6 +7,7 @@ mod condition;
 mod contact;
 mod dense;
 mod ensemble;
+mod events;
 mod exact;
 mod motion;
 mod operators;
@@ -16,6 +17,7 @@ mod signals;
 mod sparse;
 mod symbol;
 mod system;
+mod table;
 mod text;
 
 use herglotz::runtime::{AnyIntegrator, CATALOGUE};
@@ -50,6 +52,8 @@ mod _core {
     use crate::symbol::Symbol;
     #[pymodule_export]
     use crate::system::{System, velocity_names};
+    #[pymodule_export]
+    use crate::table::Table;
     #[pymodule_export]
     use crate::{catalogue, integrators};
     use pyo3::prelude::*;

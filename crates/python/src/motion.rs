@@ -1,11 +1,10 @@
 //! Requests for a motion.
 
-use crate::arrays::{number, numbers, shown, value_error, whole, word};
+use crate::arrays::{number, numbers, value_error, whole, word};
+use crate::events::GivenEvent;
 use crate::signals::Signals;
 use crate::system::System;
-use herglotz::runtime::{
-    AnyIntegrator, Column, Direction, Event, Formula, InitialVelocity, OutputTimes, Start, StepControl, Steps,
-};
+use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, Start, StepControl, Steps};
 use pyo3::prelude::*;
 
 /// A request for a motion, from the arguments of `solve`.
@@ -85,38 +84,8 @@ fn no_times() -> PyErr {
 }
 
 /// The error of a column or an event, with its text.
-fn named<T>(what: &str, text: &str, read: Result<T, herglotz::runtime::RuntimeError>) -> PyResult<T> {
+pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz::runtime::RuntimeError>) -> PyResult<T> {
     read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
-}
-
-/// The text of an event, its direction, and whether it ends the motion.
-pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool);
-
-/// The requested events.
-pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Event>> {
-    let read = |(text, direction, terminal): GivenEvent<'_>| {
-        let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
-        let direction = match direction.extract::<String>().as_deref() {
-            Ok("rising") => Direction::Rising,
-            Ok("falling") => Direction::Falling,
-            Ok("both") => Direction::Both,
-            _ => {
-                let shown = direction.extract().map_or_else(|_| shown(&direction), |text: String| format!("{text:?}"));
-                // SciPy gives directions as numbers.
-                let instead = match direction.extract::<f64>() {
-                    Ok(x) if x > 0.0 => ": write \"rising\"",
-                    Ok(x) if x < 0.0 => ": write \"falling\"",
-                    Ok(_) => ": write \"both\"",
-                    Err(_) => "",
-                };
-                return Err(value_error(format!(
-                    "the direction {shown} of the event {text:?} must be \"rising\", \"falling\" or \"both\"{instead}"
-                )));
-            }
-        };
-        Ok(Event { direction, terminal, ..Event::new(function) })
-    };
-    given.into_iter().map(read).collect()
 }
 
 #[pymethods]
@@ -135,7 +104,7 @@ impl Motion {
         estimate: bool,
         scales: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let formula = system.inner.formula();
+        let formula = &system.formula;
         let (q, velocity, is_momentum, z, near) = start;
         let q = numbers("q0", &q)?;
         let velocity = if is_momentum {
@@ -179,7 +148,7 @@ impl Motion {
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);
         }
-        let events = self::events(events, formula)?;
+        let (with_resets, events) = crate::events::events(events, system)?;
         let start = Start { t: first, q, velocity, z: number("z0", &z)? };
         let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();
@@ -193,7 +162,7 @@ impl Motion {
             interrupt: Some(signals.interrupt()),
             ..herglotz::runtime::Motion::new(start, end, step_control)
         };
-        Ok(Motion { system: system.inner.clone(), motion, conformal_factor, signals })
+        Ok(Motion { system: with_resets, motion, conformal_factor, signals })
     }
 
     /// The plan as text, with the name of the integrator, the step, the number of steps and the predicted error.

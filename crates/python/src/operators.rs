@@ -2,6 +2,7 @@
 
 use crate::condition::Condition;
 use crate::symbol::{Operand, Shared, Symbol, no_number, tracer};
+use crate::table::{Table, name_of};
 use crate::text;
 use formula_lagrangian::{Function, Graph, Id, Operation};
 use pyo3::exceptions::{PyAttributeError, PyTypeError};
@@ -187,8 +188,15 @@ impl Symbol {
 
     /// The value as an expression in the names of coordinates, velocities and parameters.
     fn text(&self, coordinates: Vec<String>, velocities: Vec<String>, parameters: Vec<String>) -> PyResult<String> {
-        let names = text::Names { coordinates, velocities, parameters };
-        Ok(text::text(&self.shared.graph(), self.id, &names))
+        let graph = self.shared.graph();
+        let tables = graph.tables().iter().map(name_of).collect();
+        let names = text::Names { coordinates, velocities, parameters, tables };
+        Ok(text::text(&graph, self.id, &names))
+    }
+
+    /// The tables in the traced function, which its text refers to by their names.
+    fn tables(&self) -> Vec<Table> {
+        self.shared.graph().tables().iter().cloned().map(Table::from).collect()
     }
 
     /// For object arrays other than those of the tracer, NumPy calls a function as a method of the elements.

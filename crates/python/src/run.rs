@@ -3,9 +3,10 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
+use discrete_herglotz::StepError;
 use herglotz::runtime::{
-    Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor, RuntimeError,
-    Status,
+    AfterReset, Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor,
+    RuntimeError, Status,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -72,8 +73,16 @@ impl RunMonitor for RowStore {
 /// The end of a motion: t, q, p, z, and v where it is known.
 type End = (f64, Vec<f64>, Vec<f64>, Option<f64>, Option<Vec<f64>>);
 
-/// A crossing: the index of the event, t, q, v, p and z.
-type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+/// A crossing: the index of the event, t, q, v, p and z, and q, v, p and z after a reset.
+type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64, After);
+
+/// The state q, v, p and z after a reset.
+pub type After = Option<(Vec<f64>, Vec<f64>, Vec<f64>, f64)>;
+
+/// The state after the reset of a crossing.
+pub fn after(crossing: &mut Crossing) -> After {
+    crossing.after.take().map(|AfterReset { q, v, p, z }| (q, v, p, z))
+}
 
 /// The record of a motion by rows.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
@@ -156,6 +165,17 @@ fn outcome_of_start(motion: &Motion) -> Outcome {
     }
 }
 
+/// How a motion ended, for users who have no `at_accumulation`.
+pub fn in_words(status: &Status) -> String {
+    match status {
+        Status::Failed { step, t, cause: StepError::Accumulation { t: limit } } => format!(
+            "failed in step {step} at t = {t}: resets accumulate at t = {limit}: infinitely many of them occur before this \
+             time; end the motion before it"
+        ),
+        status => status.to_string(),
+    }
+}
+
 impl RowStore {
     fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
@@ -193,7 +213,11 @@ pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<
     kept.raised = kept.signals.take();
     let RowStore { n, extra, .. } = kept;
     let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
-    let crossings = kept.crossings.into_iter().map(|c| (c.event, c.t, c.q, c.v, c.p, c.z)).collect();
+    let crossed = |mut c: Crossing| {
+        let after = after(&mut c);
+        (c.event, c.t, c.q, c.v, c.p, c.z, after)
+    };
+    let crossings = kept.crossings.into_iter().map(crossed).collect();
     Ok(Record {
         t: vector(py, kept.t),
         q: matrix(py, kept.q, n)?,
@@ -205,7 +229,7 @@ pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<
         columns,
         crossings,
         end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
-        status: outcome.status.to_string(),
+        status: in_words(&outcome.status),
         // A terminal event is a regular end.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
         unresolved: outcome.unresolved.map(|unresolved| unresolved.to_string()),

@@ -1,7 +1,9 @@
 //! Systems given by a formula.
 
 use crate::arrays::value_error;
-use herglotz::runtime::FormulaSymmetry;
+use crate::table::Table;
+use contact_geom::table::Table as Samples;
+use herglotz::runtime::{Formula, FormulaSymmetry};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
@@ -9,6 +11,9 @@ use pyo3::types::{PyDict, PyType};
 #[pyclass(frozen, module = "herglotz")]
 pub struct System {
     pub inner: herglotz::runtime::System,
+    /// The formula before it is differentiated, to which resets are added.
+    pub formula: Formula,
+    additions: Additions,
     /// The text of the formula.
     #[pyo3(get)]
     lagrangian: String,
@@ -17,8 +22,47 @@ pub struct System {
     given_coordinates: Vec<String>,
 }
 
+/// What a system has in addition to its Lagrangian.
+#[derive(Clone)]
+struct Additions {
+    /// The tables with their names in texts.
+    tables: Vec<(String, Samples)>,
+    /// The forces, by coordinate.
+    forces: Vec<(String, String)>,
+    /// The terms of Rayleigh's function.
+    rayleigh: Vec<String>,
+    /// The times of jumps that are named by the user.
+    breaks: Vec<f64>,
+}
+
+impl Additions {
+    fn named_tables(&self) -> Vec<(String, Table)> {
+        self.tables.iter().map(|(name, table)| (name.clone(), Table::from(table.clone()))).collect()
+    }
+
+    /// The formula of a Lagrangian with them.
+    fn formula(&self, lagrangian: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> PyResult<Formula> {
+        let tables: Vec<(&str, Samples)> =
+            self.tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
+        let mut formula =
+            Formula::parse_with_tables(lagrangian, coordinates, parameters, &tables).map_err(value_error)?;
+        for (coordinate, text) in &self.forces {
+            let with = formula.with_force(coordinate, text);
+            formula = with.map_err(|error| value_error(format!("the force on {coordinate:?}: {error}")))?;
+        }
+        for text in &self.rayleigh {
+            formula = formula.with_rayleigh(text).map_err(|error| value_error(format!("`rayleigh`: {error}")))?;
+        }
+        formula.with_breaks(&self.breaks).map_err(value_error)
+    }
+}
+
 /// The class and the arguments from which pickle restores an object.
-type Reduced<'py> = (Bound<'py, PyType>, (String, Vec<String>, Bound<'py, PyDict>));
+type Reduced<'py> = (Bound<'py, PyType>, Arguments<'py>);
+
+/// The arguments of a system.
+type Arguments<'py> =
+    (String, Vec<String>, Bound<'py, PyDict>, Vec<(String, Table)>, Vec<(String, String)>, Vec<String>, Vec<f64>);
 
 /// String slices of strings.
 fn texts(of: &[String]) -> Vec<&str> {
@@ -40,13 +84,54 @@ pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
 #[pymethods]
 impl System {
     #[new]
-    #[pyo3(signature = (lagrangian, coordinates, parameters = None))]
-    fn new(lagrangian: String, coordinates: Vec<String>, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    #[pyo3(signature = (lagrangian, coordinates, parameters = None, tables = Vec::new(), forces = Vec::new(),
+                        rayleigh = Vec::new(), breaks = Vec::new()))]
+    fn new(
+        lagrangian: String,
+        coordinates: Vec<String>,
+        parameters: Option<&Bound<'_, PyDict>>,
+        tables: Vec<(String, Bound<'_, Table>)>,
+        forces: Vec<(String, String)>,
+        rayleigh: Vec<String>,
+        breaks: Vec<f64>,
+    ) -> PyResult<Self> {
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-        let inner =
-            herglotz::runtime::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
-        Ok(System { inner, lagrangian, given_coordinates: coordinates })
+        let tables = tables.into_iter().map(|(name, table)| (name, table.get().inner.clone())).collect();
+        let additions = Additions { tables, forces, rayleigh, breaks };
+        let formula = additions.formula(&lagrangian, &texts(&coordinates), &values)?;
+        let inner = herglotz::runtime::System::new(&formula).map_err(value_error)?;
+        Ok(System { inner, formula, additions, lagrangian, given_coordinates: coordinates })
+    }
+
+    /// The tables with their names in texts.
+    #[getter]
+    fn tables(&self) -> Vec<(String, Table)> {
+        self.additions.named_tables()
+    }
+
+    /// The forces with their coordinates; those in the text of the Lagrangian are not among them.
+    #[getter]
+    fn forces(&self) -> Vec<(String, String)> {
+        self.additions.forces.clone()
+    }
+
+    /// The terms of Rayleigh's function.
+    #[getter]
+    fn rayleigh(&self) -> Vec<String> {
+        self.additions.rayleigh.clone()
+    }
+
+    /// The times of jumps that are named by the user.
+    #[getter]
+    fn breaks(&self) -> Vec<f64> {
+        self.additions.breaks.clone()
+    }
+
+    /// What contact flows have and the motions of this system lose because of its forces, each with the reason.
+    #[getter]
+    fn losses(&self) -> Vec<String> {
+        self.inner.losses().iter().map(|(what, why)| format!("{what}: {why}")).collect()
     }
 
     /// The names of the coordinates.
@@ -71,14 +156,31 @@ impl System {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (this, py) = (slf.get(), slf.py());
-        Ok((slf.get_type(), (this.lagrangian.clone(), this.given_coordinates.clone(), this.parameters(py)?)))
+        let Additions { forces, rayleigh, breaks, .. } = this.additions.clone();
+        let (text, coordinates) = (this.lagrangian.clone(), this.given_coordinates.clone());
+        let tables = this.tables();
+        Ok((slf.get_type(), (text, coordinates, this.parameters(py)?, tables, forces, rayleigh, breaks)))
     }
 
     fn __repr__(&self) -> String {
         let parameters = self.inner.formula().parameters().map(|(name, value)| format!("{name:?}: {value:?}"));
         let parameters: Vec<String> = parameters.collect();
         let (l, coordinates) = (&self.lagrangian, &self.given_coordinates);
-        format!("System({l:?}, {coordinates:?}, {{{}}})", parameters.join(", "))
+        let Additions { tables, forces, rayleigh, breaks } = &self.additions;
+        let mut text = format!("System({l:?}, {coordinates:?}, {{{}}}", parameters.join(", "));
+        if !tables.is_empty() {
+            text += &format!(", tables={:?}", tables.iter().map(|(name, _)| name).collect::<Vec<_>>());
+        }
+        if !forces.is_empty() {
+            text += &format!(", forces={forces:?}");
+        }
+        if !rayleigh.is_empty() {
+            text += &format!(", rayleigh={rayleigh:?}");
+        }
+        if !breaks.is_empty() {
+            text += &format!(", breaks={breaks:?}");
+        }
+        text + ")"
     }
 
     /// The same system with other values of some parameters.
@@ -86,7 +188,10 @@ impl System {
         let parameters = values(Some(parameters))?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let inner = self.inner.with_parameters(&values).map_err(value_error)?;
-        Ok(System { inner, lagrangian: self.lagrangian.clone(), given_coordinates: self.given_coordinates.clone() })
+        let mut formula = self.formula.clone();
+        values.iter().try_for_each(|(name, value)| formula.set(name, *value)).map_err(value_error)?;
+        let (lagrangian, given_coordinates) = (self.lagrangian.clone(), self.given_coordinates.clone());
+        Ok(System { inner, formula, additions: self.additions.clone(), lagrangian, given_coordinates })
     }
 
     /// The number of coordinates.
@@ -108,6 +213,7 @@ impl System {
             ("quadratic", s.quadratic),
             ("constant_mass", s.constant_mass),
             ("smooth", self.inner.is_smooth()),
+            ("forced", !self.inner.losses().is_empty()),
         ];
         all.into_iter().filter(|(_, holds)| *holds).map(|(name, _)| name).collect()
     }
@@ -133,7 +239,7 @@ impl System {
 #[pyfunction]
 pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<String>)> {
     // The names are expanded by parsing a formula.
-    let formula = herglotz::runtime::Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
+    let formula = Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
     let names = formula.coordinates();
     let velocities = names.iter().map(|name| herglotz::runtime::velocity_name(name)).collect();
     Ok((names, velocities))

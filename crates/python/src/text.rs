@@ -9,6 +9,7 @@ pub struct Names {
     pub coordinates: Vec<String>,
     pub velocities: Vec<String>,
     pub parameters: Vec<String>,
+    pub tables: Vec<String>,
 }
 
 /// The nesting depth of brackets above which a subexpression gets a name: a quarter of what the parser accepts.
@@ -86,7 +87,8 @@ fn expression(node: &Node, of: &mut dyn FnMut(Id) -> String, names: &Names) -> S
         }
         Node::Powi(a, n) => format!("({}^({n}))", of(a)),
         Node::Select([a, b, c, d]) => format!("if({} < {}, {}, {})", of(a), of(b), of(c), of(d)),
-        Node::Table { table, argument, .. } => format!("table_{table}({})", of(argument)),
+        // A traced function has no derivatives of tables.
+        Node::Table { table, argument, .. } => format!("{}({})", name(&names.tables, table), of(argument)),
     }
 }
 

@@ -47,6 +47,22 @@ pub struct Crossing {
     pub z: f64,
     /// The [columns](crate::runtime::Event::columns) of the event; NaN where they are not defined.
     pub columns: Vec<f64>,
+    /// The state after the [reset](crate::runtime::Event::reset) of the event, if it has one; the state of the crossing
+    /// is then that before it.
+    pub after: Option<AfterReset>,
+}
+
+/// The state after a reset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AfterReset {
+    /// The position.
+    pub q: Vec<f64>,
+    /// The velocity; NaN where no velocity corresponds to the momentum.
+    pub v: Vec<f64>,
+    /// The momentum.
+    pub p: Vec<f64>,
+    /// The action.
+    pub z: f64,
 }
 
 /// The plan of a run: what will be computed, and what is skipped.

@@ -96,12 +96,15 @@ pub struct Event {
     /// Expressions that are evaluated at each sign change, in addition to the state there. `sigma` and `log_factor` are
     /// known where `L_z` is constant.
     pub columns: Vec<Expression>,
+    /// The number of a reset of the formula, in the order of [`Formula::with_reset`](crate::runtime::Formula): the
+    /// crossings of the event are then the occurrences of this reset, and its function and direction are not used.
+    pub reset: Option<usize>,
 }
 
 impl Event {
     /// All sign changes of a function; they do not end the motion, and only the state is recorded.
     pub fn new(function: Expression) -> Self {
-        Event { function, direction: Direction::Both, terminal: false, from: None, columns: Vec::new() }
+        Event { function, direction: Direction::Both, terminal: false, from: None, columns: Vec::new(), reset: None }
     }
 
     /// The function and the columns.

@@ -27,6 +27,16 @@ pub struct System {
     pub(crate) kernel: Arc<dyn Kernel>,
 }
 
+/// What motions with a force lose, and why.
+pub(crate) const LOSSES_WITH_FORCE: &[(&str, &str)] = &[
+    (
+        "contact flow",
+        "a force f changes eta = dz - L_v dq at the rate L_z eta - f dq, where f dq is the virtual work of the force",
+    ),
+    ("momenta of symmetries", "they follow the conformal factor only if the force does no work along the symmetry"),
+    ("discrete Lagrangian", "there is none with a force, and the theorems on discrete Herglotz equations do not apply"),
+];
+
 impl System {
     /// The system of a formula.
     ///
@@ -75,6 +85,12 @@ impl System {
     /// The symmetries that are recognised.
     pub fn symmetries(&self) -> Vec<FormulaSymmetry> {
         self.kernel.symmetries()
+    }
+
+    /// What contact flows have and the motions of this system do not, because of its forces, and why; empty without
+    /// forces.
+    pub fn losses(&self) -> &'static [(&'static str, &'static str)] {
+        if self.kernel.has_force() { LOSSES_WITH_FORCE } else { &[] }
     }
 
     /// The same Lagrangian as a Rust source file, for use beyond what a formula allows; see

@@ -94,7 +94,7 @@ impl EndsScene {
         let file: EndsFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let EndsFile { system: table, start, ends, run, .. } = &file;
         let entry = entry(text, table)?;
-        let formula = formula(text, table, entry)?;
+        let formula = formula(text, table, entry, &[])?;
         check_used(text, &formula, table, &[])?;
         let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
         let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;

@@ -14,7 +14,7 @@ mod work_thread;
 use crate::runtime::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start,
 };
-use contact_geom::{Structure, Symmetry};
+use contact_geom::{Lagrangian, Structure, Symmetry};
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
 use formula_lagrangian::{Formula, FormulaError};
 use sized::Sized;
@@ -26,6 +26,7 @@ pub(crate) trait Kernel: Send + Sync {
     fn formula(&self) -> &Formula;
     fn structure(&self) -> Structure;
     fn is_smooth(&self) -> bool;
+    fn has_force(&self) -> bool;
     fn symmetries(&self) -> Vec<FormulaSymmetry>;
     fn to_rust(&self, name: &str) -> Result<String, FormulaError>;
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
@@ -68,6 +69,10 @@ impl<const N: usize> Kernel for Sized<N> {
 
     fn is_smooth(&self) -> bool {
         self.0.is_smooth()
+    }
+
+    fn has_force(&self) -> bool {
+        Lagrangian::has_force(&self.0)
     }
 
     fn symmetries(&self) -> Vec<FormulaSymmetry> {

@@ -2,12 +2,12 @@
 
 use super::sized::coordinates;
 use crate::runtime::{
-    Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
+    AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
-    Event, Events, InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal,
+    Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
     theory::legendre_inverse,
 };
 use formula_lagrangian::{Expression, FormulaLagrangian};
@@ -143,8 +143,8 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
     }
 }
 
-/// Rejects events with the conformal factor where it is not known at all times, and terminal events that count from a
-/// given time.
+/// Rejects events with the conformal factor where it is not known at all times, terminal events that count from a given
+/// time or have a reset, and events with a reset that the formula does not have.
 pub(super) fn check_events<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     events: &[crate::runtime::Event],
@@ -155,8 +155,19 @@ pub(super) fn check_events<const N: usize>(
                    two";
         return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
     }
+    if events.iter().any(|event| event.terminal && event.reset.is_some()) {
+        let why = "is given for a terminal event, which ends the motion before its reset; remove one of the two";
+        return Err(RuntimeError::argument("reset", why));
+    }
+    if events.iter().any(|event| event.reset.is_some_and(|reset| reset >= lagrangian.resets())) {
+        return Err(RuntimeError::argument(
+            "reset",
+            format!("of an event is not one of the {} resets of the formula", lagrangian.resets()),
+        ));
+    }
     let has_factor = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_conformal_factor);
-    if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
+    let is_known = lagrangian.constant_rate().is_some() && !lagrangian.formula().has_conformal_impacts();
+    if has_factor && !is_known { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
 }
 
 /// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
@@ -189,7 +200,10 @@ fn at_states<'r, const N: usize>(
 
 /// The events of a motion, with the data needed to evaluate them.
 pub(super) struct Crossings<'r, const N: usize> {
+    lagrangian: &'r FormulaLagrangian<N>,
+    /// The events without a reset, whose sign changes are searched for, and their indices.
     events: Events<'r, N>,
+    searched: Vec<usize>,
     /// The events as they were requested.
     requested: &'r [crate::runtime::Event],
     /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
@@ -217,9 +231,12 @@ impl<'r, const N: usize> Crossings<'r, N> {
         let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
         let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: Cell::new(v) });
         let action = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_action);
-        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, context.clone())));
+        let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
+        let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
         (!events.is_empty()).then(|| Crossings {
-            events: all(),
+            lagrangian,
+            events: all,
+            searched,
             requested: events,
             rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
             action,
@@ -261,26 +278,60 @@ impl<'r, const N: usize> Crossings<'r, N> {
         mut pass_on_rows: impl FnMut(Crossing) -> ControlFlow<()>,
     ) -> ControlFlow<Stop<N>> {
         let ended = self.events.step(at);
-        for crossing in self.events.crossings.drain(..) {
-            let requested = self.requested.get(crossing.event);
-            let (t, from) = (crossing.t, requested.and_then(|event| event.from));
+        let end = match &ended {
+            ControlFlow::Break(Stop { at: Some((t, _)), .. }) => Some(*t),
+            _ => None,
+        };
+        for (event, t, before, after) in self.found(at, end) {
+            let requested = self.requested.get(event);
+            let from = requested.and_then(|event| event.from);
             if from.is_some_and(|from| if self.backward { t > from } else { t < from }) {
                 continue;
             }
-            let PhasePoint { q, p, z } = crossing.state;
             // The velocity at the end of the step is close enough as an initial guess.
-            let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let velocity = |state| at.velocity_at(t, state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let (PhasePoint { q, p, z }, v) = (before, velocity(&before));
             let log_factor = self.rate * (t - self.context.start_time.get());
             let columns = requested.map_or(&[][..], |event| &event.columns).iter();
             let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
-            let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
-            if pass_on_rows(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
+            let vectors = |[q, v, p]: [SVector<f64, N>; 3]| [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
+            let after = after.as_ref().map(|after| {
+                let [q, v, p] = vectors([after.q, velocity(after), after.p]);
+                AfterReset { q, v, p, z: after.z }
+            });
+            let [q, v, p] = vectors([q, v, p]);
+            if pass_on_rows(Crossing { t, event, q, v, p, z, columns, after }).is_break() {
                 return ControlFlow::Break(Stop::here("the monitor"));
             }
         }
         ended
     }
+
+    /// The crossings in a step, up to a time at which the motion ends within it: the index of the event, the time, the
+    /// state, and that after a reset. They are in the order of the motion, resets after others at the same time.
+    fn found(&mut self, at: &StepView<'_, N>, end: Option<f64>) -> Vec<Found<N>> {
+        let searched = &self.searched;
+        let changes = self.events.crossings.drain(..);
+        let changes = changes.map(|c| (searched.get(c.event).copied().unwrap_or(usize::MAX), c.t, c.state, None));
+        let mut found: Vec<Found<N>> = changes.collect();
+        let count = found.len();
+        for Reset { t, index, before, after } in at.resets() {
+            let Some(reset) = self.lagrangian.reset_of(*index) else { continue };
+            let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) else { continue };
+            if end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
+                found.push((event, *t, *before, Some(*after)));
+            }
+        }
+        if found.len() > count {
+            let backward = self.backward;
+            found.sort_by(|a, b| if backward { b.1.total_cmp(&a.1) } else { a.1.total_cmp(&b.1) });
+        }
+        found
+    }
 }
+
+/// A crossing: the index of the event, the time, the state, and that after a reset.
+type Found<const N: usize> = (usize, f64, PhasePoint<N>, Option<PhasePoint<N>>);
 
 fn of<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,

@@ -2,7 +2,9 @@
 
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
-use crate::runtime::{Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl};
+use crate::runtime::system::LOSSES_WITH_FORCE;
+use crate::runtime::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
+use contact_geom::Lagrangian;
 use discrete_herglotz::{Problem, ResumeState, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
 
@@ -35,13 +37,21 @@ pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result
     let mut recorder = Recorder::new(&system.0, motion, &mut no_monitor)?;
     let run = of(system, &problem, motion)?.observe(&mut recorder);
     let plan = run.plan(Until::Time(motion.end))?;
+    let (mut text, mut items) = (plan.to_string(), plan.entries());
+    if Lagrangian::has_force(&system.0) {
+        for (what, why) in LOSSES_WITH_FORCE {
+            // The entries that are skipped are the last ones in the text.
+            text += &format!("  {what}: {why}\n");
+            items.push(PlanEntry::skipped(what, *why));
+        }
+    }
     Ok(Plan {
-        text: plan.to_string(),
+        text,
         integrator: plan.integrator().clone(),
         step_size: plan.step_size(),
         steps: plan.count(),
         error: plan.error(),
-        items: plan.entries(),
+        items,
     })
 }
 
