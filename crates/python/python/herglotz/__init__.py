@@ -17,10 +17,11 @@ equation,
 
 from importlib import import_module as _import_module
 
-from ._core import System
+from ._additions import table
+from ._core import System, Table
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._solution import Crossings, Interrupted, Plan, Solution, States
+from ._solution import Crossings, Interrupted, Plan, Resets, Solution, States
 from ._solve import Event, solve
 from ._system import system
 from ._trace import array, where
@@ -30,7 +31,7 @@ __version__ = "0.1.0"
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
     "_sparse": "SparseSolution bodies lattice",
-    "_ensemble": "Ensemble MemberCrossings ensemble",
+    "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_path": "Path path",
     "_checks": "Check Comparison Contact Geometry check compare geometry is_contact",
@@ -73,12 +74,15 @@ __all__ = [
     "Geometry",
     "Interrupted",
     "MemberCrossings",
+    "MemberResets",
     "Path",
     "Plan",
+    "Resets",
     "Retraction",
     "Solution",
     "States",
     "System",
+    "Table",
     "array",
     "bodies",
     "catalogue",
@@ -95,5 +99,6 @@ __all__ = [
     "retract",
     "solve",
     "system",
+    "table",
     "where",
 ]

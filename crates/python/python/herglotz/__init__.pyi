@@ -9,12 +9,25 @@ Vector: TypeAlias = NDArray[np.float64]
 Lagrangian: TypeAlias = Callable[..., Any] | str | System | Any
 Expression: TypeAlias = str | Callable[..., Any]
 Direction: TypeAlias = Literal["both", "rising", "falling"]
+Pieces: TypeAlias = Literal["linear", "held", "cubic"]
+# A function (t, q, v, z, **parameters), formulas by coordinate, or the formula for a single coordinate.
+Force: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float] | str
+# A function (t, q, v, z, **parameters) -> (q, v) or (q, v, z), or formulas by variable.
+Reset: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float]
+Events: TypeAlias = Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event]
 
 __version__: str
 
 class System:
     def __new__(
-        cls, lagrangian: str, coordinates: Sequence[str], parameters: Mapping[str, float] | None = None
+        cls,
+        lagrangian: str,
+        coordinates: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        tables: Sequence[tuple[str, Table]] = ...,
+        forces: Sequence[tuple[str, str]] = ...,
+        rayleigh: Sequence[str] = ...,
+        breaks: Sequence[float] = ...,
     ) -> System: ...
     @property
     def lagrangian(self) -> str: ...
@@ -32,14 +45,39 @@ class System:
     def used_parameters(self) -> list[str]: ...
     @property
     def symmetries(self) -> list[list[list[int]]]: ...
+    @property
+    def tables(self) -> list[tuple[str, Table]]: ...
+    @property
+    def forces(self) -> list[tuple[str, str]]: ...
+    @property
+    def rayleigh(self) -> list[str]: ...
+    @property
+    def breaks(self) -> list[float]: ...
+    @property
+    def losses(self) -> list[str]: ...
     def with_parameters(self, parameters: Mapping[str, float]) -> System: ...
     def to_rust(self, name: str) -> str: ...
+
+class Table:
+    def __new__(cls, t: ArrayLike, y: ArrayLike, pieces: Pieces = "linear") -> Table: ...
+    @property
+    def t(self) -> Vector: ...
+    @property
+    def y(self) -> Vector: ...
+    @property
+    def pieces(self) -> Pieces: ...
+    @property
+    def name(self) -> str: ...
+    def __call__(self, t: Any) -> Any: ...
 
 class Event:
     when: Expression
     direction: Direction
     terminal: bool
-    def __init__(self, when: Expression, direction: Direction = "both", terminal: bool = False) -> None: ...
+    reset: Reset | None
+    def __init__(
+        self, when: Expression, direction: Direction = "both", terminal: bool = False, reset: Reset | None = None
+    ) -> None: ...
 
 class Crossings(NamedTuple):
     t: Vector
@@ -48,6 +86,17 @@ class Crossings(NamedTuple):
     p: Vector
     z: Vector
 
+class Resets(NamedTuple):
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    after_q: Vector
+    after_v: Vector
+    after_p: Vector
+    after_z: Vector
+
 class MemberCrossings(NamedTuple):
     member: NDArray[np.int64]
     t: Vector
@@ -55,6 +104,18 @@ class MemberCrossings(NamedTuple):
     v: Vector
     p: Vector
     z: Vector
+
+class MemberResets(NamedTuple):
+    member: NDArray[np.int64]
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    after_q: Vector
+    after_v: Vector
+    after_p: Vector
+    after_z: Vector
 
 class States(NamedTuple):
     t: Vector | float
@@ -80,7 +141,7 @@ class Solution:
     z: Vector
     energy: Vector
     log_factor: Vector | None
-    events: list[Crossings] | dict[str, Crossings]
+    events: list[Crossings | Resets] | dict[str, Crossings | Resets]
     status: str
     success: bool
     unresolved: str | None
@@ -150,7 +211,7 @@ class Ensemble:
     p: Vector
     z: Vector
     times: Vector | None
-    events: list[MemberCrossings] | dict[str, MemberCrossings]
+    events: list[MemberCrossings | MemberResets] | dict[str, MemberCrossings | MemberResets]
     steps: NDArray[np.int64]
     success: NDArray[np.bool_]
     troubles: dict[int, str]
@@ -210,6 +271,7 @@ class Check(NamedTuple):
     step: float
     places: list[Place]
     statements: list[tuple[str, str, float]]
+    losses: list[str]
     def __bool__(self) -> bool: ...
 
 class Work(NamedTuple):
@@ -225,6 +287,7 @@ class Comparison:
     rows: list[Work]
     reference: str
     left_out: dict[str, str]
+    losses: list[str]
     def best(self, error: float) -> Work | None: ...
     def to_pandas(self) -> Any: ...
     def plot(self, ax: Any = None) -> Any: ...
@@ -235,6 +298,10 @@ def system(
     parameters: Mapping[str, float] | None = None,
     *,
     n: int | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
 ) -> System: ...
 def solve(
     L: Lagrangian,
@@ -249,13 +316,17 @@ def solve(
     step: float | None = None,
     steps: int | None = None,
     every: int | None = None,
-    events: Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event] = (),
+    events: Events = (),
     observe: Mapping[str, Expression] | None = None,
     conformal_factor: bool = False,
     estimate: bool = False,
     scales: ArrayLike | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
 ) -> Solution: ...
 def lattice(
     site: str,
@@ -303,11 +374,15 @@ def ensemble(
     integrator: str | None = None,
     step: float | None = None,
     steps: int | None = None,
-    events: Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event] = (),
+    events: Events = (),
     observe: Mapping[str, Expression] | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     threads: int | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
 ) -> Ensemble: ...
 def geometry(
     L: Lagrangian,
@@ -353,6 +428,10 @@ def check(
     steps: int | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
 ) -> Check: ...
 def compare(
     L: Lagrangian,
@@ -364,7 +443,12 @@ def compare(
     z0: float = 0.0,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
 ) -> Comparison: ...
+def table(t: ArrayLike, y: ArrayLike, pieces: Pieces = "linear") -> Table: ...
 def where(condition: Any, x: Any, y: Any) -> Any: ...
 def array(values: Any) -> Any: ...
 def integrators() -> dict[str, int]: ...

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core, _trace
+from ._additions import breaks_of
 from ._solve import system_and_start
 from ._system import system
 
@@ -94,8 +95,9 @@ def is_contact(map, at, *, tolerance=1e-9):
     n = np.size(q)
     if n == 0:
         raise ValueError("`at` has an empty q: give at least one coordinate")
-    components = _trace.components_of(map, n)
-    sigma, defect, image, jacobian = _core.conformality(components, (q, p, z))
+    tables = {}
+    components = _trace.components_of(map, n, tables)
+    sigma, defect, image, jacobian = _core.conformality(components, list(tables.items()), (q, p, z))
     # NaN does not count as contact, and neither does the factor 0, with which the pullback is not a contact form.
     is_so = defect <= tolerance and sigma != 0.0 and np.isfinite(sigma)
     return Contact(bool(is_so), sigma, defect, image, jacobian)
@@ -120,19 +122,29 @@ class Check(NamedTuple):
     step: float
     places: list
     statements: list  # (statement, discrete Lagrangian, residual)
+    losses: list  # what contact flows have and this motion loses because of its forces, with the reasons
 
     def __bool__(self):
         return self.is_contact
 
+    def __str__(self):
+        defect = max((place.contact_defect for place in self.places), default=0.0)
+        is_so = "contact" if self.is_contact else "not contact"
+        first = f"{is_so}: {len(self.places)} steps of {self.step!r} by {self.integrator}, largest defect {defect:.1e}"
+        return "\n".join([first, *(f"lost with the force: {loss}" for loss in self.losses)])
 
-def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
-    L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
+
+def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more):
+    L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
+    breaks = more[3]
     if (v0 is None) == (p0 is None):
         raise ValueError("give either `v0` or `p0`")
     start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
     if t is None:
         raise ValueError("`t` is not given: give the final time")
-    return _core.Motion(L, start, t, None, way, [], [], False, False, None)
+    if breaks is not None:
+        breaks_of(breaks, t)
+    return L, _core.Motion(L, start, t, None, way, [], [], False, False, None)
 
 
 def check(
@@ -150,19 +162,25 @@ def check(
     steps=None,
     coordinates=None,
     parameters=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
 ):
     """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
 
-    The arguments are those of `solve`; `places` is the number of steps that are checked.
+    The arguments are those of `solve`; `places` is the number of steps that are checked. The steps of a motion with a
+    force are not contact, and the theorems do not apply: ``losses`` says what is lost.
 
     Returns
     -------
     Check
     """
     way = accuracy, integrator, step, steps
-    motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters)
+    more = force, rayleigh, tables, breaks
+    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more)
     integrator, step, found, statements, contact = _core.check(motion, places)
-    return Check(contact, integrator, step, [Place(*place) for place in found], statements)
+    return Check(contact, integrator, step, [Place(*place) for place in found], statements, of.losses)
 
 
 class Work(NamedTuple):
@@ -180,9 +198,9 @@ class Work(NamedTuple):
 class Comparison:
     """Run time against error; made by `compare`."""
 
-    def __init__(self, rows, reference, left_out):
+    def __init__(self, rows, reference, left_out, losses):
         self.rows = [Work(*row) for row in rows]
-        self.reference, self.left_out = reference, dict(left_out)
+        self.reference, self.left_out, self.losses = reference, dict(left_out), losses
 
     def best(self, error):
         """The fastest run with at most this error; None where there is none."""
@@ -208,12 +226,29 @@ class Comparison:
         return ax
 
 
-def compare(L, q0=None, v0=None, t=None, *, p0=None, z0=0.0, coordinates=None, parameters=None):
+def compare(
+    L,
+    q0=None,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    z0=0.0,
+    coordinates=None,
+    parameters=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
+):
     """Run time against error for all integrators that apply to a motion; the arguments are those of `solve`.
+
+    ``left_out`` has the reasons why others do not apply, and ``losses`` what a motion with a force loses.
 
     Returns
     -------
     Comparison
     """
-    motion = _motion(L, q0, v0, t, p0, z0, (None, None, None, None), coordinates, parameters)
-    return Comparison(*_core.compare(motion))
+    more = force, rayleigh, tables, breaks
+    of, motion = _motion(L, q0, v0, t, p0, z0, (None, None, None, None), coordinates, parameters, more)
+    return Comparison(*_core.compare(motion), of.losses)

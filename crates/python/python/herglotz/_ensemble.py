@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
+from ._additions import breaks_of
 from ._solution import Interrupted, crossings
-from ._solve import columns_of, events_of, system_and_start
-from ._system import check_parameters
+from ._solve import columns_of, events_of, functions_of, system_and_start, texts_of_events
+from ._system import check_parameters, with_tables
 
 
 def ensemble(
@@ -27,6 +28,10 @@ def ensemble(
     coordinates=None,
     parameters=None,
     threads=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
 ):
     """M motions of one Lagrangian on several threads; the result does not depend on the number of threads.
 
@@ -48,7 +53,7 @@ def ensemble(
         As in `solve`; their results also have the member. A terminal event ends the motion of its member only.
     threads : int, optional
         By default the number of processors.
-    accuracy, integrator, step, steps, observe, coordinates
+    accuracy, integrator, step, steps, observe, coordinates, force, rayleigh, tables, breaks
         As in `solve`.
 
     Returns
@@ -73,15 +78,21 @@ def ensemble(
     }
     if np.ndim(q0) != 2:
         raise ValueError(f"`q0` has {np.ndim(q0)} dimensions; it must have the shape (M, n), with a row for each member")
-    system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed)
+    more = force, rayleigh, tables, breaks
+    system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed, more)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or several times")
     if (v0 is None) == (p0 is None):
         raise ValueError("give either `v0` or `p0`")
-    given = events_of(events, system) if events else []
-    columns = columns_of(observe, system)
+    if breaks is not None:
+        breaks_of(breaks, t)
+    found = {}
+    given = events_of(events, system, found) if events else []
+    columns = columns_of(observe, system, found)
+    system = with_tables(system, found)
     if parameters:
-        check_parameters(system, parameters, L, [*(event[0] for event in given), *columns])
+        functions = (L, *functions_of(force, rayleigh))
+        check_parameters(system, parameters, functions, [*texts_of_events(given), *columns])
     record = _core.run_ensemble(
         system,
         (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
@@ -94,7 +105,7 @@ def ensemble(
         threads,
     )
     event_names = tuple(events) if isinstance(events, dict) else len(given)
-    found = Ensemble(system, record, event_names, tuple(observe or ()))
+    found = Ensemble(system, record, event_names, tuple(observe or ()), [event[3] is not None for event in given])
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(found)
@@ -113,6 +124,21 @@ class MemberCrossings(NamedTuple):
     z: np.ndarray  # (m,)
 
 
+class MemberResets(NamedTuple):
+    """The resets of an event in an ensemble, m of them: the states before and after each."""
+
+    member: np.ndarray  # (m,)
+    t: np.ndarray  # (m,)
+    q: np.ndarray  # (m, n)
+    v: np.ndarray  # (m, n)
+    p: np.ndarray  # (m, n)
+    z: np.ndarray  # (m,)
+    after_q: np.ndarray  # (m, n)
+    after_v: np.ndarray  # (m, n)
+    after_p: np.ndarray  # (m, n)
+    after_z: np.ndarray  # (m,)
+
+
 class Ensemble:
     """M motions of n coordinates; made by `ensemble`.
 
@@ -123,9 +149,9 @@ class Ensemble:
     t : array of shape (M,)
         The times that were reached.
     times : array of shape (k,) or None
-    events : list or dict of MemberCrossings
+    events : list or dict of MemberCrossings or MemberResets
         The sign changes of the events, in the order of the events or by name: those of all members, one after the
-        other.
+        other. For events with a reset these are the resets.
     steps : array of int of shape (M,)
     success : array of bool of shape (M,)
     troubles : dict of str
@@ -134,7 +160,7 @@ class Ensemble:
         The number of members that were advanced together in SIMD lanes.
     """
 
-    def __init__(self, system, record, event_names, observed):
+    def __init__(self, system, record, event_names, observed, has_reset):
         self.system = system
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
@@ -142,7 +168,8 @@ class Ensemble:
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
         self.z = record.z.reshape(count, *many)
-        self.events = crossings(MemberCrossings, record.crossings, event_names, n) if event_names else []
+        kinds = [MemberResets if reset else MemberCrossings for reset in has_reset]
+        self.events = crossings(kinds, record.crossings, event_names, n) if event_names else []
         self._observed = {name: record.columns[:, i].reshape(count, *many) for i, name in enumerate(observed)}
 
     def __len__(self):

@@ -17,6 +17,20 @@ class Crossings(NamedTuple):
     z: np.ndarray  # (m,)
 
 
+class Resets(NamedTuple):
+    """The resets of an event, m of them: the states before and after each."""
+
+    t: np.ndarray  # (m,)
+    q: np.ndarray  # (m, n)
+    v: np.ndarray  # (m, n)
+    p: np.ndarray  # (m, n)
+    z: np.ndarray  # (m,)
+    after_q: np.ndarray  # (m, n)
+    after_v: np.ndarray  # (m, n)
+    after_p: np.ndarray  # (m, n)
+    after_z: np.ndarray  # (m,)
+
+
 class States(NamedTuple):
     """States at m times, or at one."""
 
@@ -70,8 +84,8 @@ class Solution:
         The action, and the energy v.p - L.
     log_factor : array of shape (k,) or None
         The logarithm of the conformal factor since the start, where it was requested.
-    events : list or dict of Crossings
-        The sign changes of the events, in the order of the events or by name.
+    events : list or dict of Crossings or Resets
+        The sign changes of the events, in the order of the events or by name; for events with a reset the resets.
     status : str
         How the run ended; ``success`` is whether it ended as requested.
     unresolved : str or None
@@ -96,7 +110,8 @@ class Solution:
         self._end, self._halted = record.end, record.halted
         self._observed = observed
         self._columns = record.columns
-        self.events = crossings(Crossings, record.crossings, event_names, system.dimension) if event_names else []
+        kinds = [Crossings if event[3] is None else Resets for event in request[4]]
+        self.events = crossings(kinds, record.crossings, event_names, system.dimension) if event_names else []
         self._event_names = event_names
         self._plan = self._dense = None
 
@@ -133,7 +148,7 @@ class Solution:
         """Dense output: the states at any times of the motion, as accurate as its steps.
 
         The first call runs the motion again and keeps the ends of its steps; a state within a step is computed by a
-        shorter step of the same integrator.
+        shorter step of the same integrator. At the time of a reset the state is that before it.
 
         Parameters
         ----------
@@ -201,9 +216,12 @@ class Solution:
 
         Those of bodies are recognised where L depends on the differences of their coordinates: ``translation of x1,
         x2`` and ``rotation of (x1, y1), (x2, y2)``. They decay as the conformal factor: a momentum divided by
-        exp(log_factor) is constant.
+        exp(log_factor) is constant. With a force they are those along which the force does no work; with resets, which
+        change momenta, there are none.
         """
         coordinates, found = self.system.coordinates, {}
+        if any(event[3] is not None for event in self._request[4]):
+            return found
         for which in self.system.symmetries:
             pairs = [", ".join(coordinates[i] for i in part) for part in which]
             if len(which[0]) == 1:
@@ -260,15 +278,19 @@ class Solution:
         return f"<Solution: {len(self.t)} rows, t = {self.t_end}, {self.steps} steps, {self.status}>"
 
 
-def crossings(kind, found, names, n):
-    """The crossings of each event: by name, or a list where `names` is a count. In `found` the event precedes t."""
-    before = kind._fields.index("t")
+def crossings(kinds, found, names, n):
+    """The crossings of each event: by name, or a list where `names` is a count.
+
+    In `found` the event precedes t, and the state after a reset is the last entry.
+    """
 
     def of(index):
-        mine = [crossing for crossing in found if crossing[before] == index]
+        kind = kinds[index]
+        before = kind._fields.index("t")
+        mine = [(*crossing[:-1], *(crossing[-1] or ())) for crossing in found if crossing[before] == index]
         fields = [field for k, field in enumerate(zip(*mine)) if k != before] or [()] * len(kind._fields)
         arrays = (np.array(field, dtype=int if name == "member" else float) for name, field in zip(kind._fields, fields))
-        return kind(*(x.reshape(-1, n) if name in ("q", "v", "p") else x for name, x in zip(kind._fields, arrays)))
+        return kind(*(x.reshape(-1, n) if name[-1] in "qvp" else x for name, x in zip(kind._fields, arrays)))
 
     if isinstance(names, int):
         return [of(index) for index in range(names)]

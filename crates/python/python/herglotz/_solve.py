@@ -1,8 +1,9 @@
 """One motion: its request and its run."""
 
 from . import _core
+from ._additions import breaks_of, reset_of
 from ._solution import Interrupted, Solution
-from ._system import check_parameters, copied, expression, system
+from ._system import check_parameters, copied, expression, system, with_tables
 
 
 def solve(
@@ -25,6 +26,10 @@ def solve(
     scales=None,
     coordinates=None,
     parameters=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
 ):
     """The motion of a Lagrangian system: Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
 
@@ -52,7 +57,7 @@ def solve(
     every : int, optional
         Record a row every `every` steps, in place of the rows at `t`.
     events : str, Event, or a list or dict of them
-        Functions of time and state whose sign changes are located.
+        Functions of time and state whose sign changes are located, and resets that occur at them.
     observe : dict of str or functions, optional
         Expressions by name: additional columns, ``sol["name"]``.
     conformal_factor : bool
@@ -65,6 +70,12 @@ def solve(
         apply to each coordinate and its velocity in units of its size.
     coordinates, parameters
         As in `system`.
+    force, rayleigh, tables
+        As in `system`. With a force f the equation of motion is d/dt L_v - L_q - L_z L_v = f, and the flow is not
+        contact: ``sol.plan`` says what is lost.
+    breaks : list of float, optional
+        Times of jumps within the span, in ascending order: steps end there. Those that the formulas show, as samples of
+        tables and ``np.where(t < 3, ...)``, are known without it.
 
     Returns
     -------
@@ -77,26 +88,33 @@ def solve(
     Interrupted
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
-    given = L
-    if type(L) is not _core.System or parameters is not None or q0 is None:
-        L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
+    given = (L, *functions_of(force, rayleigh))
+    more = force, rayleigh, tables, breaks
+    if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in more):
+        L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or the times of the rows")
     if (v0 is None) == (p0 is None):
         raise ValueError("give either `v0` or `p0`")
+    if breaks is not None:
+        breaks_of(breaks, t)
+    found = {}
+    given_events = events_of(events, L, found) if events else []
+    columns = columns_of(observe, L, found)
+    L = with_tables(L, found)
     request = (
         (copied(q0), copied(v0), False, z0, None) if p0 is None else (copied(q0), copied(p0), True, z0, None),
         copied(t),
         every,
         (accuracy, integrator, step, steps),
-        events_of(events, L) if events else [],
-        columns_of(observe, L),
+        given_events,
+        columns,
         conformal_factor,
         estimate,
         copied(scales),
     )
     if parameters:
-        check_parameters(L, parameters, given, [*(event[0] for event in request[4]), *request[5]])
+        check_parameters(L, parameters, given, [*texts_of_events(given_events), *columns])
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
     return run(L, request, event_names, tuple(observe) if observe else ())
 
@@ -113,7 +131,7 @@ def run(L, request, event_names, observed, halted=None):
     return sol
 
 
-def system_and_start(L, q0, v0, p0, coordinates, parameters):
+def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4):
     """The system of an argument, and the start, which the catalogue may provide."""
     if isinstance(L, str) and L in CATALOGUE:
         entry = CATALOGUE[L]
@@ -122,14 +140,21 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters):
     if q0 is None:
         raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1
-    return system(L, coordinates, parameters, n=n), q0, v0
+    force, rayleigh, tables, breaks = more
+    of = system(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks)
+    return of, q0, v0
+
+
+def functions_of(force, rayleigh):
+    """The functions of forces, whose parameters may be given."""
+    return (*(force.values() if hasattr(force, "values") else [force]), rayleigh)
 
 
 CATALOGUE = {entry[0]: entry for entry in _core.catalogue()}
 
 
 class Event:
-    """A function of time and state whose sign changes are located.
+    """A function of time and state whose sign changes are located, and what happens to the state there.
 
     Parameters
     ----------
@@ -140,28 +165,51 @@ class Event:
         Which sign changes count, in the direction of the motion.
     terminal : bool
         Whether the first sign change ends the motion.
+    reset : function or dict of str, optional
+        The state after the sign change, from which the motion continues: a function (t, q, v, z, **parameters) of the
+        state before it that returns (q, v), where z remains, or (q, v, z); or formulas of the variables that change,
+        ``{"x'": "-0.8*x'"}``. The state must be on the surface or on the side from which the motion comes.
+
+    Examples
+    --------
+    A ball that loses a fifth of its speed at each bounce:
+
+    >>> import herglotz as hz
+    >>> floor = hz.Event("x", "falling", reset={"x'": "-0.8*x'"})
+    >>> sol = hz.solve("x'^2/2 - 9.81*x", [1.0], [0.0], 3.0, coordinates=["x"], events=floor)
+    >>> bounces = sol.events[0]
+    >>> bounces.t.shape, bounces.v[0], bounces.after_v[0]
+    ((5,), array([-4.42944692]), array([3.54355753]))
     """
 
-    __slots__ = ("when", "direction", "terminal")
+    __slots__ = ("when", "direction", "terminal", "reset")
 
-    def __init__(self, when, direction="both", terminal=False):
-        self.when, self.direction, self.terminal = when, direction, terminal
+    def __init__(self, when, direction="both", terminal=False, reset=None):
+        self.when, self.direction, self.terminal, self.reset = when, direction, terminal, reset
 
     def __repr__(self):
-        return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal})"
+        reset = "" if self.reset is None else f", reset={self.reset!r}"
+        return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal}{reset})"
 
 
-def columns_of(observe, L):
+def columns_of(observe, L, tables):
     """The texts of the observed expressions."""
     if not observe:
         return []
     if not hasattr(observe, "values"):
         raise ValueError(f'`observe` is {observe!r}; it must give expressions by name, as in observe={{"square": "x^2"}}')
-    return [expression(column, L) for column in observe.values()]
+    return [expression(column, L, tables) for column in observe.values()]
 
 
-def events_of(events, L):
-    """The events in the form of the core."""
+def texts_of_events(events):
+    """All formulas of events in the form of the core."""
+    for text, _, _, reset in events:
+        yield text
+        yield from (value for _, value in reset or ())
+
+
+def events_of(events, L, tables):
+    """The events in the form of the core; the tables in their functions are added to `tables`."""
     if isinstance(events, (str, Event)) or callable(events):
         events = [events]
     elif isinstance(events, dict):
@@ -170,5 +218,9 @@ def events_of(events, L):
     for event in events:
         if not isinstance(event, Event):
             event = Event(event)
-        result.append((expression(event.when, L), event.direction, bool(event.terminal)))
+        text = expression(event.when, L, tables)
+        if event.terminal and event.reset is not None:
+            raise ValueError(f"the event {text!r} is terminal and has a reset: remove one of the two")
+        reset = None if event.reset is None else reset_of(event.reset, L, tables)
+        result.append((text, event.direction, bool(event.terminal), reset))
     return result

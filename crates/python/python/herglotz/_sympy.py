@@ -103,4 +103,4 @@ def _text(L, coordinates, parameters):
 
     names = [_name(c) for c in coordinates]
     velocity_names = [f"{name}'" for name in names]
-    return _trace.formula_of(traced, (names, velocity_names, parameters))
+    return _trace.formula_of(traced, (names, velocity_names, parameters), {})

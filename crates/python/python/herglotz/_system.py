@@ -1,20 +1,22 @@
 """Systems from the objects that a user may give as a Lagrangian."""
 
 import difflib
-import functools
 import re
 from types import FunctionType
 
 import numpy as np
 
 from . import _core, _trace
+from ._additions import Additions, additions_of, names_of, velocity_names
 
 _SYSTEMS = {}
 # The number of systems of texts that are cached, so that a text is parsed once.
 _MOST = 256
 
 
-def system(L, coordinates=None, parameters=None, *, n=None):
+def system(
+    L, coordinates=None, parameters=None, *, n=None, force=None, rayleigh=None, tables=None, breaks=None
+):
     """The system of a Lagrangian.
 
     Parameters
@@ -29,6 +31,18 @@ def system(L, coordinates=None, parameters=None, *, n=None):
         The values of the parameters by name.
     n : int, optional
         The number of coordinates, where they have no names.
+    force : function, dict of str, or str, optional
+        The force f(t, q, v, z) on the coordinates: the motions then satisfy d/dt L_v - L_q - L_z L_v = f, dz/dt = L. A
+        function (t, q, v, z, **parameters) that returns an array of shape (n,), or a number for one coordinate; or
+        formulas by coordinate, ``{"x": "-c*x'*abs(x')"}``; or the formula for a single coordinate. With a force the
+        flow is not contact.
+    rayleigh : function or str, optional
+        Rayleigh's function R(t, q, v, z), whose force -dR/dv is added.
+    tables : dict of Table, optional
+        Tables by the names that they have in formulas: ``tables={"drive": table}`` for ``drive(t)``. Functions call
+        their tables without this argument.
+    breaks : list of float, optional
+        Times at which steps end, in ascending order: those of jumps that the formulas do not show as such.
 
     Returns
     -------
@@ -36,54 +50,83 @@ def system(L, coordinates=None, parameters=None, *, n=None):
     """
     if parameters is not None and not hasattr(parameters, "keys"):
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
+    is_plain = force is None and rayleigh is None and not tables and breaks is None
     if isinstance(L, _core.System):
-        return L.with_parameters(parameters) if parameters else L
+        if is_plain:
+            return L.with_parameters(parameters) if parameters else L
+        text, coordinates, known = L.lagrangian, L.given_coordinates, L.parameters
+        parameters = known | dict(parameters or {})
+        more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks))
+    else:
+        found = {}
+        text, coordinates, parameters = _text_of(L, coordinates, parameters, n, found)
+        more = Additions(tuple(found.items()))
+    if not is_plain:
+        of = (*velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        more = more.plus(additions_of(force, rayleigh, tables, breaks, of))
+    return _built(text, coordinates, parameters, more)
+
+
+def _text_of(L, coordinates, parameters, n, tables):
+    """The formula of a Lagrangian, the coordinates and the parameters; the tables in it are added to `tables`."""
     if isinstance(coordinates, str):
         coordinates = [coordinates]
     if isinstance(L, str):
-        return _of_text(L, coordinates, parameters, n)
+        if coordinates is None and L.isidentifier():
+            for name, _, coordinates, formula, values, _, _ in _core.catalogue():
+                if name == L:
+                    return formula, coordinates, dict(values) | dict(parameters or {})
+            coordinates = None
+        return L, names(coordinates, n), parameters
     if type(L) is FunctionType or (callable(L) and not hasattr(L, "free_symbols")):
         coordinates = names(coordinates, n)
-        of = (*_velocity_names(tuple(coordinates)), tuple(parameters or ()))
-        return _of_text(_trace.formula_of(L, of), coordinates, parameters, n)
+        of = (*velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        return _trace.formula_of(L, of, tables), coordinates, parameters
     if hasattr(L, "free_symbols"):
         from ._sympy import formula_of_expression
 
-        return _of_text(*formula_of_expression(L, coordinates, parameters), parameters, n)
+        return *formula_of_expression(L, coordinates, parameters), parameters
     raise TypeError(f"L is a {type(L).__name__}; it must be a function, a formula, a SymPy expression or a System")
 
 
-_velocity_names = functools.lru_cache(256)(
-    lambda coordinates: tuple(map(tuple, _core.velocity_names(list(coordinates))))
-)
+def expression(of, system, tables):
+    """The text of an additional expression: itself, or that of a function (t, q, v, z, **parameters).
 
-
-def expression(of, system):
-    """The text of an additional expression: itself, or that of a function (t, q, v, z, **parameters)."""
+    The tables in a function are added to `tables`.
+    """
     if isinstance(of, str):
         return of
     if callable(of):
-        names = system.coordinates
-        return _trace.formula_of(
-            of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters))
-        )
+        return _trace.formula_of(of, names_of(system), tables)
     raise ValueError(f"{of!r} is not an expression: give a string, or a function of (t, q, v, z)")
 
 
-def check_parameters(system, given, L, expressions):
-    """Rejects parameters that neither the Lagrangian nor an additional expression uses: most are misspelt."""
+def with_tables(of, tables):
+    """The system with tables of traced events and columns in addition to its own."""
+    known = {name for name, _ in of.tables} if tables else ()
+    more = {name: table for name, table in tables.items() if name not in known}
+    return system(of, tables=more) if more else of
+
+
+def check_parameters(system, given, functions, expressions):
+    """Rejects parameters that neither the Lagrangian, a force nor an additional expression uses: most are misspelt."""
     known = system.used_parameters
+    codes = [getattr(function, "__code__", None) for function in functions]
+    own = [
+        name
+        for code in codes
+        if code is not None
+        for name in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount][4:]
+    ]
     for name in given:
         if name in known or any(re.search(rf"\b{re.escape(str(name))}\b", text) for text in expressions):
             continue
-        own = getattr(L, "__code__", None)
-        own = own.co_varnames[: own.co_argcount + own.co_kwonlyargcount][4:] if own is not None else ()
         if name in own:
             continue
         names = sorted({*known, *own})
         near = difflib.get_close_matches(str(name), names, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"the formulas use {', '.join(map(repr, names)) or 'no parameters'}"
-        raise ValueError(f"the parameter {name!r} is not used in the Lagrangian, an event or a column: {hint}")
+        raise ValueError(f"the parameter {name!r} is not used in the Lagrangian, a force, an event or a column: {hint}")
 
 
 def copied(x):
@@ -102,20 +145,15 @@ def names(coordinates, n):
     return [f"q[{n}]"]
 
 
-def _of_text(text, coordinates, parameters, n):
-    if coordinates is None and text.isidentifier():
-        for name, _, coordinates, formula, values, _, _ in _core.catalogue():
-            if name == text:
-                return system(formula, coordinates, dict(values) | dict(parameters or {}))
-    coordinates = names(coordinates, n)
+def _built(text, coordinates, parameters, more):
     try:
-        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else ())
+        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else (), more)
         found = _SYSTEMS.get(key)
     except TypeError:
         # A value that cannot be hashed is not a number, and is refused below.
         key = found = None
     if found is None:
-        found = _core.System(text, coordinates, parameters)
+        found = _core.System(text, list(coordinates), parameters, *map(list, more))
         if len(_SYSTEMS) >= _MOST:
             _SYSTEMS.clear()
         if key is not None:

@@ -231,8 +231,30 @@ def _vector(values):
     return found
 
 
-def formula_of(function, names):
-    """The formula of a function (t, q, v, z, **parameters), in the names of coordinates, velocities and parameters."""
+def tabulated(table, t):
+    """The values of a table at an array of numbers or of traced values."""
+    t = np.asanyarray(t)
+    if t.dtype == object:
+        return _wrapped(np.frompyfunc(table, 1, 1)(t.view(np.ndarray)))
+    if t.dtype.kind not in "fiu":
+        raise ValueError(f"a table is evaluated at {t!r}: give a number, an array of numbers or a traced value")
+    return _wrapped_numbers(table.values_at(np.ravel(t).astype(float)).reshape(t.shape))
+
+
+def _wrapped_numbers(found):
+    return found if found.ndim else float(found)
+
+
+def formula_of(function, names, tables):
+    """The formula of a function (t, q, v, z, **parameters), in the names of coordinates, velocities and parameters.
+
+    The tables in it are added to the dict `tables`, by the names that they have in the formula.
+    """
+    return value_text(call_traced(function, names), function, names, tables)
+
+
+def call_traced(function, names):
+    """The value of a function (t, q, v, z, **parameters) of symbols."""
     coordinates, _, parameters = names
     t, q, v, z, values = symbols(len(coordinates), len(parameters))
     wanted = _parameters_of(function)
@@ -246,10 +268,21 @@ def formula_of(function, names):
                     f"the parameter {name!r} of {_name(function)} has no value: give parameters={{{name!r}: ...}}"
                 )
         given = {name: value for name, value in zip(parameters, values) if name in required or name in others}
-    return value_text(function(t, _vector(q), _vector(v), z, **given), function, names)
+    return function(t, _vector(q), _vector(v), z, **given)
 
 
-def components_of(function, n):
+def texts_of(values, n, what, function, names, tables):
+    """The formulas of n numbers that a function returns: an array of them, or a number if n is 1."""
+    found = np.array(values, dtype=object)
+    if found.ndim > 1 or found.size != n or (found.ndim == 0 and n != 1):
+        shape = f"an array of shape {found.shape}" if found.ndim else repr(values)
+        raise ValueError(
+            f"{_name(function)} returns {shape} as {what}, but there are {n} coordinates: return an array of shape ({n},)"
+        )
+    return [value_text(value, function, names, tables) for value in np.ravel(found)]
+
+
+def components_of(function, n, tables):
     """The formulas of the components of a map (q, p, z) -> (q, p, z), with v in place of p."""
     names = velocity_names([f"q[{n}]"])
     _, q, p, z, _ = symbols(n, 0)
@@ -260,7 +293,7 @@ def components_of(function, n):
     for what, x in (("q", found[0]), ("p", found[1])):
         if len(x) != n:
             raise ValueError(f"{_name(function)} returns a {what} with {len(x)} numbers, but there are {n} coordinates")
-    return [value_text(x, function, (*names, [])) for x in (*found[0], *found[1], found[2])]
+    return [value_text(x, function, (*names, []), tables) for x in (*found[0], *found[1], found[2])]
 
 
 def _name(function):
@@ -282,8 +315,8 @@ def _parameters_of(function):
     return [p.name for p in found if p.default is p.empty], [p.name for p in found if p.default is not p.empty]
 
 
-def value_text(value, function, names):
-    """The formula of a traced value."""
+def value_text(value, function, names, tables):
+    """The formula of a traced value, whose tables are added to `tables`."""
     if isinstance(value, np.ndarray):
         if value.ndim:
             raise ValueError(
@@ -291,6 +324,7 @@ def value_text(value, function, names):
             )
         value = value[()]
     if isinstance(value, Symbol):
+        tables.update((table.name, table) for table in value.tables())
         return value.text(*names)
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         return repr(float(value))
