@@ -14,8 +14,6 @@ use crate::{Exceptions, InputTest};
 pub const EXCEPTIONS: Exceptions = &[
     ("Lagrangian::closed_*", "the implementor's, and nothing by default"),
     ("Lagrangian::switching_functions", "the implementor's, and none by default"),
-    ("Lagrangian::at_switch", "the implementor's, and by default the motion continues"),
-    ("Lagrangian::breaks", "the implementor's, and none by default"),
     ("Lagrangian::structure", "the implementor's, and takes no number"),
     ("OneParameterGroup::act", "the implementor's; that of Symmetry is tested with its callers"),
     ("SystemVisitor::*", "the implementor's"),
