@@ -33,10 +33,7 @@ pub(crate) const LOSSES_WITH_FORCE: &[(&str, &str)] = &[
         "contact flow",
         "a force f changes eta = dz - L_v dq at the rate L_z eta - f dq, where f dq is the virtual work of the force",
     ),
-    (
-        "momenta of symmetries",
-        "they follow the conformal factor only if the force does no work along the symmetry",
-    ),
+    ("momenta of symmetries", "they follow the conformal factor only if the force does no work along the symmetry"),
     ("discrete Lagrangian", "there is none with a force, and the theorems on discrete Herglotz equations do not apply"),
 ];
 
