@@ -45,6 +45,11 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Drift::*", "arithmetic: a result that is not finite follows from input that is not"),
     ("Rule::is_symmetric", "takes no number"),
     ("ActionFlow::*", "the implementor's; that of Riccati is tested with its callers"),
+    ("Resets::new", "takes no number"),
+    ("StepView::resets", "takes no number; tests/resets"),
+    ("Stepper::resets", "takes no number; tests/resets"),
+    ("Stepper::pieces", "takes no number; tests/resets"),
+    ("Stepper::has_changed_energy", "takes no number; tests/resets"),
     ("Observer::*", "the implementor's; observers with odd requests are in the test of Run::observe"),
 ];
 

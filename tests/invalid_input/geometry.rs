@@ -6,6 +6,8 @@ mod forms;
 mod lagrangians;
 #[path = "geometry/scalars.rs"]
 mod scalars;
+#[path = "geometry/switching.rs"]
+mod switching;
 
 use crate::{Exceptions, InputTest};
 
@@ -26,9 +28,10 @@ pub const EXCEPTIONS: Exceptions = &[
     ("VanDerPol::initial", "takes no number"),
     ("Structure::has_constant_rate", "takes no number"),
     ("Structure::is_affine_in_z", "takes no number"),
+    ("Forced::new", "stores its arguments; every start checks them"),
     ("Statement::*", "takes no number but its own; its test tries all"),
     ("ChartVector::from_fn", "the caller's function"),
     ("$name::new", "stores its arguments; check() and every start check them"),
 ];
 
-pub const TESTS: &[&[InputTest]] = &[forms::TESTS, lagrangians::TESTS, scalars::TESTS];
+pub const TESTS: &[&[InputTest]] = &[forms::TESTS, lagrangians::TESTS, scalars::TESTS, switching::TESTS];

@@ -12,6 +12,7 @@
 mod common;
 
 mod derivatives;
+mod forces;
 mod methods;
 mod section_2;
 mod section_3;
@@ -30,13 +31,15 @@ use table::Row;
 /// A section: its name, its tables, and the statements that have tests of their own.
 type Section = (&'static str, &'static [&'static [Row]], &'static [Statement]);
 
-/// The sections of the paper.
-const SECTIONS: [Section; 5] = [
+/// The sections of the paper, and the statements on forces and impacts, which it does not contain.
+const SECTIONS: [Section; 7] = [
     ("2", &[section_2::AT_POINTS, section_2::WITH_METHODS, section_2::ALONG_MOTIONS], section_2::BY_NAME),
     ("3", &[section_3::WITH_METHODS], section_3::BY_NAME),
     ("4", &[section_4::ALONG_MOTIONS], &[]),
     ("5", &[section_5::WITH_METHODS], section_5::BY_NAME),
     ("6", &[], section_6::BY_NAME),
+    ("forces", &[forces::AT_POINTS, forces::WITH_FORCES], &[]),
+    ("impacts", &[forces::AT_IMPACTS], &[]),
 ];
 
 /// Every statement is in a table of its section or has a test of its own, and the tables hold all that the libraries
@@ -55,7 +58,11 @@ fn every_statement_is_tested() {
     let of = |tables: &[&[Row]]| -> BTreeSet<Statement> {
         tables.iter().copied().flatten().map(|row| row.statement).collect()
     };
-    assert_eq!(of(&[section_2::AT_POINTS]), BTreeSet::from(continuous::STATEMENTS));
+    assert_eq!(
+        of(&[section_2::AT_POINTS, forces::AT_POINTS, forces::AT_IMPACTS]),
+        BTreeSet::from(continuous::STATEMENTS)
+    );
+    assert_eq!(of(&[forces::WITH_FORCES]), BTreeSet::from(discrete::FORCED_STATEMENTS));
     let with_methods = [section_2::WITH_METHODS, section_3::WITH_METHODS, section_5::WITH_METHODS];
     assert_eq!(of(&with_methods), BTreeSet::from(discrete::STATEMENTS));
     assert_eq!(of(&[section_2::ALONG_MOTIONS, section_4::ALONG_MOTIONS]), BTreeSet::from(exact::STATEMENTS));

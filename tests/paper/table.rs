@@ -51,7 +51,7 @@ impl Row {
     }
 
     /// Whether the statement applies to a system.
-    fn applies_to<const N: usize>(&self, system: &impl System<N>) -> bool {
+    pub fn applies_to<const N: usize>(&self, system: &impl System<N>) -> bool {
         self.hypothesis == Hypothesis::None || !system.symmetries().is_empty()
     }
 

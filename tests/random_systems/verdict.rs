@@ -95,7 +95,7 @@ pub fn ended(cause: &StepError) -> Verdict {
         StepError::OutsideDomain { .. } => "outside the domain",
         StepError::ConjugatePoint { .. } => "conjugate point",
         StepError::NonFinite => "not finite",
-        StepError::Event { .. } => "event",
+        StepError::Event { .. } | StepError::EventUnresolved { .. } => "event",
         _ => "another",
     })
 }

@@ -36,32 +36,6 @@ fn energy(t: f64, x: &VelocityPoint<2>) -> f64 {
     x.v.dot(&slope.y) - value
 }
 
-/// `dz - p dq + H dt` is multiplied by the factor of the law, on vectors tangent to the surface; with the factor 1, the
-/// elastic law is strictly contact.
-#[test]
-fn contact_laws_multiply_the_contact_form_by_their_factor() {
-    for law in [Impact::Elastic, Impact::Conformal(0.8), Impact::Conformal(0.95)] {
-        let factor = law.factor().unwrap();
-        for case in 0..256 {
-            let draws = &mut Draws::of(case);
-            let (t, x) = arrival(draws);
-            let (normal, rate) = Moving.normal(t, &x.q);
-            let y = law.after(&Nonlinear, t, &x, (&normal, rate)).unwrap();
-            assert!(normal.dot(&y.v) + rate > 0.0, "the motion leaves the surface");
-            let (dt, dx, dz) = (draws.between(-1.0, 1.0), draws.between(-1.0, 1.0), draws.between(-1.0, 1.0));
-            let dq = SVector::from([dx, -(normal[0] * dx + rate * dt) / normal[1]]);
-            let form = |x: &VelocityPoint<2>, dz: f64| {
-                let p = Nonlinear.gradient(t, x).y;
-                (dz - p.dot(&dq) + energy(t, x) * dt, dz.abs() + p.abs().dot(&dq.abs()) + (energy(t, x) * dt).abs())
-            };
-            let (before, size) = form(&x, dz);
-            let (after, _) = form(&y, factor * dz);
-            // Sums of ten terms, each with the round-off of the Newton iteration for the velocity.
-            assert!((after - factor * before).abs() <= 64.0 * f64::EPSILON * size.max(1.0), "{law:?}, case {case}");
-        }
-    }
-}
-
 /// Newton's law is not contact: on some vector the form differs by more than a tenth.
 #[test]
 fn the_law_of_newton_is_not_contact() {

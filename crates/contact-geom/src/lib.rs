@@ -67,7 +67,7 @@ pub mod switching {
 pub use dynamics::{
     Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints, Lagrangian,
     Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
-    TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
+    TimeTransformation, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
     legendre_jacobian, regularity,
 };
 pub use error::GeometryError;

@@ -1,4 +1,4 @@
-//! The list of the paper's statements that can be checked numerically.
+//! The list of the statements that can be checked numerically: those of the paper, and those on forces and impacts.
 
 use std::fmt;
 
@@ -13,7 +13,8 @@ struct Row {
 /// number, the section of the paper and its title follow.
 macro_rules! statements {
     ($(#[doc = $text:literal] $name:ident = $number:literal, $section:literal, $title:literal;)*) => {
-        /// A statement of the paper *On the geometry of discrete contact mechanics*, with its errata applied.
+        /// A statement of the paper *On the geometry of discrete contact mechanics*, with its errata applied; or one on
+        /// forces or impacts, which the paper does not treat, in the sections `forces` and `impacts`.
         ///
         /// The number is that of its rows in `statements.csv`; its tests are in `tests/paper`. Most statements are
         /// evaluated by the function `residual` in the module `statements` of a library.
@@ -24,7 +25,7 @@ macro_rules! statements {
 
         impl Statement {
             /// All statements, in the order of their numbers.
-            pub const ALL: [Statement; 41] = [$(Statement::$name),*];
+            pub const ALL: [Statement; 47] = [$(Statement::$name),*];
 
             fn row(self) -> Row {
                 match self {
@@ -118,10 +119,22 @@ statements! {
     ErrorOrders = 40, "6", "orders of L_d - L_h^e and of the flow";
     /// Rules on Q x Q x R^2, also those of higher order, are discrete Lagrangians on Q x Q x R with the same momenta.
     ExtendedRules = 41, "6", "rules on Q x Q x R^2";
+    /// With a force f, which does no work in z' = L, the energy changes as E' = L_z E - L_t + f.v.
+    ForcedEnergy = 42, "forces", "energy with a force";
+    /// With discrete forces F- and F+ the flow pulls eta back to sigma_d eta - F-.dq0 - F+.dq1.
+    DiscreteForces = 43, "forces", "contact defect of discrete forces";
+    /// The contact defect of a Gauss step is the virtual work of the force, the sum of -h b_j rho_j f_j.dQ_j.
+    VirtualWork = 44, "forces", "contact defect of a Gauss step";
+    /// A momentum obeys J1 = sigma_d J0 plus the impulse of the force on the group; it decays exactly where f.xi = 0.
+    ForcedMomentum = 45, "forces", "momentum with a force";
+    /// An elastic impact is strictly contact: dz - p dq + H dt has the same values on the surface before and after it.
+    ElasticImpact = 46, "impacts", "elastic impacts are strictly contact";
+    /// The law p+ = c p- + mu g_q, z+ = c z-, H+ = c H- - mu g_t multiplies dz - p dq + H dt on the surface by c.
+    ConformalImpact = 47, "impacts", "conformally contact impacts";
 }
 
 impl Statement {
-    /// The statement's number in the project's list, from 1 to 41.
+    /// The statement's number in the project's list, from 1 to 47.
     pub fn number(self) -> u32 {
         self as u32
     }
@@ -142,7 +155,8 @@ impl Statement {
         self.row().text.trim_start()
     }
 
-    /// The section of the paper that contains the statement, such as `2.2.1`.
+    /// The section of the paper that contains the statement, such as `2.2.1`; `forces` and `impacts` for those that the
+    /// paper does not contain.
     pub fn section(self) -> &'static str {
         self.row().section
     }
@@ -162,11 +176,11 @@ mod tests {
 
     #[test]
     fn numbers_are_places() {
-        assert!(Statement::ALL.into_iter().map(Statement::number).eq(1..=41));
+        assert!(Statement::ALL.into_iter().map(Statement::number).eq(1..=47));
         for statement in Statement::ALL {
             assert_eq!(Statement::from_number(statement.number()), Some(statement));
         }
-        assert_eq!([0, 42, u32::MAX].map(Statement::from_number), [None; 3]);
+        assert_eq!([0, 48, u32::MAX].map(Statement::from_number), [None; 3]);
     }
 
     #[test]

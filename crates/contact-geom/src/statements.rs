@@ -1,5 +1,5 @@
-//! Residuals of the statements of the paper's section 2: each statement is evaluated at a point of a system, relative
-//! to the size of its terms.
+//! Residuals of the statements of the paper's section 2, and of those on forces and impacts: each statement is
+//! evaluated at a point of a system, relative to the size of its terms.
 //!
 //! The residual of a true statement is round-off times the condition numbers of the matrices involved. Tolerances are
 //! set by the tests, not by this module.
@@ -7,6 +7,7 @@
 // `f64::max` and `amax` discard a NaN, which would make a check pass.
 #![deny(clippy::disallowed_methods)]
 
+use crate::switching::Impact;
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
     ChartVector, ContactForm, Darboux, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
@@ -23,8 +24,13 @@ use crate::{
 };
 use nalgebra::SVector;
 
-/// The statements of section 2 that [`residual`] evaluates.
-pub const STATEMENTS: [Statement; 10] = [
+mod forces;
+mod impacts;
+
+pub use forces::AnyForce;
+
+/// The statements of section 2, and on forces and impacts, that [`residual`] evaluates.
+pub const STATEMENTS: [Statement; 13] = [
     Statement::Volume,
     Statement::ReebField,
     Statement::HamiltonianField,
@@ -35,10 +41,17 @@ pub const STATEMENTS: [Statement; 10] = [
     Statement::LegendreTransformation,
     Statement::DissipatedQuantities,
     Statement::Noether,
+    Statement::ForcedEnergy,
+    Statement::ElasticImpact,
+    Statement::ConformalImpact,
 ];
 
-/// The residual of a statement of section 2 for a system at a time and a point of TQ x R; `None` where the statement's
-/// hypotheses do not apply, as for Noether's theorem without a symmetry, or where it is not one of [`STATEMENTS`].
+/// The factor of the law of statement 47.
+const CONFORMAL_IMPACT: f64 = 0.9;
+
+/// The residual of a statement of section 2, or on forces and impacts, for a system at a time and a point of TQ x R;
+/// `None` where the statement's hypotheses do not apply, as for Noether's theorem without a symmetry, or where it is not
+/// one of [`STATEMENTS`].
 ///
 /// # Errors
 /// Those of the forms at a point where the system is not regular.
@@ -59,6 +72,9 @@ pub fn residual<const N: usize>(
         Statement::LegendreTransformation => Some(legendre_is_contact(system, t, x)?),
         Statement::DissipatedQuantities => Some(dissipated_quantities(system, t, x)?),
         Statement::Noether => noether(system, t, x)?,
+        Statement::ForcedEnergy => Some(forces::forced_energy(system, t, x)?),
+        Statement::ElasticImpact => Some(impacts::impact(system, Impact::Elastic, t, x)?),
+        Statement::ConformalImpact => Some(impacts::impact(system, Impact::Conformal(CONFORMAL_IMPACT), t, x)?),
         _ => None,
     })
 }

@@ -184,10 +184,10 @@ pub enum InputError {
         "the method requires a Lagrangian that declares a time transformation (`Hints::time_transformation`, `dt_dtau`); choose another integrator or another Lagrangian"
     )]
     NoTimeTransformation,
-    /// The problem has an applied force, which the method does not take.
+    /// The problem has an applied force that the method does not take.
     #[error(
-        "the problem has a force, and {method} takes none; choose contact Gauss collocation (`GaussCollocation`), or \
-         write the force into the Lagrangian"
+        "the problem has a force that {method} does not take; choose contact Gauss collocation (`GaussCollocation`), \
+         which takes every force, or write the force into the Lagrangian"
     )]
     Forced {
         /// The method.
@@ -334,6 +334,15 @@ pub enum StepError {
     #[error("the function of an event is not finite at t = {t}; use a function that is defined along the motion")]
     Event {
         /// The time.
+        t: f64,
+    },
+    /// The sign changes of the function of an event cannot be told apart: it varies too fast within a step.
+    #[error(
+        "the function of an event varies so fast after t = {t} that its sign changes within the step cannot be told \
+         apart; take shorter steps, or use a smoother function"
+    )]
+    EventUnresolved {
+        /// The time up to which all sign changes are found.
         t: f64,
     },
     /// A formula branches on a value that differs between SIMD lanes.

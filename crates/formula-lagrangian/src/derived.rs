@@ -114,7 +114,8 @@ impl Derived {
         let triggers = formula.resets.iter().map(|reset| reset.when);
         let functions: Vec<Id> = kinks.functions.iter().copied().chain(triggers).collect();
         let switching = Tape::new(&graph, &functions, n).ok_or(too_large.clone())?;
-        let resets = formula.resets.iter().map(|reset| DerivedReset::new(&graph, reset, n)).collect::<Option<_>>();
+        let mut derive = |reset| DerivedReset::new(&mut graph, reset, n, MOST_NODES_WITH_HESSIAN);
+        let resets = formula.resets.iter().map(&mut derive).collect::<Option<_>>();
         let resets = resets.ok_or(too_large.clone())?;
         let applied = match applied_nodes.as_slice() {
             [] => None,
@@ -169,7 +170,7 @@ impl Derived {
         if let Some(applied) = &mut self.applied {
             applied.set_constants(&constants);
         }
-        self.resets.iter_mut().for_each(|reset| reset.values.set_constants(&constants));
+        self.resets.iter_mut().for_each(|reset| reset.set_constants(&constants));
         self.proved_force.set_constants(&constants);
         self.breaks = self.kinks.times(&self.formula.graph, &constants, &self.formula.breaks);
         let rate = self.partials.last().filter(|_| self.unforced.constant_rate);

@@ -44,34 +44,14 @@ impl ProvedForce {
         }
     }
 
-    /// Whether the forces depend on time and positions alone, with the present values of the coefficients.
-    fn is_of_positions(&self) -> bool {
-        match self {
-            ProvedForce::None => true,
-            ProvedForce::General => false,
-            ProvedForce::Drag { linear, quadratic } => linear.iter().chain([quadratic]).all(|c| c.value == 0.0),
-        }
-    }
-
-    /// The same for all values of the parameters.
-    pub fn is_always_of_positions(&self, graph: &Graph) -> bool {
-        match self {
-            ProvedForce::None => true,
-            ProvedForce::General => false,
-            ProvedForce::Drag { linear, quadratic } => {
-                linear.iter().chain([quadratic]).all(|c| graph.as_number(c.node) == Some(0.0))
-            }
-        }
-    }
-
-    /// The structure of a Lagrangian with these forces, as that of [`Forced`](contact_geom::Forced).
+    /// The structure of a Lagrangian with these forces, as that of [`Forced`](contact_geom::Forced): the claims on the form
+    /// of L remain.
     pub fn structure(&self, unforced: Structure) -> Structure {
         if let ProvedForce::None = self {
             return unforced;
         }
         Structure {
             autonomous: false,
-            separable: unforced.separable && self.is_of_positions(),
             quadratic: false,
             constant_mass: unforced.constant_mass || unforced.separable || unforced.quadratic,
             constant_rate: unforced.has_constant_rate(),

@@ -33,6 +33,12 @@ pub enum FormulaError {
         /// The reason.
         why: &'static str,
     },
+    /// An impact that is not one.
+    #[error("an impact {why}")]
+    Impact {
+        /// The reason, and the remedy.
+        why: &'static str,
+    },
     /// A time at which steps are to end is not finite.
     #[error("a break of the motion is at the time {time}; it must be a finite number")]
     Break {

@@ -3,7 +3,8 @@
 use crate::forces::Forces;
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser, ValueName};
-use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node, ResetNodes};
+use crate::resets::FormulaReset;
+use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
 
 /// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
 /// parameters, with names chosen by the user.
@@ -28,7 +29,7 @@ pub struct Formula {
     pub(crate) forces: Forces,
     /// The times at which steps end, as given by the user.
     pub(crate) breaks: Vec<f64>,
-    pub(crate) resets: Vec<ResetNodes>,
+    pub(crate) resets: Vec<FormulaReset>,
 }
 
 impl Formula {
@@ -162,7 +163,7 @@ impl Formula {
 
     /// The nodes of all that the formula consists of.
     fn roots(&self) -> Vec<Id> {
-        let of_resets = self.resets.iter().flat_map(ResetNodes::roots);
+        let of_resets = self.resets.iter().flat_map(FormulaReset::roots);
         std::iter::once(self.root).chain(self.forces.roots()).chain(of_resets).collect()
     }
 

@@ -14,8 +14,7 @@ pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
             "it is discontinuous; write each piece with `if(a < b, then, otherwise)`"
         }
         "interp" | "interp1d" | "spline" | "cubicspline" | "table" => {
-            "give the samples as a table with a name, and write `name(t)`; or write the pieces with `if(a < b, then, \
-             otherwise)`"
+            "give the samples as a table and write its name, or write its pieces with `if(a < b, then, otherwise)`"
         }
         "polyval" | "poly" | "polynomial" => "write the polynomial out, as in `c0 + x*(c1 + x*c2)`",
         "log10" => "write `ln(x)/ln(10)`",

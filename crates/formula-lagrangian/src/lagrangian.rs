@@ -72,13 +72,13 @@ impl<const N: usize> FormulaLagrangian<N> {
         &self.derived.structure
     }
 
-    /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`, `atan2`, `hypot`.
-    /// Integrators reach their order where the motion does not meet a kink or a jump.
+    /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`,
+    /// `atan2`, `hypot`, and no tables. Integrators reach their order where the motion does not meet a kink or a jump.
     pub fn is_smooth(&self) -> bool {
         self.derived.smooth
     }
 
-    /// The number of resets.
+    /// The number of resets and impacts.
     pub fn resets(&self) -> usize {
         self.derived.resets.len()
     }
@@ -259,10 +259,17 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         }
     }
 
-    /// The state after the reset to which the function belongs, if it has this direction. A new value may be NaN.
+    /// The state after the reset or the impact to which the function belongs, if it has this direction. A new value may
+    /// be NaN.
     fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
         let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
-        reset.and_then(|reset| reset.after(t, x, rising)).map_or(Control::Continue, Control::Replace)
+        reset.map_or(Control::Continue, |reset| reset.at_switch(self, t, x, rising))
+    }
+
+    /// The state at which the motion continues where resets accumulate, if the reset states one.
+    fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
+        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        reset.map_or(Control::Continue, |reset| reset.at_accumulation(t, x))
     }
 
     /// The zeros of switching functions that are affine functions of time with coefficients from the parameters, as of

@@ -29,6 +29,10 @@
 //! | `u[i]`, `u'[i]` | entries of an array, given as the coordinate `"u[3]"` |
 //! | `z`, `t`, `pi`, `n` | the action, the time, 3.14159..., the number of coordinates |
 //! | `r = sqrt(x^2 + y^2)` | a definition, on its own line or followed by `;`. The last line is the value L, with or without `L =`; the value of an output column may have any name |
+//! | `force[x] = -c*x'` | a line before L: the force on a coordinate, by its name or its index: `force[u[2]]`, `force[q[0]]`, `force[0]` |
+//! | `force[u[i]] = -c*u'[i]` | the forces on all entries of an array, if `i` has no other meaning; also `force[q[i]]` for all coordinates |
+//! | `rayleigh = c/2*x'^2` | a line before L: Rayleigh's dissipation function R, whose force `-dR/dv` is added |
+//! | `drive(t)` | a table that is given by name, at any argument |
 //! | `+ - * /`, `^` or `**` | powers have the highest precedence and are right-associative: `-x^2` is `-(x^2)`, `2^3^2` is `2^9` |
 //! | `sum(i, 1, n-1, (q[i] - q[i-1])^2)` | the sum over i from 1 to n - 1; an empty sum is 0 |
 //! | `if(a < b, c, d)` | c if a < b, else d; also with `>` |
@@ -38,6 +42,9 @@
 //! | `abs sign`, `min(a, b, ...)`, `max(a, b, ...)` | with kinks or jumps, as `if`, `atan2` and `hypot` |
 //! | `# ...` | a comment |
 //!
+//! In expressions that belong to a Lagrangian, such as output columns and resets, energy and momenta have names as well;
+//! see [`Expression`].
+//!
 //! A line continues after an operator and within brackets. The names `n`, `q`, `v` and `pi` may also be given to
 //! coordinates and parameters, which then take precedence.
 //!
@@ -45,10 +52,38 @@
 //! depends on the state. `0*x` is 0, even if x is infinite. This and the collection of powers of two are the only
 //! rearrangements; [`Graph`] gives the exact rules.
 //!
+//! # Forces
+//!
+//! The equations of motion are `d/dt L_v - L_q - L_z L_v = f(t, q, v, z)`, `zdot = L`. The forces f are lines of the
+//! text, or are given by a program: [`Formula::with_force`], [`Formula::with_rayleigh`], [`Formula::with_force_nodes`].
+//! Coordinates without a force have the force 0. The lines are read in order, so that forces and L share the
+//! definitions before them. Where a coordinate, a parameter or a definition is named `force`, `force[...]` is an entry
+//! of that.
+//!
+//! ```
+//! use contact_geom::{ForceStructure, Lagrangian};
+//! use formula_lagrangian::Formula;
+//! let text = "
+//!     speed = sqrt(x'^2 + y'^2)
+//!     force[x] = -c*speed*x'
+//!     force[y] = -c*speed*y' + sin(t)
+//!     L = speed^2/2 - 9.81*y";
+//! let thrown = Formula::parse(text, &["x", "y"], &[("c", 0.1)])?.lagrangian::<2>()?;
+//! assert!(matches!(thrown.force_structure(), ForceStructure::Drag { quadratic: 0.1, .. }));
+//! # Ok::<(), formula_lagrangian::FormulaError>(())
+//! ```
+//!
 //! # Kinks and jumps
 //!
-//! [`FormulaLagrangian::is_smooth`] returns whether there are any. No structure is claimed in coordinates on which a
-//! kink or a jump depends. The derivative of a jump is taken to be 0.
+//! [`FormulaLagrangian::is_smooth`] returns whether there are any, in L and in the forces. No structure is claimed in
+//! coordinates on which a kink or a jump depends. The derivative of a jump is taken to be 0.
+//!
+//! Kinks and jumps at zeros of affine functions of time, as `if(t > t1, a, b)`, are at known times, which are
+//! [breaks](contact_geom::Lagrangian::breaks); so are the samples of a table at an argument like `t` or `2*t - t1`
+//! ([`Formula::parse_with_tables`]) and the times of [`Formula::with_breaks`]. All others are at the zeros of
+//! [switching functions](contact_geom::Lagrangian::switching_functions): the arguments of `abs` and `sign`, the
+//! differences whose sign decides `min`, `max` and `if`, and for a table at another argument its distance from each
+//! sample. [`Formula::with_reset`] adds functions at whose zeros the state is replaced.
 //!
 //! # Bounds
 //!
@@ -68,6 +103,7 @@ mod formula;
 mod functions;
 mod graph;
 mod hints;
+mod impacts;
 mod lagrangian;
 mod names;
 mod node;

@@ -88,7 +88,8 @@ impl Names {
     /// The name that is nearest to an unknown one, among the known names and `others`.
     pub fn nearest(&self, name: &str, others: &[String]) -> Option<String> {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
-        let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
+        let known =
+            known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n", "force"]);
         let known = known.chain(self.tables.iter().map(|table| table.name.as_str()));
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
         // A known name that is invalid at this position is not suggested as its own correction.

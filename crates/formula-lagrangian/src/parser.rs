@@ -102,8 +102,8 @@ impl<'a> Parser<'a> {
         self
     }
 
-    /// Parses the text, which consists of definitions and forces, one per line, and the value at the end, with or without
-    /// a name. Returns the value.
+    /// Parses the text, which consists of definitions and forces, one per line, and the value at the end, with or
+    /// without a name. Returns the value.
     pub fn program(&mut self) -> Parsed<Id> {
         loop {
             self.skip_lines();

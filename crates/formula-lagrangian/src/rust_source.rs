@@ -120,7 +120,7 @@ impl Derived {
 
         let Structure { autonomous, z_affine, constant_rate, quadratic, constant_mass, .. } = self.structure;
         // The present values of parameters are not used here, since the fields can be changed.
-        let separable = self.unforced.separable && self.proved_force.is_always_of_positions(graph);
+        let separable = self.unforced.separable;
         let z_free = !graph.inputs(root).meets(Inputs::ACTION);
         writeln!(out, "    fn structure(&self) -> Structure {{\n        Structure {{")?;
         let claims = [

@@ -4,10 +4,11 @@
 
 mod random;
 
-use formula_lagrangian::Formula;
+use contact_geom::{Lagrangian, VelocityPoint};
+use formula_lagrangian::{Direction, Formula, Reset};
 use random::Random;
 
-const WORDS: [&str; 48] = [
+const WORDS: [&str; 51] = [
     "x",
     "y",
     "x'",
@@ -52,13 +53,17 @@ const WORDS: [&str; 48] = [
     "ln(",
     "atan2(",
     "if(",
+    "force[",
+    "force[x]=",
+    "rayleigh=",
     "min(",
     "\u{3b8}",
     "\u{1f600}",
     ".",
 ];
 
-const GOOD: [&str; 6] = [
+const GOOD: [&str; 7] = [
+    "force[x] = -a*x'*abs(x'); force[y] = n*sin(t)\nrayleigh = y'^4 ; L = x'^2 + y'^2",
     "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2) + gamma*z",
     "r = hypot(x, y)\nr'2 = 3; x'^2",
     "sum(i, 0, n-1, v[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)",
@@ -73,7 +78,17 @@ fn attack(text: &str) -> bool {
         Ok(formula) => {
             let lagrangian = formula.lagrangian::<2>().unwrap();
             lagrangian.to_rust("System").unwrap();
-            let _ = formula.expression(text).unwrap().at(0.3, &[0.5, -0.25], &[1.0, 2.0], 0.1);
+            let x = VelocityPoint::new([0.5, -0.25], [1.0, 2.0], 0.1);
+            let _ = (lagrangian.applied_force(0.3, &x), lagrangian.force_structure(), lagrangian.breaks());
+            match formula.expression(text) {
+                Ok(expression) => drop(expression.at(0.3, x.q.as_slice(), x.v.as_slice(), x.z)),
+                Err(_) => assert!(formula.has_forces(), "{text}"),
+            }
+            // The same text as that of a force and of a reset.
+            let then = [("x'", text)];
+            let _ = formula.with_force(text, text);
+            let _ =
+                formula.with_reset(Reset { when: text, direction: Direction::Both, then: &then, rest: Some(&then) });
             true
         }
         Err(error) => {

@@ -8,6 +8,7 @@
 #[path = "../../../tests/common/counting_allocator.rs"]
 mod counting_allocator;
 
+use contact_geom::table::{Interpolation, Table};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 use counting_allocator::allocations;
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
@@ -29,6 +30,19 @@ fn nothing_is_allocated() {
         sum += l.force(0.5, &x)[7] + l.mass_matrix(0.5, &x)[(6, 7)] + l.hessian(0.5, &x).vv[(1, 1)];
     });
     assert!(sum.is_finite());
+    assert_eq!(count, 0);
+    // Forces, tables, and switching functions into a vector with room for them.
+    let table = Table::new(&[0.0, 1.0, 2.0], &[1.0, 3.0, 0.0], Interpolation::Cubic).unwrap();
+    let text = "force[q[i]] = -a*v[i]*abs(v[i]) + drive(t); sum(i, 0, n-1, v[i]^2 - abs(q[i]))";
+    let forced = Formula::parse_with_tables(text, &["q[8]"], &[("a", 0.1)], &[("drive", table)]).unwrap();
+    let forced: FormulaLagrangian<8> = forced.lagrangian().unwrap();
+    let mut values = Vec::with_capacity(16);
+    let count = allocations(|| {
+        sum += forced.applied_force(0.5, &x)[7] + l.applied_force(0.5, &x)[7];
+        forced.switching_functions(0.5, &x, &mut values);
+        sum += forced.breaks().len() as f64 + f64::from(forced.has_force());
+    });
+    assert!(sum.is_finite() && values.len() == 16);
     assert_eq!(count, 0);
     // The steps of integrators do not allocate either: they do not use nested dual numbers, whose registers are on the
     // heap.

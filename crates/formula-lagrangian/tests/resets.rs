@@ -19,7 +19,7 @@ fn lagrangian(formula: &Formula) -> FormulaLagrangian<2> {
 }
 
 fn reset<'a>(when: &'a str, direction: Direction, then: &'a [(&'a str, &'a str)]) -> Reset<'a> {
-    Reset { when, direction, then }
+    Reset { when, direction, then, rest: None }
 }
 
 fn point() -> VelocityPoint<2> {
@@ -120,7 +120,7 @@ fn resets_of_graphs() {
     let base = Formula::from_graph(graph, l, &["x", "y"], &[]).unwrap();
     let nodes = |when, then: &[(Variable, formula_lagrangian::Id)]| {
         let then = then.to_vec();
-        base.clone().with_reset_nodes(ResetNodes { when, direction: Direction::Falling, then })
+        base.clone().with_reset_nodes(ResetNodes { when, direction: Direction::Falling, then, rest: None })
     };
     let found = replaced(&lagrangian(&nodes(x, &[(Variable::Velocity(0), minus), (Variable::Action, x)]).unwrap()), 0);
     assert_eq!(found, VelocityPoint::new([0.5, -1.0], [-2.0, 4.0], 0.5));
@@ -143,7 +143,7 @@ fn resets_of_graphs() {
     let (x, v) = (symbols.position(0), symbols.velocity(0));
     let (l, minus) = (&v * &v, -&v);
     let then = vec![(Variable::Velocity(0), minus.id())];
-    let reset = ResetNodes { when: x.id(), direction: Direction::Falling, then };
+    let reset = ResetNodes { when: x.id(), direction: Direction::Falling, then, rest: None };
     let bounce = symbols.formula(&l).unwrap().with_reset_nodes(reset).unwrap();
     assert_eq!(replaced(&lagrangian(&bounce), 0).v[0], -2.0);
 }

@@ -207,7 +207,7 @@ fn names_of_tables() {
         ("x'^2 + x*drive(t, x)", "column 10: `drive` takes one argument, not 2"),
         ("drive = 3; x'^2", "the name `drive` is in use"),
         ("sum(drive, 0, 3, x'^2)", "the name `drive` is in use"),
-        ("x'^2 + interp(t)", "unknown function `interp`; give the samples as a table with a name, and write `name(t)`"),
+        ("x'^2 + interp(t)", "unknown function `interp`; give the samples as a table and write its name"),
     ] {
         let error = parse(text, "drive").unwrap_err().to_string();
         assert!(error.contains(message), "{text}: {error}");

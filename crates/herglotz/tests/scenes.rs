@@ -2,8 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+#[path = "scenes/additions.rs"]
+mod additions;
 #[path = "../../formula-lagrangian/tests/random/mod.rs"]
 mod random;
+#[path = "scenes/where_z_bites.rs"]
+mod where_z_bites;
 
 use herglotz::runtime::{InitialVelocity, OutputTimes};
 use herglotz::{Scene, SceneError};
@@ -162,6 +166,7 @@ fn bad_input_is_told_with_its_place_and_a_remedy() {
         let error = Scene::read_with(GOOD, &[change.to_owned()]).err().unwrap();
         told += &format!("--set {change}\n{error}\n\n");
     }
+    told += &additions::errors();
     // Round-off depends on the instruction set of the processor.
     if let Some((before, (_, after))) =
         told.split_once("trial runs agree to ").and_then(|(a, b)| Some((a, b.split_once(')')?)))
@@ -362,8 +367,8 @@ fn attack(seed: u64, count: usize) -> usize {
     for k in 0..count {
         // In half of the cases a line is removed, inserted from the other scene, or given another value, so that most
         // of these pass the TOML reader.
-        let mut lines: Vec<&str> = [GOOD, SEVERAL][k % 2].lines().collect();
-        let others: Vec<&str> = [SEVERAL, GOOD][k % 2].lines().collect();
+        let mut lines: Vec<&str> = [GOOD, SEVERAL, additions::ADDED][k % 3].lines().collect();
+        let others: Vec<&str> = [SEVERAL, additions::ADDED, GOOD][k % 3].lines().collect();
         let (line, other) = (random.below(lines.len()), random.below(others.len()));
         let with_value =
             lines[line].split_once("= ").map(|(key, _)| format!("{key}= {}", VALUES[other % VALUES.len()]));

@@ -21,7 +21,7 @@ pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz::ru
         if let Some(then) = then {
             let then: Vec<(&str, &str)> =
                 then.iter().map(|(variable, value)| (variable.as_str(), value.as_str())).collect();
-            let reset = Reset { when: &text, direction: of_reset(direction), then: &then };
+            let reset = Reset { when: &text, direction: of_reset(direction), then: &then, rest: None };
             event.reset = Some(formula.resets());
             formula = named("the reset of the event", &text, formula.with_reset(reset).map_err(Into::into))?;
         }

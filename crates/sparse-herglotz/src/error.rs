@@ -91,6 +91,15 @@ pub enum SparseError {
         "the system has general local terms, but splittings and `SparseMidpoint` accept only potentials; use `SparseGauss`"
     )]
     NotSeparable,
+    /// A method for systems without friction was applied to a system with friction.
+    #[error(
+        "the system has friction, which {method} does not take; use `SparseSplitting`, with a drag gamma z of constant \
+         rate"
+    )]
+    Friction {
+        /// The method.
+        method: &'static str,
+    },
     /// An operation needs the action, which the state does not have.
     #[error("the Lagrangian depends on the action z, which the initial state lacks; give it, as in `z: Some(0.0)`")]
     NoAction,

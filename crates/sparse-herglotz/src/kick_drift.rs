@@ -3,6 +3,7 @@
 use crate::blocks::{BLOCK_SIZE, MIN_PARALLEL_UNKNOWNS, block_count};
 use crate::drag::apply_drift;
 use crate::energies::sum_of_squares;
+use crate::friction::FrictionDrift;
 use crate::kick::{FollowingDrift, KickFactor};
 use crate::stages::Stage;
 use crate::system::{Masses, SparseSystem};
@@ -30,6 +31,8 @@ pub(crate) struct KickDrift<'p> {
     pub q: &'p [f64],
     pub t: f64,
     pub stage: Stage,
+    /// The drifts of the unknowns, if the system has friction.
+    pub friction: Option<&'p FrictionDrift>,
 }
 
 /// What a kick and drift update: the velocities, the positions after the drift, and, if requested and otherwise empty,
@@ -117,7 +120,7 @@ impl KickDrift<'_> {
             let (lists, factor) = (&self.system.potentials, self.kick_factor(block, v.len()));
             for (i, list) in lists.iter().enumerate() {
                 // Energies are evaluated between the kick and the drift, so that these cannot be fused.
-                let is_last = i + 1 == lists.len() && energies.is_empty();
+                let is_last = i + 1 == lists.len() && energies.is_empty() && self.friction.is_none();
                 let following = is_last.then_some(FollowingDrift { drift, next: &mut *next });
                 if list.kick(block, self.t, self.q, factor, v, following) {
                     return;
@@ -125,7 +128,13 @@ impl KickDrift<'_> {
             }
         }
         self.evaluate_energies(block, v, energies);
-        apply_drift(&drift, self.q.get(block * BLOCK_SIZE + 1..).unwrap_or(&[]), v, next);
+        let q = self.q.get(block * BLOCK_SIZE + 1..).unwrap_or(&[]);
+        let Some(friction) = self.friction else { return apply_drift(&drift, q, v, next) };
+        let [length, damping, _] = friction.block(block * BLOCK_SIZE, v.len());
+        for ((((next, q), v), length), damping) in next.iter_mut().zip(q).zip(v).zip(length).zip(damping) {
+            *next = q + length * *v;
+            *v += damping * *v;
+        }
     }
 
     /// The same with compensated summation, for a block of at most B unknowns.
@@ -148,6 +157,15 @@ impl KickDrift<'_> {
         }
         self.evaluate_energies(block, v, energies);
         let q = self.q.get(block * BLOCK_SIZE + 1..).unwrap_or(&[]);
+        if let Some(friction) = self.friction {
+            let [lengths, dampings, _] = friction.block(block * BLOCK_SIZE, v.len());
+            let rest = next.iter_mut().zip(q).zip(q_rest).zip(v).zip(v_rest);
+            for (((((next, q), q_rest), v), v_rest), (length, damping)) in rest.zip(lengths.iter().zip(dampings)) {
+                (*next, *q_rest) = exact_sum(*q, length * *v + (length * *v_rest + *q_rest));
+                (*v, *v_rest) = exact_sum(*v, damping * *v + (damping * *v_rest + *v_rest));
+            }
+            return;
+        }
         for ((((next, q), q_rest), v), v_rest) in next.iter_mut().zip(q).zip(q_rest).zip(v).zip(v_rest) {
             (*next, *q_rest) = exact_sum(*q, length * *v + (length * *v_rest + *q_rest));
             (*v, *v_rest) = exact_sum(*v, damping * *v + (damping * *v_rest + *v_rest));
@@ -163,6 +181,12 @@ impl KickDrift<'_> {
         // The potential changes the action only in a kick.
         energies[0] = if self.stage.kick == 0.0 { 0.0 } else { potential };
         let from = block * BLOCK_SIZE;
+        if let Some(friction) = self.friction {
+            let [_, _, lift] = friction.block(from, v.len());
+            let of = |(i, (lift, v)): (usize, (&f64, &f64))| lift * self.system.mass(from + i) * v * v;
+            energies[1] = lift.iter().zip(v).enumerate().map(of).sum();
+            return;
+        }
         energies[1] = match &self.system.masses {
             Masses::Same(m) => m * sum_of_squares(v),
             Masses::Each(masses) => masses[from..from + v.len()].iter().zip(v).map(|(m, v)| m * v * v).sum(),

@@ -27,6 +27,7 @@ mod drag;
 mod elements;
 mod energies;
 mod error;
+mod friction;
 mod gather;
 mod hessian;
 mod implicit;

@@ -63,6 +63,8 @@ impl EnergyMonitor {
         let general = !system.general_terms.is_empty();
         let (kind, defect) = match &system.drag {
             _ if general => (Some(EnergyKind::Lagrangian), 0.0),
+            // The work of friction is not computed.
+            _ if system.friction.is_some() => (None, 0.0),
             Drag::Constant(gamma) => {
                 let conserved = start.z.is_some() || *gamma == 0.0;
                 let bounded = (gamma * h < 0.0).then_some(EnergyKind::Mechanical);

@@ -4,10 +4,11 @@ use crate::SparseError;
 use crate::aligned::AlignedVector;
 use crate::blocks::{BLOCK_SIZE, block_count};
 use crate::drag::Drag;
+use crate::friction::FrictionDrift;
 use crate::kick::KickFactor;
 use crate::kick_drift::{InverseMasses, KickDrift, KickDriftOutput};
 use crate::monitor::{EnergyMonitor, RunProgress, StepInfo};
-use crate::stages::StageTable;
+use crate::stages::{Stage, StageTable};
 use crate::system::{MassSource, Masses, SparseSystem, State};
 use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, UnresolvedStep};
 
@@ -23,6 +24,9 @@ const STEPS_BETWEEN_FINITE_CHECKS: usize = 256;
 /// which is computed by a Gauss formula of order 12 along each drift. The map is that of
 /// [`Splitting`](discrete_herglotz::splitting::Splitting) on a small system.
 ///
+/// Friction, an applied force `-c_i v_i`, is combined with the drift: the velocity of an unknown decays at the rate
+/// `gamma - c_i/m_i`. It needs three numbers for each unknown and each stage.
+///
 /// A kick and the drift after it are applied in one pass over memory, block by block: the forces of a block are
 /// evaluated, and its velocities and positions are updated, while it is in the L1 cache. The new positions go to a
 /// second vector, so that blocks are independent. Large systems are distributed over threads, and the results are
@@ -33,6 +37,9 @@ const STEPS_BETWEEN_FINITE_CHECKS: usize = 256;
 pub struct SparseSplitting<'a> {
     system: &'a SparseSystem,
     table: StageTable,
+    /// The drifts with friction of the stages of the first step, of the merged stage, and of the closing one; empty
+    /// without friction.
+    friction: Vec<FrictionDrift>,
     h: f64,
     t0: f64,
     taken: usize,
@@ -77,6 +84,8 @@ impl<'a> SparseSplitting<'a> {
         start.check(system)?;
         system.check_separable()?;
         system.check_masses(MassSource::Diagonal)?;
+        let mut table = StageTable::new(scheme, &system.drag, h, start.t);
+        let friction = friction_of(system, &mut table)?;
         SparseSystem::check_number("gamma", system.rate(start.t))?;
         let n = system.unknowns();
         let q = AlignedVector::padded(start.q);
@@ -92,7 +101,8 @@ impl<'a> SparseSplitting<'a> {
         });
         let splitting = SparseSplitting {
             system,
-            table: StageTable::new(scheme, &system.drag, h, start.t),
+            table,
+            friction,
             h,
             t0: start.t,
             taken: 0,
@@ -164,7 +174,9 @@ impl<'a> SparseSplitting<'a> {
             let table = if self.taken == 0 { &self.table.first } else { &self.table.merged };
             let stage = table[i].at(&self.system.drag, t);
             let (system, inverse_masses) = (self.system, &self.inverse_masses);
-            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: t + stage.time, stage };
+            let merged = i == 0 && self.taken > 0;
+            let friction = self.friction.get(if merged { self.table.first.len() } else { i });
+            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: t + stage.time, stage, friction };
             let next = self.next.get_mut(1..=self.v.len()).unwrap_or_default();
             let CompensationTerms { q: q_rest, v: v_rest } = &mut self.compensation;
             kick_drift.run(KickDriftOutput { v: &mut self.v, next, energies: &mut self.energies, q_rest, v_rest });
@@ -219,7 +231,8 @@ impl<'a> SparseSplitting<'a> {
             let stage = self.table.closing.at(&self.system.drag, t - self.h);
             let time = t - self.h + stage.time;
             let (system, inverse_masses) = (self.system, &self.inverse_masses);
-            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: time, stage };
+            let friction = self.friction.last();
+            let kick_drift = KickDrift { system, inverse_masses, q: &self.q, t: time, stage, friction };
             self.end_compensation.q.copy_from_slice(&self.compensation.q);
             self.end_compensation.v.copy_from_slice(&self.compensation.v);
             let next = self.next.get_mut(1..=n).unwrap_or_default();
@@ -243,4 +256,19 @@ impl<'a> SparseSplitting<'a> {
         let drifts = self.table.first.iter().chain([&self.table.closing]);
         drifts.map(|stage| 1.0 + stage.at(drag, t).drift.damping).product()
     }
+}
+
+/// The drifts with friction of a table of stages, whose own drifts are then those of the action.
+fn friction_of(system: &SparseSystem, table: &mut StageTable) -> Result<Vec<FrictionDrift>, SparseError> {
+    let Some(coefficients) = &system.friction else { return Ok(Vec::new()) };
+    system.check_vector("the friction", coefficients)?;
+    let Drag::Constant(gamma) = system.drag else {
+        return Err(SparseError::Friction { method: "a splitting with a drag that depends on time" });
+    };
+    let relative: Vec<f64> = coefficients.iter().enumerate().map(|(i, c)| c / system.mass(i)).collect();
+    let spans = table.first.iter().chain(table.merged.first()).chain([&table.closing]).map(|stage| stage.span);
+    let drifts = spans.map(|s| FrictionDrift::new(gamma, &relative, s)).collect();
+    let of_action = |stage: &mut Stage| stage.drift = FrictionDrift::of_action(gamma, stage.span);
+    table.first.iter_mut().chain(&mut table.merged).chain([&mut table.closing]).for_each(of_action);
+    Ok(drifts)
 }

@@ -10,7 +10,7 @@ pub(crate) struct Stage {
     pub kick: f64,
     pub drift: Drift,
     /// The length of the drift in time.
-    span: f64,
+    pub span: f64,
     /// The time of the kick, relative to the start of the step.
     pub time: f64,
 }

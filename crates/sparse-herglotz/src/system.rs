@@ -44,6 +44,8 @@ pub struct SparseSystem {
     unknowns: usize,
     pub(crate) masses: Masses,
     pub(crate) drag: Drag,
+    /// The coefficients of the friction of the unknowns.
+    pub(crate) friction: Option<Vec<f64>>,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
     pub(crate) general_terms: Vec<Box<dyn LocalTermList>>,
 }
@@ -88,6 +90,7 @@ impl SparseSystem {
             unknowns,
             masses: Masses::Same(0.0),
             drag: Drag::Constant(0.0),
+            friction: None,
             potentials: Vec::new(),
             general_terms: Vec::new(),
         })
@@ -122,6 +125,14 @@ impl SparseSystem {
     /// ```
     pub fn with_timed_drag(self, rate: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Self {
         SparseSystem { drag: Drag::Timed(Box::new(rate)), ..self }
+    }
+
+    /// Sets the friction of each unknown, an applied force `-c_i v_i`: `m_i v_i' = -V_q + gamma m_i v_i - c_i v_i`. Unlike
+    /// a drag `gamma z` it differs from unknown to unknown and does not enter `z' = L`; the motion is not contact, and its
+    /// defect is the virtual work of the friction. Only [`SparseSplitting`](crate::SparseSplitting) takes it, by an exact
+    /// flow, and does not monitor the energy of such motions.
+    pub fn with_friction(self, coefficients: Vec<f64>) -> Self {
+        SparseSystem { friction: Some(coefficients), ..self }
     }
 
     /// Adds a potential for each element of a list.
@@ -269,6 +280,11 @@ impl SparseSystem {
     /// Checks that there are no general terms.
     pub(crate) fn check_separable(&self) -> Result<(), SparseError> {
         if self.general_terms.is_empty() { Ok(()) } else { Err(SparseError::NotSeparable) }
+    }
+
+    /// Checks that there is no friction, for a method that takes none.
+    pub(crate) fn check_frictionless(&self, method: &'static str) -> Result<(), SparseError> {
+        if self.friction.is_none() { Ok(()) } else { Err(SparseError::Friction { method }) }
     }
 
     /// Checks that each unknown has a mass; 0 is accepted if general terms may contribute the mass.

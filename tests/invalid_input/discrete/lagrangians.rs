@@ -4,20 +4,21 @@ use super::{STEPS, starts};
 use crate::InputTest;
 use crate::numbers::{Claiming, EXTREME, Everything, Grade, Report, fine, grade, places, triples};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Pendulum, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
+use contact_geom::{ChartVector, DiscretePoint, Forced, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, DiscreteStep, MomentumDecay, MomentumRow, Problem, Steps, Until,
-    checks::check_claims,
+    checks::{check_claims, check_unforced},
     gauss::Gauss,
     rules::{Method, Midpoint, Rectangle, Trapezoidal},
     solve::{Solver, last_correction},
     splitting::{ActionStrang, Riccati, Strang},
     theory::{
         DiscretePath, HamiltonianFlow, derived_jet, derived_second_jet, discrete_action, discrete_flow,
-        discrete_flow_jacobian, discrete_momentum, discrete_regularity, discrete_symmetry_defect, hamiltonian_flow,
-        hamiltonian_flow_jacobian, legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus,
-        legendre_plus_inverse, sigma_d, statements,
+        discrete_flow_jacobian, discrete_forces, discrete_momentum, discrete_regularity, discrete_symmetry_defect,
+        hamiltonian_flow, hamiltonian_flow_jacobian, legendre_inverse, legendre_minus, legendre_minus_inverse,
+        legendre_plus, legendre_plus_inverse, sigma_d, statements,
     },
 };
 
@@ -34,6 +35,8 @@ pub const TESTS: &[InputTest] = &[
             "theory::discrete_momentum",
             "theory::discrete_symmetry_defect",
             "Quadrature::extended_jet",
+            "theory::discrete_forces",
+            "DiscreteLagrangian::forces",
             "DiscreteLagrangian::value",
             "DiscreteLagrangian::jet",
             "DiscreteLagrangian::second_jet",
@@ -84,8 +87,8 @@ pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["MomentumRow::defect", "MomentumDecay::new"], run: momenta },
     InputTest { entries: &["solve::last_correction"], run: corrections },
     InputTest { entries: &["Solver::on_the_stack", "Solver::by_faer", "Solver::solve"], run: solvers },
-    InputTest { entries: &["statements::residual"], run: residuals },
-    InputTest { entries: &["check_claims"], run: claims },
+    InputTest { entries: &["statements::residual", "statements::forced_residual"], run: residuals },
+    InputTest { entries: &["check_claims", "check_unforced"], run: claims },
 ];
 
 fn transitions(report: &mut Report) {
@@ -113,6 +116,9 @@ fn jets(report: &mut Report) {
             report.formula(&input, jet.map(|j| ((j.d11, j.d12, j.d22), (j.d1z, j.d2z, j.dzz))));
         }
         report.formula(&input, sigma_d(&ld, t, &at));
+        let forced = Trapezoidal::new(Forced { lagrangian: Everything, force: AnyForce(0.3) }, 0.1).unwrap();
+        report.formula(&input, forced.forces(t, &at).map(|[minus, plus]| (minus, plus)));
+        report.formula(&input, discrete_forces(&forced, t, &at).map(|f| (f.minus, f.plus)));
         report.formula(&input, legendre_minus(&ld, t, &at));
         report.formula(&input, legendre_plus(&ld, t, &at));
         report.formula(&input, discrete_regularity(&ld, t, &at).map(|r| (r.sigma, r.fibre.condition())));
@@ -297,12 +303,25 @@ fn residuals(report: &mut Report) {
                 Err(_) => known,
             };
             report.check(good, || format!("statement {statement} at t = {t}, {x:?}: {found:?}"));
+            let forced = Forced { lagrangian: Pendulum::default(), force: AnyForce(0.3) };
+            let known = statements::FORCED_STATEMENTS.contains(&statement);
+            let found = statements::forced_residual(statement, &forced, &[], 0.1, t, &x.into());
+            let good = match &found {
+                Ok(None) => !known || statement == Statement::ForcedMomentum,
+                Ok(Some(r)) => known && (x.is_finite() && t.is_finite() || !(*r <= 1e-3)),
+                Err(_) => known,
+            };
+            report.check(good, || format!("statement {statement} at t = {t}, {x:?}: {found:?}"));
         }
     }
 }
 
 /// A property is verified where L is defined; elsewhere it is not assumed to hold.
 fn claims(report: &mut Report) {
+    let forced = Forced { lagrangian: Claiming, force: AnyForce(0.3) };
+    let refused =
+        check_unforced::<_, 1>(&forced, "a method").is_err() && check_unforced::<_, 1>(&Claiming, "a method").is_ok();
+    report.check(refused, || "a force is taken".into());
     for (t, x) in places() {
         let found = check_claims(&Claiming, t, &x.into());
         // The properties do not depend on the action.

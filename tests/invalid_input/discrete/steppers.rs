@@ -5,15 +5,16 @@ use crate::InputTest;
 use crate::common::gauss::GaussSteppers;
 use crate::numbers::{Claiming, EXTREME, Everything, Grade, Numbers, Report, fine, grade, triples};
 use contact_geom::nalgebra::SVector;
+use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Kepler, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint};
+use contact_geom::{ChartVector, DiscretePoint, Forced, Lagrangian, PhasePoint, Symmetry, VelocityDrag};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, Problem, SplittingScheme, Start, Stepper, StepperOptions, Steps, TransformedGauss,
     Until,
     checks::{EnergyDrift, EnergySample},
-    gauss::{Gauss, GaussRoute, GaussStepper, TransformedStepper},
+    gauss::{Gauss, GaussRoute, GaussStepper, TransformedStepper, VirtualWork},
     rules::{Composition, Flow, Midpoint},
-    splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, Splitting},
+    splitting::{ActionFlow, ActionMap, ActionSplitting, DragSplitting, Riccati, Splitting},
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -48,6 +49,10 @@ pub const TESTS: &[InputTest] = &[
         run: gauss,
     },
     InputTest {
+        entries: &["VirtualWork::of_step", "VirtualWork::residual", "VirtualWork::impulse"],
+        run: virtual_work,
+    },
+    InputTest {
         entries: &[
             "TransformedGauss::new",
             "TransformedGauss::with",
@@ -64,6 +69,9 @@ pub const TESTS: &[InputTest] = &[
             "Splitting::without_action",
             "Splitting::compensated",
             "Splitting::with_resolution_check",
+            "DragSplitting::new",
+            "DragSplitting::without_action",
+            "DragSplitting::with_resolution_check",
             "ActionSplitting::new",
             "ActionSplitting::with_flow",
             "ActionSplitting::compensated",
@@ -131,6 +139,27 @@ fn constructor<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, Phase
     }
 }
 
+/// The contact defect of one step, from invalid starts and with invalid stages and steps.
+fn virtual_work(report: &mut Report) {
+    let forced = Forced { lagrangian: Everything, force: AnyForce(0.3) };
+    let group = Symmetry::Translation(SVector::from([1.0]));
+    let guess = SVector::from([0.5]);
+    for (t, x) in starts() {
+        let found = VirtualWork::of_step(&forced, 2, 0.1, t, &x, &guess);
+        report.entry_point(&(t, x), found.map(|step| (step.end, step.residual(), step.impulse(&group))));
+    }
+    let tame: PhasePoint<1> = triples()[0].into();
+    for h in EXTREME {
+        let found = VirtualWork::of_step(&forced, 2, h, 0.4, &tame, &guess);
+        let refused = h == 0.0 || !h.is_finite();
+        report.check(!refused || matches!(found, Err(InputError::Step { .. })), || format!("the step {h} is taken"));
+    }
+    for stages in [0, 17] {
+        let found = VirtualWork::of_step(&forced, stages, 0.1, 0.4, &tame, &guess);
+        report.check(found == Err(InputError::Stages { found: stages }), || format!("{stages} stages: {found:?}"));
+    }
+}
+
 fn compositions(report: &mut Report) {
     let scheme = SplittingScheme::YOSHIDA_4;
     constructor(report, |h, t, x| Composition::new(|h| Midpoint::new(Everything, h), &scheme, h, t, x));
@@ -142,7 +171,14 @@ fn splittings(report: &mut Report) {
     constructor(report, |h, t, x| {
         Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.with_resolution_check().compensated().without_action())
     });
+    let drag = VelocityDrag { linear: SVector::from([0.3]), quadratic: 0.0 };
+    let dragged = Forced { lagrangian: &Claiming, force: drag };
+    constructor(report, |h, t, x| {
+        DragSplitting::new(&dragged, &scheme, h, t, x).map(|s| s.with_resolution_check().without_action())
+    });
     let scheme = SplittingScheme::YOSHIDA_4;
+    let turbulent = Forced { lagrangian: &Claiming, force: VelocityDrag { quadratic: 0.4, ..drag } };
+    constructor(report, |h, t, x| DragSplitting::new(&turbulent, &scheme, h, t, x));
     let system = QuadraticInZ::default();
     constructor(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
     let flow = Riccati { b: -0.1, c: 0.0 };

@@ -3,12 +3,12 @@
 use crate::InputTest;
 use crate::numbers::{EXTREME, Everything, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::statements::ActionSquared;
+use contact_geom::statements::{ActionSquared, AnyForce};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
-    Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, TimeTransformation, VelocityPoint,
-    WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, regularity,
-    statements,
+    Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Statement, Structure, TimeTransformation,
+    VelocityDrag, VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
+    legendre_jacobian, regularity, statements,
     support::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, legendre_polynomials},
 };
 
@@ -27,6 +27,7 @@ pub const TESTS: &[InputTest] = &[
             "Lagrangian::value",
             "Derivatives::along",
             "Derivatives::with_gradient",
+            "Derivatives::with_gradient_and_force",
             "Derivatives::with_force",
             "Derivatives::force",
             "Derivatives::rate",
@@ -35,6 +36,19 @@ pub const TESTS: &[InputTest] = &[
             "Derivatives::hessian",
         ],
         run: lagrangians,
+    },
+    InputTest {
+        entries: &[
+            "Lagrangian::applied_force",
+            "Lagrangian::force_structure",
+            "Lagrangian::has_force",
+            "Force::value",
+            "Force::structure",
+            "ForceStructure::of_positions",
+            "ForceStructure::is_of_positions",
+            "ForceStructure::plus",
+        ],
+        run: forces,
     },
     InputTest { entries: &["Structure::defects"], run: structures },
     InputTest {
@@ -94,6 +108,7 @@ fn lagrangians(report: &mut Report) {
         let l = Everything;
         report.formula(&(t, x), fine(l.value(t, &at.q, &at.v, at.z)));
         report.formula(&(t, x), fine(l.with_gradient(t, &at)));
+        report.formula(&(t, x), fine(l.with_gradient_and_force(t, &at)));
         report.formula(&(t, x), fine(l.with_force(t, &at)));
         report.formula(&(t, x), fine(l.force(t, &at)));
         report.formula(&(t, x), fine(l.rate(t, &at)));
@@ -117,6 +132,32 @@ fn lagrangians(report: &mut Report) {
         if t.is_finite() && x.z.is_finite() {
             report.formula(&(x.x, x.y), fine(gradient));
         }
+    }
+}
+
+/// A force is not lost where it is not a number, and its structure is that of its coefficients.
+fn forces(report: &mut Report) {
+    for (t, x) in places() {
+        let at = VelocityPoint::from(x);
+        for force in
+            [AnyForce(0.4).value(t, &at), Forced { lagrangian: Everything, force: AnyForce(0.4) }.applied_force(t, &at)]
+        {
+            report.formula(&(t, x), fine(force));
+        }
+        report.formula(&(t, x), herglotz_field(&Forced { lagrangian: Everything, force: AnyForce(0.4) }, t, &at));
+    }
+    for c in EXTREME {
+        let drag = VelocityDrag { linear: SVector::<f64, 1>::new(c), quadratic: c };
+        let moved = drag.value(0.0, &VelocityPoint::new([0.1], [0.5], 0.0));
+        report.check(c.is_finite() || !moved[0].is_finite(), || format!("a drag of {c} is {moved}"));
+        let forced = Forced { lagrangian: Everything, force: drag };
+        report.check(forced.has_force() && forced.force_structure() == drag.structure() || c.is_nan(), || {
+            format!("the drag {c} is lost")
+        });
+        let still = drag.structure().is_of_positions();
+        report.check(still == (c == 0.0), || format!("a drag of {c} depends on positions alone"));
+        let twice = drag.structure().plus(ForceStructure::of_positions());
+        report.check(twice == drag.structure() || c.is_nan(), || format!("{twice:?}"));
     }
 }
 

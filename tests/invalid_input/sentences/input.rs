@@ -5,7 +5,9 @@ use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint};
+use contact_geom::{
+    DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityDrag, VelocityPoint,
+};
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint, Rectangle};
@@ -185,6 +187,10 @@ fn input_errors() {
         InputError::NoTimeTransformation => {
             AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
         }, ["declares a time transformation", "another integrator"];
+        InputError::Forced { .. } => {
+            let drag = VelocityDrag { linear: SVector::from([0.1]), quadratic: 0.0 };
+            Gauss::new::<1>(Forced { lagrangian: pendulum, force: drag }, 2, 0.1).err().unwrap()
+        }, ["a discrete Lagrangian does not take", "`GaussCollocation`"];
         InputError::FirstStep(_) => {
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
             Flow::new(&Rectangle::new(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()

@@ -5,7 +5,8 @@ use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::{Explosive, Massless};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler, Pendulum};
+use contact_geom::switching::{Control, Impact, Impacts, Surface};
+use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler, Pendulum, UniformField};
 use contact_geom::{DiscretePoint, Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Method, Midpoint, Rectangle};
@@ -18,10 +19,12 @@ use exact_lagrangian::ExactLagrangian;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-/// A Lagrangian that jumps where its velocity passes 1/2, and one whose switching function changes its sign at every
+/// A Lagrangian that jumps where its velocity passes 1/2, one with a reset there, and one whose switching function changes its sign at every
 /// evaluation.
 enum Switching {
     Fast,
+    /// A reset beyond its surface.
+    Reset,
     Restless(std::cell::Cell<bool>),
 }
 
@@ -33,12 +36,40 @@ impl Lagrangian<1> for Switching {
     }
     fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
         values.push(match self {
-            Switching::Fast => x.v[0] - 0.5,
+            Switching::Fast | Switching::Reset => x.v[0] - 0.5,
             Switching::Restless(positive) => {
                 positive.set(!positive.get());
                 if positive.get() { 1.0 } else { -1.0 }
             }
         });
+    }
+    fn at_switch(&self, _index: usize, _t: f64, x: &VelocityPoint<1>, _rising: bool) -> Control<1> {
+        match self {
+            Switching::Reset => Control::Replace(VelocityPoint { v: [0.7].into(), ..*x }),
+            _ => Control::Continue,
+        }
+    }
+}
+
+/// A ball that falls from the height 1/2 on a floor.
+struct Impacting(Impact);
+
+struct Floor;
+
+impl Surface<1> for Floor {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
+        q[0]
+    }
+}
+
+impl Impacting {
+    fn fails(self) -> StepError {
+        let ball = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, self.0);
+        let problem = Problem::new(&ball, 0.0, VelocityPoint::new([0.5], [0.0], 0.0)).unwrap();
+        match problem.steps(Steps::Size(0.3)).run(Until::Time(3.0)).unwrap().status {
+            Status::Failed { cause, .. } => cause,
+            other => panic!("{other:?}"),
+        }
     }
 }
 
@@ -122,6 +153,15 @@ fn step_errors() {
                 other => panic!("{other:?}"),
             }
         }, ["the function of an event", "not finite at t = 0.15", "defined along the motion"];
+        StepError::EventUnresolved { .. } => {
+            let pendulum = Pendulum::default();
+            let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
+            let mut fast = Events::new([Event::new(|t, _| (1e6 * t).sin() + 0.5)]);
+            match problem.steps(Steps::Size(10.0)).observe(&mut fast).run(Until::Steps(1)).unwrap().status {
+                Status::Failed { cause, .. } => cause,
+                other => panic!("{other:?}"),
+            }
+        }, ["the function of an event varies so fast after t = ", "shorter steps", "smoother function"];
         StepError::Undivided { .. } => {
             let divided = DividedGauss { stages: 2, max_defect: f64::MIN_POSITIVE };
             let pendulum = Pendulum { gamma: -0.1 };
@@ -134,6 +174,15 @@ fn step_errors() {
         StepError::Switching { .. } => {
             Switching::Restless(std::cell::Cell::new(false)).fails()
         }, ["too often", "smooth the kink"];
+        StepError::ResetUndefined { .. } => {
+            Impacting(Impact::Restitution(f64::NAN)).fails()
+        }, ["the reset at t = 1", "not finite", "change what the reset assigns"];
+        StepError::ResetBeyond { .. } => {
+            Switching::Reset.fails()
+        }, ["the reset at t = ", "the other side of its own surface", "assign a state"];
+        StepError::Accumulation { .. } => {
+            Impacting(Impact::Restitution(0.0)).fails()
+        }, ["accumulate at t = 1", "at_accumulation"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();

@@ -61,6 +61,18 @@ impl<const N: usize> ForceStructure<N> {
         ForceStructure::Drag { linear: SVector::zeros(), quadratic: 0.0 }
     }
 
+    /// The structure of a sum of two forces.
+    pub fn plus(self, other: Self) -> Self {
+        use ForceStructure::{Drag, General, None};
+        match (self, other) {
+            (None, one) | (one, None) => one,
+            (Drag { linear: c, quadratic: k }, Drag { linear, quadratic }) => {
+                Drag { linear: c + linear, quadratic: k + quadratic }
+            }
+            (General, _) | (_, General) => General,
+        }
+    }
+
     /// Whether the force depends on time and positions alone; so does a force that does not exist.
     pub fn is_of_positions(&self) -> bool {
         match self {
@@ -81,7 +93,39 @@ impl<const N: usize, F: Force<N>> Force<N> for &F {
     }
 }
 
-/// A Lagrangian with a [`Force`]. Its derivatives are those of the Lagrangian; [`herglotz_field`](crate::herglotz_field)
+/// The drag `-linear_i v_i - quadratic |v| v_i` of a velocity, by a viscous medium and by a turbulent one.
+///
+/// ```
+/// use contact_geom::{Forced, VelocityDrag, VelocityPoint, herglotz_field, nalgebra::SVector, systems::Pendulum};
+/// let drag = VelocityDrag { linear: SVector::from([0.5]), quadratic: 0.25 };
+/// let damped = Forced { lagrangian: Pendulum { gamma: 0.0 }, force: drag };
+/// let field = herglotz_field(&damped, 0.0, &VelocityPoint::new([0.0], [2.0], 0.0))?;
+/// assert_eq!(field.y[0], -2.0);
+/// # Ok::<(), contact_geom::GeometryError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VelocityDrag<const N: usize> {
+    /// The coefficients of the linear drag.
+    pub linear: SVector<f64, N>,
+    /// The coefficient of the quadratic drag.
+    pub quadratic: f64,
+}
+
+impl<const N: usize> Force<N> for VelocityDrag<N> {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        if self.quadratic == 0.0 {
+            return SVector::from_fn(|i, _| -(x.v[i] * self.linear[i]));
+        }
+        let speed = x.v.dot(&x.v).sqrt() * self.quadratic;
+        SVector::from_fn(|i, _| -(x.v[i] * (speed + self.linear[i])))
+    }
+    fn structure(&self) -> ForceStructure<N> {
+        ForceStructure::Drag { linear: self.linear, quadratic: self.quadratic }
+    }
+}
+
+/// A Lagrangian with a [`Force`], which is added to that of the Lagrangian if there is one. Its derivatives are those of the Lagrangian; [`herglotz_field`](crate::herglotz_field)
 /// contains the force. Integrators that do not take forces refuse it.
 ///
 /// The flow is not conformally contact: its defect is the virtual work of the force.
@@ -108,19 +152,24 @@ impl<const N: usize, L: Lagrangian<N>, F: Force<N>> Lagrangian<N> for Forced<L, 
 
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        self.force.value(t, x)
+        let force = self.force.value(t, x);
+        if const { L::HINTS.forced } {
+            let other = self.lagrangian.applied_force(t, x);
+            return SVector::from_fn(|i, _| force[i] + other[i]);
+        }
+        force
     }
     fn force_structure(&self) -> ForceStructure<N> {
-        self.force.structure()
+        self.force.structure().plus(self.lagrangian.force_structure())
     }
-    /// Of the structure of the Lagrangian, what a force leaves. The motion may depend on time and is not linear. The
-    /// Lagrangian remains separable for methods if the force depends on time and positions alone.
+    /// Of the structure of the Lagrangian, what holds with a force: its motion may depend on time and is not linear. The
+    /// claims on the form of L remain; a method that relies on `separable` reads the
+    /// [structure of the force](Lagrangian::force_structure) too.
     fn structure(&self) -> Structure {
         let of_lagrangian = self.lagrangian.structure();
         let constant_mass = of_lagrangian.constant_mass || of_lagrangian.separable || of_lagrangian.quadratic;
         Structure {
             autonomous: false,
-            separable: of_lagrangian.separable && self.force.structure().is_of_positions(),
             quadratic: false,
             constant_mass,
             constant_rate: of_lagrangian.has_constant_rate(),

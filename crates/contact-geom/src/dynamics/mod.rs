@@ -21,7 +21,7 @@ pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
-pub use force::{Force, ForceStructure, Forced};
+pub use force::{Force, ForceStructure, Forced, VelocityDrag};
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
     dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,

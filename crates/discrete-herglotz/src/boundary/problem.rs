@@ -87,6 +87,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        if const { D::FORCED } {
+            return Err(InputError::Forced { method: "a boundary value problem" });
+        }
         if steps < 2 {
             return Err(InputError::Count { what: "the number of steps of the path", least: 2, found: steps });
         }

@@ -5,7 +5,7 @@ use crate::ensemble::lane::{Lane, LaneOptions, LaneStatus};
 use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::single::Common;
 use crate::ensemble::splitting::SplittingPacks;
-use crate::integration::BatchKernel;
+use crate::integration::{BatchKernel, is_separable};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{branched, forget_branches};
 use crate::numbers::state_words::digest;
@@ -91,12 +91,13 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
         }
+        let separable = is_separable(lagrangian, &structure);
         let kernel = match self.integrator.batch_kernel() {
-            Some(BatchKernel::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
+            Some(BatchKernel::Splitting(scheme)) if separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state)
                     .map(|packs| Kernel::Splitting(packs.with_interrupt(self.interrupt)))
             }
-            Some(BatchKernel::Gauss { stages }) if structure.separable && structure.has_constant_rate() => {
+            Some(BatchKernel::Gauss { stages }) if separable && structure.has_constant_rate() => {
                 GaussPacks::new(lagrangian, stages, plan, self.common.t0, state)
                     .map(|packs| Kernel::Gauss(packs.with_interrupt(self.interrupt)))
             }
@@ -119,7 +120,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
                 Start::Velocity(x) => (x.q, x.v, x.z),
                 Start::Momentum(x, _) => (x.q, x.p, x.z),
             };
-            let (value, slope) = lagrangian.with_gradient(t0, &VelocityPoint { q, v: y, z });
+            let (value, slope) = lagrangian.with_gradient_and_force(t0, &VelocityPoint { q, v: y, z });
             let vectors = [&q, &y, &slope.x, &slope.y];
             let numbers = vectors.into_iter().flat_map(|x| x.iter().copied()).chain([z, value, slope.z]);
             words.extend(numbers.map(f64::to_bits));

@@ -118,10 +118,11 @@ fn through(values: &[f64; MAX_STAGES], s: usize) -> Series {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::chebyshev::node;
     use contact_geom::numbers::max_or_nan;
     use std::array::from_fn;
 
-    /// The states between the parts agree with those of the curve to a few units of round-off of each term.
+    /// The states at the nodes agree with those of the curve to a few units of round-off of each term.
     #[test]
     fn a_sketch_is_on_the_curve() {
         for s in 1..=MAX_STAGES {
@@ -132,13 +133,13 @@ mod tests {
             (solved.rate, solved.l) = (stages(3.1), stages(0.4));
             let curve = solved.curve(s, 0.5, 0.3, PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2));
             let mut states = Vec::new();
-            curve.states_between_parts(&mut states);
-            assert_eq!(states.len() + 1, curve.parts());
+            curve.states_at_nodes(&mut states);
+            assert_eq!(states.len() + 1, curve.sampling_degree());
             for (i, found) in states.iter().enumerate() {
-                let at = curve.at_fraction((i + 1) as f64 / curve.parts() as f64);
+                let at = curve.at_fraction(node(curve.sampling_degree(), i + 1));
                 let off =
                     max_or_nan((found.q - at.q).amax(), max_or_nan((found.p - at.p).amax(), (found.z - at.z).abs()));
-                assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, part {i}: {off:e}");
+                assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, node {i}: {off:e}");
             }
         }
     }

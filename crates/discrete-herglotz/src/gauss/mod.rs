@@ -10,6 +10,7 @@ pub(crate) mod routes;
 mod stages;
 mod stepper;
 pub(crate) mod tables;
+mod virtual_work;
 mod work_summary;
 
 pub(crate) use dense::StepStart;
@@ -18,6 +19,7 @@ pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 pub use routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
+pub use virtual_work::VirtualWork;
 pub use work_summary::GaussRoute;
 
 use crate::integration::check_unforced;

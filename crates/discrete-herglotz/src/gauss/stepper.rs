@@ -30,6 +30,7 @@ use crate::solve::mass_matrix::is_identity;
 use crate::{
     DenseStep, InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions, UnresolvedStep,
     integration::SuspectInterval,
+    integration::{depends_on_action, is_separable},
 };
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint};
@@ -120,7 +121,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         let (s, wants_z) = (stages, action);
         let InitialMass { w, inverse } = InitialMass::of(problem)?;
-        let condensed = structure.separable && structure.has_constant_rate();
+        let condensed = is_separable(lagrangian, &structure) && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
             let table = Condensed::of(s, h, lagrangian.gradient(t0, &start).z)?;
@@ -142,7 +143,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             }
         } else {
             let mass = Mass::new(&structure, inverse);
-            let (physical, z_drives) = (Extension::new(Physical, t0, 0.0), !structure.is_affine_in_z());
+            let (physical, z_drives) = (Extension::new(Physical, t0, 0.0), depends_on_action(lagrangian, &structure));
             Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, z_drives, &state, &start.v))
         };
         let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
@@ -331,7 +332,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary(self.route(), &self.lagrangian.structure())
+        work_summary(self.route(), depends_on_action(self.lagrangian, &self.lagrangian.structure()))
     }
 
     /// The collocation polynomial of the last step; computed only when it is requested.

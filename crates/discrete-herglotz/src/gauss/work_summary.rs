@@ -27,16 +27,15 @@ fn mass_matrix(constant: bool) -> PlanEntry {
     }
 }
 
-fn action(structure: &Structure) -> PlanEntry {
-    let drives = !structure.is_affine_in_z();
+fn action(drives: bool) -> PlanEntry {
     PlanEntry::computed(
         "action z",
         if drives { "the motion depends on it" } else { "the stage equations of this route include it" },
     )
 }
 
-/// The summary for steps that are equal in physical time.
-pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
+/// The summary for steps that are equal in physical time; `drives` states that the motion depends on the action.
+pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
     let newton =
         PlanEntry::skipped("Newton's method", "used only in steps whose fixed-point iteration does not contract");
     let gradients = PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients");
@@ -65,7 +64,7 @@ pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<Plan
             mass_matrix(route == GaussRoute::ConstantMass),
             gradients,
             newton,
-            action(structure),
+            action(drives),
         ],
     }
 }
@@ -84,6 +83,6 @@ pub(crate) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<Pla
         mass_matrix(structure.constant_mass),
         PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients"),
         PlanEntry::skipped("Newton's method", "a step whose fixed-point iteration does not contract fails"),
-        action(structure),
+        action(!structure.is_affine_in_z()),
     ]
 }

@@ -2,7 +2,9 @@
 
 use crate::{InputError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
+use contact_geom::{
+    Defect, ForceStructure, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, numbers::max_abs_or_nan,
+};
 
 /// Refuses a Lagrangian with an applied force, for a method that takes none.
 ///
@@ -13,6 +15,30 @@ pub fn check_unforced<L: Lagrangian<N>, const N: usize>(
     method: &'static str,
 ) -> Result<(), InputError> {
     if lagrangian.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
+}
+
+/// Refuses a Lagrangian with a force that is no kick, a function of time and positions alone.
+///
+/// # Errors
+/// [`InputError::Forced`].
+pub(crate) fn check_kicks<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    method: &'static str,
+) -> Result<(), InputError> {
+    let kicks = const { !L::HINTS.forced } || lagrangian.force_structure().is_of_positions();
+    if kicks { Ok(()) } else { Err(InputError::Forced { method }) }
+}
+
+/// Whether L is separable with a force of time and positions alone, if any.
+#[inline(always)]
+pub(crate) fn is_separable<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {
+    structure.separable && (const { !L::HINTS.forced } || lagrangian.force_structure().is_of_positions())
+}
+
+/// Whether the action may act on the motion by more than a rate that depends on time alone.
+#[inline(always)]
+pub(crate) fn depends_on_action<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {
+    !structure.is_affine_in_z() || const { L::HINTS.forced } && lagrangian.force_structure() == ForceStructure::General
 }
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
@@ -31,19 +57,17 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
     let structure = lagrangian.structure();
+    let nearby = near(start);
+    for (t, x) in [(t, start), (shifted(t, 2 * N + 1), &nearby)] {
+        if let Some(Defect { claim, size }) = force_defect(lagrangian, t, x) {
+            return Err(InputError::FalseClaim { claim, size });
+        }
+    }
     if const { L::HINTS.proved } {
         let value = lagrangian.value(t, &start.q, &start.v, start.z);
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
     }
-    // At the start derivatives may vanish by symmetry, as at an equilibrium, or for a cosine at t = 0; near it they do
-    // not.
-    let shifted = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
-    let nearby = VelocityPoint {
-        q: start.q.map_with_location(|i, _, q| shifted(q, i)),
-        v: start.v.map_with_location(|i, _, v| shifted(v, N + i)),
-        z: shifted(start.z, 2 * N),
-    };
     let at_both = [(t, start), (shifted(t, 2 * N + 1), &nearby)].map(|(t, x)| structure.defects(lagrangian, t, x));
     if at_both.iter().all(Option::is_none) {
         return Err(GeometryError::Undefined { what: "the Lagrangian" }.into());
@@ -54,6 +78,44 @@ pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     }
 }
 
+/// A number moved by about a hundredth of its size. At a start derivatives may vanish by symmetry, as at an equilibrium,
+/// or for a cosine at t = 0; near it they do not.
+fn shifted(x: f64, i: usize) -> f64 {
+    x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs())
+}
+
+/// A point near another.
+fn near<const N: usize>(x: &VelocityPoint<N>) -> VelocityPoint<N> {
+    VelocityPoint {
+        q: x.q.map_with_location(|i, _, q| shifted(q, i)),
+        v: x.v.map_with_location(|i, _, v| shifted(v, N + i)),
+        z: shifted(x.z, 2 * N),
+    }
+}
+
+/// The defect of the declared structure of an applied force, if it is false at a point: the force is compared with its
+/// declared form, which does not depend on the action.
+fn force_defect<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
+    if const { !L::HINTS.forced } {
+        return None;
+    }
+    let force = lagrangian.applied_force(t, x);
+    let at_rest = || lagrangian.applied_force(t, &VelocityPoint { v: SVector::zeros(), z: shifted(x.z, 2 * N), ..*x });
+    let (at_rest, linear, quadratic) = match lagrangian.force_structure() {
+        ForceStructure::Drag { linear, quadratic } => (at_rest(), linear, quadratic * x.v.norm()),
+        ForceStructure::None => (SVector::zeros(), SVector::zeros(), 0.0),
+        _ => return None,
+    };
+    let defect = |i: usize| {
+        let drag = (linear[i] + quadratic) * x.v[i];
+        let size = force[i].abs() + at_rest[i].abs() + drag.abs();
+        if size == 0.0 { 0.0 } else { (force[i] - (at_rest[i] - drag)).abs() / size }
+    };
+    let size = max_abs_or_nan((0..N).map(defect));
+    // The force may not be defined at a point near the start.
+    (size > MAX_CLAIM_DEFECT).then_some(Defect { claim: "force_structure", size })
+}
+
 /// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None`
 /// where L is not defined, or where the inverse Legendre transformation fails.
 pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
@@ -62,11 +124,17 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Option<Defect> {
-    if const { L::HINTS.proved } {
+    if const { L::HINTS.proved && !L::HINTS.forced } {
         return None;
     }
     let structure = lagrangian.structure();
     let x = legendre_inverse(lagrangian, t, state, guess).ok()?;
+    if let Some(defect) = force_defect(lagrangian, t, &x) {
+        return Some(defect);
+    }
+    if const { L::HINTS.proved } {
+        return None;
+    }
     structure.defects(lagrangian, t, &x)?.find(|d| d.size > MAX_CLAIM_DEFECT)
 }
 

@@ -1,6 +1,7 @@
 //! Dense output: a step as a curve.
 
 use crate::numbers::registers::MAX_STAGES;
+use crate::solve::chebyshev::{MAX_DEGREE, node};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::sync::OnceLock;
@@ -73,16 +74,22 @@ impl<const N: usize> DenseStep<N> {
         self.h
     }
 
-    /// The number of parts into which [`states_between_parts`](Self::states_between_parts) divides the step.
-    pub(crate) fn parts(&self) -> usize {
-        self.s + 2
+    /// The number of stages.
+    pub(crate) fn stages(&self) -> usize {
+        self.s
     }
 
-    /// Appends the states between the parts of the step.
-    pub(crate) fn states_between_parts(&self, to: &mut Vec<PhasePoint<N>>) {
-        let table = integrals_to_parts(self.s);
+    /// The degree of the interpolation in [`states_at_nodes`](Self::states_at_nodes): larger by two than that of the
+    /// positions, so that the last coefficients of a function that does not resolve are seen, up to the largest one.
+    pub(crate) fn sampling_degree(&self) -> usize {
+        sampling_degree(self.s)
+    }
+
+    /// Appends the states at the Chebyshev-Lobatto nodes of the step, without those at its ends.
+    pub(crate) fn states_at_nodes(&self, to: &mut Vec<PhasePoint<N>>) {
+        let table = integrals_to_nodes(self.s);
         let along = |series: &Series| {
-            let mut sums = [0.0; MAX_STATES_BETWEEN_PARTS];
+            let mut sums = [0.0; MAX_INNER_NODES];
             for (row, c) in table.iter().zip(&series.0).take(self.s) {
                 for (sum, integral) in sums.iter_mut().zip(row) {
                     *sum += self.h * c * integral;
@@ -92,7 +99,7 @@ impl<const N: usize> DenseStep<N> {
         };
         let (moved, pushed) = (self.v.each_ref().map(along), self.force.each_ref().map(along));
         let (rate, action) = (along(&self.rate), along(&self.l));
-        to.extend((0..self.parts() - 1).map(|i| PhasePoint {
+        to.extend((0..self.sampling_degree() - 1).map(|i| PhasePoint {
             q: SVector::from_fn(|d, _| self.start.q[d] + moved[d][i]),
             p: SVector::from_fn(|d, _| (self.start.p[d] + pushed[d][i]) / (1.0 - rate[i])),
             z: self.start.z + action[i],
@@ -146,18 +153,28 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
     integrals
 }
 
-/// The largest number of states between the parts of a step.
-const MAX_STATES_BETWEEN_PARTS: usize = MAX_STAGES + 1;
+/// The smallest degree of interpolation: its error is estimated from the last three coefficients, which should not
+/// include that of a linear function.
+const MIN_SAMPLING_DEGREE: usize = 4;
 
-/// The integrals of the Legendre polynomials to the ends of the first s + 1 of the s + 2 parts of a step: `[k][i]` is
-/// the integral of `P_k` to the end of part i.
-fn integrals_to_parts(s: usize) -> &'static [[f64; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES] {
-    static TABLES: [OnceLock<Box<[[f64; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
+/// The degree of interpolation on a step with s stages.
+fn sampling_degree(s: usize) -> usize {
+    (s + 2).clamp(MIN_SAMPLING_DEGREE, MAX_DEGREE)
+}
+
+/// The largest number of nodes between the ends of a step.
+const MAX_INNER_NODES: usize = MAX_DEGREE - 1;
+
+/// The integrals of the Legendre polynomials to the nodes between the ends of a step: `[k][i]` is the integral of `P_k`
+/// to node i + 1.
+fn integrals_to_nodes(s: usize) -> &'static [[f64; MAX_INNER_NODES]; MAX_STAGES] {
+    static TABLES: [OnceLock<Box<[[f64; MAX_INNER_NODES]; MAX_STAGES]>>; MAX_STAGES] =
         [const { OnceLock::new() }; MAX_STAGES];
     TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| {
-        let mut table = Box::new([[0.0; MAX_STATES_BETWEEN_PARTS]; MAX_STAGES]);
-        for i in 0..=s {
-            let fraction = (i + 1) as f64 / (s + 2) as f64;
+        let mut table = Box::new([[0.0; MAX_INNER_NODES]; MAX_STAGES]);
+        let degree = sampling_degree(s);
+        for i in 0..degree - 1 {
+            let fraction = node(degree, i + 1);
             let p = polynomials(s, fraction);
             for (row, integral) in table.iter_mut().zip(integrals(s, &p, fraction)) {
                 row[i] = integral;

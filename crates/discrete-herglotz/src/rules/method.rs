@@ -212,12 +212,18 @@ macro_rules! each {
 }
 
 impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for AnyDiscreteLagrangian<L, N> {
+    const FORCED: bool = L::HINTS.forced;
+
     fn step_size(&self) -> f64 {
         each!(self, ld => DiscreteLagrangian::<N>::step_size(ld))
     }
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         each!(self, ld => ld.value(t, x))
+    }
+
+    fn forces<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        each!(self, ld => ld.forces(t, x))
     }
 
     fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {

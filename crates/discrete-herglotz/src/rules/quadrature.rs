@@ -1,6 +1,5 @@
 //! Discrete Lagrangians by quadrature of the action: the common part of the rules of [`crate::rules`].
 
-use crate::integration::check_unforced;
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
@@ -40,6 +39,9 @@ pub trait Rule: 'static {
 /// `S` is a discrete Lagrangian on `Q x Q x R^2` in the sense of Vermeeren, Bravetti and Seri; solving for `z1` gives
 /// one on `Q x Q x R`. With the partial derivatives `S_1, S_2, S_z0, S_z1` of `S`, `sigma_d = (1 + S_z0)/(1 - S_z1)`,
 /// `p0 = -S_1/(1 + S_z0)` and `p1 = S_2/(1 - S_z1)`.
+///
+/// An applied force f is evaluated at the same nodes, with places `a_i`: the discrete forces are
+/// `F- = h sum_i w_i (1 - a_i) f_i / (1 - S_z1)` and `F+ = h sum_i w_i a_i f_i / (1 - S_z1)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Quadrature<L, R> {
     lagrangian: L,
@@ -78,7 +80,6 @@ impl<L, R: Rule> Quadrature<L, R> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        check_unforced(&lagrangian, "a quadrature rule")?;
         Ok(Quadrature { lagrangian, h, rule: PhantomData })
     }
 
@@ -175,7 +176,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     /// With left directions `l_i = (h (1-a) e_i, -e_i, h (1-b) p0_i)` at each node, the momentum equation is
     /// `r_i = p0_i + sum w dL[l_i] = 0`; its derivatives are `d2L[l_i, r_j]` along the right directions
     /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested dual numbers carry only
-    /// these directions, in blocks.
+    /// these directions, in blocks. An applied force f adds `sum w h (1-a) f_i` to the residual.
     #[inline(always)]
     fn linearise<const N: usize, const ADJOINT: bool>(
         &self,
@@ -207,9 +208,9 @@ impl<L, R: Rule> Quadrature<L, R> {
             if const { N > BLOCK } {
                 frame.by_blocks(&self.lagrangian, N + usize::from(implicit), &mut sums);
             } else if implicit {
-                frame.accumulate::<AugmentedVector<N>, N>(&self.lagrangian, 0, 0, &mut sums);
+                frame.accumulate::<AugmentedVector<N>, N, _>(&self.lagrangian, 0, 0, &mut sums);
             } else {
-                frame.accumulate::<SVector<f64, N>, N>(&self.lagrangian, 0, 0, &mut sums);
+                frame.accumulate::<SVector<f64, N>, N, _>(&self.lagrangian, 0, 0, &mut sums);
             }
         }
         let size = max_abs(&from.p) + max_abs(&sums.right) * max_abs(u);
@@ -337,8 +338,28 @@ fn place<T: Scalar, const N: usize>(node: &Node, h: f64, x: &DiscretePoint<N, T>
 }
 
 impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadrature<L, R> {
+    const FORCED: bool = L::HINTS.forced;
+
     fn step_size(&self) -> f64 {
         self.h
+    }
+
+    fn forces<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        let z1 = self.end_action(t, x)?;
+        let [mut minus, mut plus] = [SVector::<T, N>::from_fn(|_, _| T::zero()); 2];
+        let mut pivot = T::one();
+        for node in R::NODES {
+            let (at, time, w) = (place(node, self.h, x, z1), T::from(t + node.place * self.h), self.h * node.weight);
+            let force = self.lagrangian.applied_force(time, &at);
+            for i in 0..N {
+                minus[i] += force[i] * (w * (1.0 - node.place));
+                plus[i] += force[i] * (w * node.place);
+            }
+            if node.action != 0.0 {
+                pivot -= self.lagrangian.rate(time, &at) * (w * node.action);
+            }
+        }
+        Ok([minus.map(|f| f / pivot), plus.map(|f| f / pivot)])
     }
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {

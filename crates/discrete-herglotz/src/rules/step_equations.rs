@@ -10,7 +10,7 @@ use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint, numbers::Augmen
 pub(crate) struct Sums<const N: usize> {
     /// `sum w L`.
     pub value: f64,
-    /// `p0 + sum w dL[l_i]`.
+    /// `p0 + sum w dL[l_i]`; with an applied force f, `dL[l_i] + h (1 - a) f_i` is in the place of `dL[l_i]`.
     pub residual: SVector<f64, N>,
     /// `sum w d2L[l_i, r_j]` for the velocity directions.
     pub right: SMatrix<f64, N, N>,
@@ -33,9 +33,9 @@ impl<const N: usize> Frame<'_, N> {
     /// Adds the part of the sums with one block of left directions from `left` and one of right directions from
     /// `right`.
     #[inline(always)]
-    pub fn accumulate<U: Unknowns, const A: usize>(
+    pub fn accumulate<U: Unknowns, const A: usize, L: Lagrangian<N>>(
         &self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &L,
         left: usize,
         right: usize,
         sums: &mut Sums<N>,
@@ -57,7 +57,14 @@ impl<const N: usize> Frame<'_, N> {
             x.v[i].d[i - left] = Dual::constant(-1.0);
             x.z.d[i - left] = Dual::constant(h * (1.0 - action) * self.p[i]);
         }
-        let l = lagrangian.along(Dual::constant(self.t), &x);
+        let mut l = lagrangian.along(Dual::constant(self.t), &x);
+        if const { L::HINTS.forced } {
+            let at = VelocityPoint { q: x.q.map(|e| e.re), v: x.v.map(|e| e.re), z: x.z.re };
+            let force = lagrangian.applied_force(Dual::constant(self.t), &at);
+            for i in left..N.min(left + A) {
+                l.d[i - left] += force[i] * (h * (1.0 - place));
+            }
+        }
         if left == 0 && right == 0 {
             sums.value += weight * l.re.re;
         }
@@ -88,15 +95,29 @@ impl<const N: usize> Frame<'_, N> {
     pub fn by_blocks(&self, lagrangian: &impl Lagrangian<N>, unknowns: usize, sums: &mut Sums<N>) {
         for left in (0..N).step_by(BLOCK) {
             for right in (0..unknowns).step_by(BLOCK) {
-                self.accumulate::<SVector<f64, BLOCK>, BLOCK>(lagrangian, left, right, sums);
+                self.accumulate::<SVector<f64, BLOCK>, BLOCK, _>(lagrangian, left, right, sums);
             }
         }
     }
 }
 
-/// `L`, `L_q` and `L_z` at a node, as needed at the end of a step.
+/// `L`, `L_q + f` with the applied force f, and `L_z` at a node, as needed at the end of a step.
 #[inline(always)]
-pub(crate) fn rates_at<const N: usize>(
+pub(crate) fn rates_at<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    t: f64,
+    at: &VelocityPoint<N>,
+) -> (f64, SVector<f64, N>, f64) {
+    let (value, mut force, rate) = lagrangian_rates(lagrangian, t, at);
+    if const { L::HINTS.forced } {
+        force += lagrangian.applied_force(t, at);
+    }
+    (value, force, rate)
+}
+
+/// `L`, `L_q` and `L_z` at a node.
+#[inline(always)]
+fn lagrangian_rates<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     at: &VelocityPoint<N>,
@@ -114,7 +135,7 @@ pub(crate) fn rates_at<const N: usize>(
     (l.re, l.d.x, l.d.z)
 }
 
-/// [`rates_at`] for a large system.
+/// [`lagrangian_rates`] for a large system.
 #[inline(never)]
 fn rates_by_blocks<const N: usize>(
     lagrangian: &impl Lagrangian<N>,

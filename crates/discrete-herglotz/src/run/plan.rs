@@ -15,6 +15,9 @@ use std::fmt::{Display, Formatter};
 /// shows only in motion is an error of the input and not of the run: seven checks, at powers of two.
 const MAX_STEPS_CHECKED_FIRST: usize = 64;
 
+/// The reason why the steps of a run with a force keep no contact form.
+const FORCED: &str = "not contact: forced; the defect is the virtual work of the force";
+
 /// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
 /// `Display` output lists what will be computed and what is skipped.
 pub struct Plan<'p, L, const N: usize> {
@@ -153,8 +156,15 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         } else {
             PlanEntry::computed(what, "the properties that L claims are checked at the start and along the run")
         });
+        if self.steps.problem.lagrangian.has_force() {
+            entries.push(PlanEntry::skipped("contact form", FORCED));
+        }
         let (what, autonomous) = ("time at the stages", structure.autonomous);
-        let why = if autonomous { "L does not depend on t" } else { "L depends on t" };
+        let why = match (autonomous, self.steps.problem.lagrangian.has_force()) {
+            (true, _) => "L does not depend on t",
+            (false, false) => "L depends on t",
+            (false, true) => "L or the force may depend on t",
+        };
         entries.push(PlanEntry { what, computed: !autonomous, why: why.into() });
         entries
     }

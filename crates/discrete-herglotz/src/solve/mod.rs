@@ -1,5 +1,6 @@
 //! The solution of the equations of a step: Newton's method and linear solvers. Only this module uses faer.
 
+pub(crate) mod chebyshev;
 #[cfg(feature = "faer")]
 mod faer_lu;
 pub(crate) mod hermite;
@@ -9,6 +10,7 @@ pub(crate) mod mass_matrix;
 mod nalgebra_lu;
 pub(crate) mod newton;
 pub(crate) mod roots;
+pub(crate) mod sign_changes;
 pub(crate) mod solver;
 pub(crate) mod unknowns;
 

@@ -5,7 +5,7 @@ use super::separable::SeparableForm;
 use crate::resolution::monitor::defect;
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar};
 
 /// The substep `C B A B C` of [`ActionSplitting`](crate::splitting::ActionSplitting) as a discrete Lagrangian of order
 /// 2: with the flow `phi` of `f(z)` over half a step,
@@ -53,6 +53,17 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
         Ok(ActionStrang { form, h, forth, back, rest: (state.z, flow.rate(state.z)) })
     }
 
+    /// The action after the last kick, before the last map of the action.
+    fn action_between<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> T {
+        let (rest, constant) = self.rest;
+        let still = SVector::from_element(T::zero());
+        let kick = |t: f64, q: &SVector<T, N>| {
+            (self.form.lagrangian.value(T::from(t), q, &still, T::from(rest)) - constant) * (0.5 * self.h)
+        };
+        let kinetic = self.form.twice_kinetic(&(x.q1 - x.q0)) * (0.5 / self.h);
+        self.forth.apply(x.z0) + kinetic + kick(t, &x.q0) + kick(t + self.h, &x.q1)
+    }
+
     /// One step of length h, of either sign, from the time `t`, with the map over `h/2`. Returns the final state, the
     /// mean velocity and the conformal factor.
     #[inline(always)]
@@ -74,19 +85,23 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
 }
 
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for ActionStrang<L, F, N> {
+    const FORCED: bool = L::HINTS.forced;
+
     fn step_size(&self) -> f64 {
         self.h
     }
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
-        let (rest, constant) = self.rest;
-        let still = SVector::from_element(T::zero());
-        let kick = |t: f64, q: &SVector<T, N>| {
-            (self.form.lagrangian.value(T::from(t), q, &still, T::from(rest)) - constant) * (0.5 * self.h)
-        };
-        let kinetic = self.form.twice_kinetic(&(x.q1 - x.q0)) * (0.5 / self.h);
-        let z = self.forth.apply(x.z0) + kinetic + kick(t, &x.q0) + kick(t + self.h, &x.q1);
-        Ok(self.forth.apply(z) - x.z0)
+        Ok(self.forth.apply(self.action_between(t, x)) - x.z0)
+    }
+
+    /// Those of the two kicks, times the slope of the last map of the action: `F- = phi' h/2 f(t, q0)` and
+    /// `F+ = phi' h/2 f(t + h, q1)`.
+    fn forces<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        let z = Dual { re: self.action_between(t, x), d: SVector::<T, 1>::new(T::one()) };
+        let slope = self.forth.apply(z).d[0] * (0.5 * self.h);
+        let kick = |t: f64, q: &SVector<T, N>| self.form.applied_force(t, q, T::from(self.rest.0)).map(|f| f * slope);
+        Ok([kick(t, &x.q0), kick(t + self.h, &x.q1)])
     }
 
     #[inline(always)]

@@ -1,7 +1,8 @@
 //! Splitting schemes as integrators.
 
 use super::separable::SeparableForm;
-use super::{ActionSplitting, Splitting};
+use super::velocity_drag::check_force;
+use super::{ActionSplitting, DragSplitting, Splitting};
 use crate::SplittingScheme;
 use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
 use contact_geom::Lagrangian;
@@ -34,7 +35,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         if self.is_nystrom() && !structure.is_affine_in_z() {
             return Err(InputError::Unclaimed { claim: "z_affine" });
         }
-        Ok(())
+        check_force(lagrangian, self.is_nystrom())
     }
 
     fn stepper(
@@ -50,6 +51,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         }
         // The problem has already verified the claims of its Lagrangian.
         let form = SeparableForm::read_of(lagrangian, h, t0, &state, true)?;
+        if const { L::HINTS.forced } && !lagrangian.force_structure().is_of_positions() {
+            let splitting = DragSplitting::of(form, self, h, t0, state)?;
+            let splitting = if check_resolution { splitting.with_resolution_check() } else { splitting };
+            return Ok(Box::new(if action { splitting } else { splitting.without_action() }));
+        }
         let splitting = Splitting::of(form, self, h, t0, state)?.compensated_where_tiny();
         let splitting = if check_resolution { splitting.with_resolution_check() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))

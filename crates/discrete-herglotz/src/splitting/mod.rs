@@ -11,12 +11,15 @@ pub(crate) mod separable;
 mod strang;
 #[cfg(test)]
 mod tests;
+mod velocity_drag;
+mod velocity_drag_flow;
 
 pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
 pub use action_strang::ActionStrang;
 pub use linear_drag::Splitting;
 pub use nonlinear_drag::ActionSplitting;
 pub use strang::Strang;
+pub use velocity_drag::DragSplitting;
 
 use crate::PlanEntry;
 

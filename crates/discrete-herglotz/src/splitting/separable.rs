@@ -1,7 +1,7 @@
 //! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
 use crate::integration::check_claims::MAX_CLAIM_DEFECT;
-use crate::integration::check_unforced;
+use crate::integration::check_kicks;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -23,6 +23,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Evaluates M, and verifies the claims of the Lagrangian at a state and at a point near it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        check_kicks(&lagrangian, "a splitting without drag of the velocity")?;
         Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
@@ -38,7 +39,6 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        check_unforced(&lagrangian, "a splitting")?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -90,17 +90,23 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         Ok(())
     }
 
-    /// `L(t, q, 0, z) = -V + f(z)`, and `L_q`. Only the derivatives in `q` are carried.
+    /// `L(t, q, 0, z) = -V + f(z)`, and `L_q` plus the applied force. Only the derivatives in `q` are carried.
     #[inline(always)]
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
         self.lagrangian.with_force(t, &rest)
     }
 
-    /// `L_q` alone, for steps without the action.
+    /// `L_q` plus the applied force, for steps without the action.
     #[inline(always)]
     pub(crate) fn force(&self, t: f64, q: &SVector<f64, N>, z: f64) -> SVector<f64, N> {
         self.lagrangian.force(t, &VelocityPoint { q: *q, v: SVector::zeros(), z })
+    }
+
+    /// The applied force alone, which depends on time and positions.
+    pub(crate) fn applied_force<T: Scalar>(&self, t: f64, q: &SVector<T, N>, z: T) -> SVector<T, N> {
+        let still = SVector::from_element(T::zero());
+        self.lagrangian.applied_force(T::from(t), &VelocityPoint { q: *q, v: still, z })
     }
 
     /// The value and the force of the kick at an initial state.
@@ -136,6 +142,12 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
             }
         }
         sum
+    }
+
+    /// The diagonal of M; `None` if another entry is not zero.
+    pub(crate) fn diagonal_mass(&self) -> Option<SVector<f64, N>> {
+        let diagonal = (0..N).all(|i| (0..N).all(|j| i == j || self.mass[(i, j)] == 0.0));
+        diagonal.then(|| self.mass.diagonal())
     }
 
     /// `M v`.

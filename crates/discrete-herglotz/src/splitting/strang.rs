@@ -83,6 +83,8 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
+    const FORCED: bool = L::HINTS.forced;
+
     fn step_size(&self) -> f64 {
         self.h
     }
@@ -95,6 +97,13 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         let Drift { damping: growth, length, .. } = self.drift(t, true);
         let before = square * (0.5 / length) + kick(t, &x.q0);
         Ok(before * (1.0 + growth) + kick(t + self.h, &x.q1) + x.z0 * growth)
+    }
+
+    /// Those of the two kicks, `F- = (1 + damping) h/2 f(t, q0)` and `F+ = h/2 f(t + h, q1)`.
+    fn forces<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        let kick = |t: f64, q: &SVector<T, N>, s: f64| self.form.applied_force(t, q, T::zero()).map(|f| f * s);
+        let before = 0.5 * self.h * (1.0 + self.drift(t, true).damping);
+        Ok([kick(t, &x.q0, before), kick(t + self.h, &x.q1, 0.5 * self.h)])
     }
 
     #[inline(always)]

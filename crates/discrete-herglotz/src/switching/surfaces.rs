@@ -1,16 +1,28 @@
 //! The switching functions of a Lagrangian along a step.
 
 use crate::gauss::StepStart;
+use crate::solve::chebyshev::{Samples, node};
 use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
+use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, herglotz_field};
 use std::convert::Infallible;
 
-/// The number of parts in which a step without dense output is searched for sign changes: twice those of a search for
-/// events, since a sign change that is missed spoils the step.
+/// The number of equal parts in which a curve without dense output is searched for jumps.
 const DEFAULT_PARTS: usize = 8;
+
+/// The degree of interpolation of a function along a step without dense output: nearly twice that of a search for
+/// events, since a sign change that is missed spoils the step.
+const DEFAULT_DEGREE: usize = 7;
+
+/// The largest number of stages with which the cubic Hermite polynomial, of order 4, is used in place of the
+/// collocation polynomial, whose order between the ends of the step is the number of stages.
+const MAX_HERMITE_STAGES: usize = 2;
+
+/// The round-off of a switching function, relative to its size on a step: that of the sums of the curve.
+const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
 
 /// The largest number of halvings of the part after a zero, in the search for a point where the function still has its
 /// old sign: down to the round-off of half of the digits of the time.
@@ -71,7 +83,18 @@ pub(super) struct StepCurve<const N: usize> {
 
 impl<const N: usize> StepCurve<N> {
     pub(super) fn parts(&self) -> usize {
-        self.dense.as_ref().map_or(DEFAULT_PARTS, DenseStep::parts)
+        DEFAULT_PARTS
+    }
+
+    /// The degree with which a function is interpolated first: with its value at the start, it is evaluated `s + 2`
+    /// times on a step with s stages.
+    fn sampling_degree(&self) -> usize {
+        self.collocation().map_or(DEFAULT_DEGREE, |dense| dense.sampling_degree() - 1)
+    }
+
+    /// The collocation polynomial, if it is the more accurate curve.
+    fn collocation(&self) -> Option<&DenseStep<N>> {
+        self.dense.as_ref().filter(|dense| dense.stages() > MAX_HERMITE_STAGES)
     }
 
     pub fn span(&self) -> f64 {
@@ -83,7 +106,7 @@ impl<const N: usize> StepCurve<N> {
         if fraction == 1.0 {
             return (self.to.t, self.to.point());
         }
-        let x = match &self.dense {
+        let x = match self.collocation() {
             Some(dense) => {
                 let x = dense.at_fraction(fraction);
                 VelocityPoint { q: x.q, v: dense.velocity(t), z: x.z }
@@ -282,31 +305,84 @@ impl Surfaces {
         lagrangian: &impl Lagrangian<N>,
         curve: &StepCurve<N>,
     ) -> Option<SignChange> {
-        if self.sides.is_empty() {
+        let (count, degree) = (self.sides.len(), curve.sampling_degree());
+        if count == 0 {
             return None;
         }
-        let parts = curve.parts();
-        for part in 1..=parts {
-            let fraction = part as f64 / parts as f64;
-            let (t, x) = curve.at(fraction);
-            self.values.clear();
+        self.values.clear();
+        for j in 0..=degree {
+            let (t, x) = curve.at(node(degree, j));
             lagrangian.switching_functions(t, &x, &mut self.values);
-            let mut changed = false;
-            for (side, value) in self.sides.iter_mut().zip(&self.values) {
-                if *side == 0.0 {
-                    *side = sign(*value);
-                }
-                changed |= *side * sign(*value) < 0.0;
+        }
+        // The functions are evaluated anew below, and the values of this step are kept.
+        let values = std::mem::take(&mut self.values);
+        let samples_of =
+            |index: usize| Samples::new(degree, |j| values.get(j * count + index).copied().unwrap_or(f64::NAN));
+        let (mut first, mut without_side) = (None::<SignChange>, Vec::new());
+        for index in 0..count {
+            let samples = samples_of(index);
+            let (side, end) = (self.side(index), sign(samples.ends()[1]));
+            if side * end > 0.0 && has_no_zero(&samples, 0.0) {
+                continue;
             }
-            if changed {
-                let from = (part - 1) as f64 / parts as f64;
-                let of = |i: &usize| self.side(*i) * sign(self.values.get(*i).copied().unwrap_or(0.0)) < 0.0;
-                let indices: Vec<usize> = (0..self.sides.len()).filter(of).collect();
-                let changes = indices.into_iter().map(|index| self.change(lagrangian, curve, index, [from, fraction]));
-                return changes.min_by(|a, b| a.estimate.total_cmp(&b.estimate));
+            let (place, ends) = self.change_of_side(lagrangian, curve, index, &samples);
+            if let Some((own, from)) = place {
+                if side == 0.0 {
+                    without_side.push((index, from));
+                }
+                if let Some(slot) = self.sides.get_mut(index) {
+                    *slot = own;
+                }
+            }
+            let change = ends.map(|ends| self.change(lagrangian, curve, index, ends));
+            first = [first, change].into_iter().flatten().min_by(|a, b| a.estimate.total_cmp(&b.estimate));
+        }
+        self.values = values;
+        if let Some(change) = first {
+            // A side that is taken only after the first sign change, the motion may never reach.
+            for (index, _) in without_side.into_iter().filter(|(_, from)| *from > change.ends[1]) {
+                if let Some(slot) = self.sides.get_mut(index) {
+                    *slot = 0.0;
+                }
             }
         }
-        None
+        first
+    }
+
+    /// The side of a function with the fraction of the step from which it has one, and the fractions between which it
+    /// first changes.
+    fn change_of_side<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        curve: &StepCurve<N>,
+        index: usize,
+        samples: &Samples,
+    ) -> (Option<(f64, f64)>, Option<[f64; 2]>) {
+        let size = samples.size();
+        let (mut points, scale) = (Vec::new(), Scale { size, near: 0.0, noise: ROUND_OFF * size });
+        let along = |fraction: f64| {
+            let (t, x) = curve.at(fraction);
+            self.value(lagrangian, index, (t, &x))
+        };
+        let reached = match separate(samples, scale, along, &mut points) {
+            Separation::Complete => 1.0,
+            Separation::Unresolved(fraction) => fraction,
+            Separation::Undefined => points.last().map_or(0.0, |point| point.fraction),
+        };
+        // Beyond, or if there is nothing to separate, the values at the nodes decide.
+        let nodes = (1..samples.degree()).map(|j| (node(samples.degree(), j), j)).filter(|(x, _)| *x > reached);
+        let nodes = nodes.map(|(x, j)| (x, samples.values()[j])).chain([(1.0, samples.ends()[1])]);
+        let (mut side, mut from, mut since) = (self.side(index), 0.0, 0.0);
+        for (fraction, value) in points.iter().map(|point| (point.fraction, point.value)).chain(nodes) {
+            if side == 0.0 {
+                (side, since) = (sign(value), fraction);
+            }
+            if side * sign(value) < 0.0 {
+                return (Some((side, since)), Some([from, fraction]));
+            }
+            from = fraction;
+        }
+        ((side != 0.0).then_some((side, since)), None)
     }
 
     /// The zero of a function between two fractions of a step, where the second one is on the other side.

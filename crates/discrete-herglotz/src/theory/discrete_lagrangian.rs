@@ -2,6 +2,7 @@
 
 use crate::solve::mass_matrix::BLOCK;
 use crate::solve::newton::{Linearised, NewtonStart, newton};
+use crate::theory::discrete_forces::discrete_forces;
 use crate::{InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
@@ -14,7 +15,13 @@ use contact_geom::{
 /// Only the step size and the value, a generic function, are required. By default derivatives are computed by automatic
 /// differentiation and steps by Newton's method; the discretisations of this crate override both with faster
 /// implementations. For a time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
+///
+/// With discrete forces F- and F+ the momenta of a step are `p0 = -(D1 L_d + F-)/sigma_d` and `p1 = D2 L_d + F+`; the
+/// flow has the contact defect `Phi* eta - sigma_d eta = -F-.dq0 - F+.dq1`.
 pub trait DiscreteLagrangian<const N: usize> {
+    /// Whether there may be [discrete forces](Self::forces). Where it is `false`, no code for them is compiled.
+    const FORCED: bool = false;
+
     /// The time step h; negative for steps backward in time.
     fn step_size(&self) -> f64;
 
@@ -23,6 +30,15 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// # Errors
     /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
+
+    /// The discrete forces `[F-, F+]` on the two ends of a step. Set [`FORCED`](Self::FORCED) as well; by default there are
+    /// none.
+    ///
+    /// # Errors
+    /// Those of [`value`](Self::value).
+    fn forces<T: Scalar>(&self, _t: f64, _x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        Ok([SVector::from_fn(|_, _| T::zero()); 2])
+    }
 
     /// Checks the hypotheses at the initial state of a run, beyond the regularity of `L_d`: for example that the
     /// Lagrangian which `L_d` discretises is regular. By default there are none.
@@ -76,7 +92,7 @@ pub trait DiscreteLagrangian<const N: usize> {
 
     /// The step `(q0, p0, z0) -> (q1, p1, z1)` of the discrete Hamiltonian flow `F+L_d o (F-L_d)^-1`.
     ///
-    /// Solves `D1 L_d + sigma_d p0 = 0` for `q1`, starting from `q0 + h u` with the guess `u` of the mean velocity.
+    /// Solves `D1 L_d + F- + sigma_d p0 = 0` for `q1`, starting from `q0 + h u` with the guess `u` of the mean velocity.
     ///
     /// # Errors
     /// A [`StepError`]: no convergence, a singular matrix, `sigma_d <= 0`, a non-finite value.
@@ -97,10 +113,16 @@ pub trait DiscreteLagrangian<const N: usize> {
             |_, _| [0.0; 2],
             |u, _| {
                 let jet = self.second_jet(t, &point(u))?;
+                let (mut pull, mut slope) = (jet.first.d1, jet.d12);
+                if const { Self::FORCED } {
+                    let forces = discrete_forces(self, t, &point(u))?;
+                    pull += forces.minus;
+                    slope += forces.minus_slopes.1;
+                }
                 Ok(Linearised {
-                    residual: jet.first.d1 + from.p * jet.first.sigma(),
-                    jacobian: (jet.d12 + from.p * jet.d2z.transpose()) * h,
-                    size: jet.first.d1.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
+                    residual: pull + from.p * jet.first.sigma(),
+                    jacobian: (slope + from.p * jet.d2z.transpose()) * h,
+                    size: pull.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
                     z_change: 0.0,
                     z_slope: SVector::zeros(),
                 })
@@ -108,13 +130,17 @@ pub trait DiscreteLagrangian<const N: usize> {
         )?;
         let x = point(&root.u);
         let jet = self.jet(t, &x)?;
-        let end = PhasePoint { q: x.q1, p: jet.d2, z: from.z + jet.value };
+        let mut p = jet.d2;
+        if const { Self::FORCED } {
+            p += self.forces(t, &x)?[1];
+        }
+        let end = PhasePoint { q: x.q1, p, z: from.z + jet.value };
         DiscreteStep { end, velocity: root.u, sigma: jet.sigma(), iterations: root.iterations }.checked()
     }
 
     /// The step `(q1, p1, z1) -> (q0, p0, z0)` of the inverse flow; `t` is the time at `(q0, p0, z0)`.
     ///
-    /// Solves `D2 L_d = p1`, `z0 + L_d = z1` for `(q0, z0)`, starting from `q1 - h u`.
+    /// Solves `D2 L_d + F+ = p1`, `z0 + L_d = z1` for `(q0, z0)`, starting from `q1 - h u`.
     ///
     /// # Errors
     /// Like those of [`forward`](Self::forward).
@@ -138,10 +164,17 @@ pub trait DiscreteLagrangian<const N: usize> {
                 let defect = z0 + jet.first.value - from.z;
                 // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.
                 let (z_change, z_slope) = (-defect / jet.first.sigma(), jet.first.d1 * (h / jet.first.sigma()));
+                let (mut push, mut slope, mut of_z) = (jet.first.d2, jet.d12.transpose(), jet.d2z);
+                if const { Self::FORCED } {
+                    let forces = discrete_forces(self, t, &point(u, z0))?;
+                    push += forces.plus;
+                    slope += forces.plus_slopes.0;
+                    of_z += forces.plus_slopes.2;
+                }
                 Ok(Linearised {
-                    residual: jet.first.d2 - from.p + jet.d2z * z_change,
-                    jacobian: jet.d12.transpose() * -h + jet.d2z * z_slope.transpose(),
-                    size: jet.first.d2.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
+                    residual: push - from.p + of_z * z_change,
+                    jacobian: slope * -h + of_z * z_slope.transpose(),
+                    size: push.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
                     z_change,
                     z_slope,
                 })
@@ -149,18 +182,26 @@ pub trait DiscreteLagrangian<const N: usize> {
         )?;
         let x = point(&root.u, root.z);
         let jet = self.jet(t, &x)?;
-        let sigma = jet.sigma();
-        let end = PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: root.z };
+        let (sigma, mut pull) = (jet.sigma(), jet.d1);
+        if const { Self::FORCED } {
+            pull += self.forces(t, &x)?[0];
+        }
+        let end = PhasePoint { q: x.q0, p: -pull / sigma, z: root.z };
         DiscreteStep { end, velocity: root.u, sigma, iterations: root.iterations }.checked()
     }
 }
 
 impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
+    const FORCED: bool = D::FORCED;
+
     fn step_size(&self) -> f64 {
         (**self).step_size()
     }
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         (**self).value(t, x)
+    }
+    fn forces<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<[SVector<T, N>; 2], StepError> {
+        (**self).forces(t, x)
     }
     fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
         (**self).check_start(t, from, velocity)

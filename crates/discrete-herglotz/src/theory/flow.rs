@@ -1,5 +1,6 @@
 //! The discrete Lagrangian flow Phi_d and the discrete Hamiltonian flow Phi~_d, with their linearisations.
 
+use super::discrete_forces::transform_jacobians;
 use super::legendre::{legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse};
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -28,8 +29,8 @@ pub fn discrete_flow_jacobian<const N: usize>(
     x: &DiscretePoint<N>,
     image: &DiscretePoint<N>,
 ) -> Result<DMatrix<f64>, StepError> {
-    let plus = ld.second_jet(t, x)?.legendre_plus_jacobian();
-    let minus = ld.second_jet(t + ld.step_size(), image)?.legendre_minus_jacobian();
+    let [_, plus] = transform_jacobians(ld, t, x)?.1;
+    let [minus, _] = transform_jacobians(ld, t + ld.step_size(), image)?.1;
     minus.lu().solve(&plus).ok_or(StepError::Singular { pivot: 0.0 })
 }
 
@@ -42,8 +43,8 @@ pub fn hamiltonian_flow_jacobian<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<DMatrix<f64>, StepError> {
-    let jet = ld.second_jet(t, x)?;
-    let transposed = jet.legendre_minus_jacobian().transpose().lu().solve(&jet.legendre_plus_jacobian().transpose());
+    let [minus, plus] = transform_jacobians(ld, t, x)?.1;
+    let transposed = minus.transpose().lu().solve(&plus.transpose());
     transposed.map(|m| m.transpose()).ok_or(StepError::Singular { pivot: 0.0 })
 }
 

@@ -1,7 +1,8 @@
 //! The discrete Legendre transforms F+L_d and F-L_d, their inverses, and regularity.
 
+use super::discrete_forces::{momenta, states, transform_jacobians};
 use crate::{DiscreteLagrangian, StepError, solve::Solver};
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{DiscretePoint, PhasePoint, Regularity};
 
 /// The conformal factor `sigma_d = 1 + Dz L_d` of a step; paper, section 3.1.
@@ -16,7 +17,8 @@ pub fn sigma_d<const N: usize>(
     Ok(ld.jet(t, x)?.sigma())
 }
 
-/// The discrete Legendre transform `F-L_d (q0, q1, z0) = (q0, -D1 L_d / (1 + Dz L_d), z0)`; paper, section 3.1.
+/// The discrete Legendre transform `F-L_d (q0, q1, z0) = (q0, -D1 L_d / (1 + Dz L_d), z0)`; paper, section 3.1. With
+/// [discrete forces](DiscreteLagrangian::forces), `-(D1 L_d + F-)/(1 + Dz L_d)`.
 ///
 /// # Errors
 /// [`StepError::SigmaVanished`] where `sigma_d` vanishes, and those of the discrete Lagrangian.
@@ -25,15 +27,11 @@ pub fn legendre_minus<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<PhasePoint<N>, StepError> {
-    let jet = ld.jet(t, x)?;
-    let sigma = jet.sigma();
-    if sigma == 0.0 {
-        return Err(StepError::SigmaVanished { sigma });
-    }
-    Ok(PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: x.z0 })
+    Ok(states(ld, t, x)?[0])
 }
 
-/// The discrete Legendre transform `F+L_d (q0, q1, z0) = (q1, D2 L_d, z0 + L_d)`; paper, section 3.1.
+/// The discrete Legendre transform `F+L_d (q0, q1, z0) = (q1, D2 L_d, z0 + L_d)`; paper, section 3.1. With
+/// [discrete forces](DiscreteLagrangian::forces), `D2 L_d + F+`.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.
@@ -42,8 +40,8 @@ pub fn legendre_plus<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<PhasePoint<N>, StepError> {
-    let jet = ld.jet(t, x)?;
-    Ok(PhasePoint { q: x.q1, p: jet.d2, z: x.z0 + jet.value })
+    let (jet, [_, p]) = momenta(ld, t, x)?;
+    Ok(PhasePoint { q: x.q1, p, z: x.z0 + jet.value })
 }
 
 /// The inverse of F-L_d, by Newton's method from a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the
@@ -90,11 +88,16 @@ pub struct DiscreteRegularity {
 ///
 /// # Errors
 /// Those of the discrete Lagrangian.
-pub fn discrete_regularity<const N: usize>(
-    ld: &impl DiscreteLagrangian<N>,
+pub fn discrete_regularity<D: DiscreteLagrangian<N>, const N: usize>(
+    ld: &D,
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<DiscreteRegularity, StepError> {
+    if const { D::FORCED } {
+        let (jet, [minus, _]) = transform_jacobians(ld, t, x)?;
+        let fibre = Regularity::of(DMatrix::from_fn(N, N, |i, j| minus[(N + i, N + j)]));
+        return Ok(DiscreteRegularity { sigma: jet.first.sigma(), fibre });
+    }
     let jet = ld.second_jet(t, x)?;
     Ok(DiscreteRegularity { sigma: jet.first.sigma(), fibre: jet.regularity() })
 }

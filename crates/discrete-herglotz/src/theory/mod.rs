@@ -1,5 +1,6 @@
 //! The theory of discrete Lagrangians on Q x Q x R.
 
+mod discrete_forces;
 pub(crate) mod discrete_lagrangian;
 mod flow;
 mod legendre;
@@ -8,6 +9,7 @@ mod momentum;
 mod path;
 pub mod statements;
 
+pub use discrete_forces::{DiscreteForces, ForceSlopes, discrete_forces};
 pub use discrete_lagrangian::{derived_jet, derived_second_jet};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
 pub use legendre::{

@@ -1,5 +1,6 @@
 //! Discrete symmetries and their dissipated momenta.
 
+use super::discrete_forces::momenta;
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::{DiscretePoint, OneParameterGroup};
 
@@ -14,8 +15,8 @@ pub fn discrete_momentum<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<f64, StepError> {
-    let jet = ld.jet(t, x)?;
-    Ok(group.momentum(&x.q0, &(-jet.d1 / jet.sigma())))
+    let (_, [p0, _]) = momenta(ld, t, x)?;
+    Ok(group.momentum(&x.q0, &p0))
 }
 
 /// The defect of infinitesimal invariance of a discrete Lagrangian, `|D1 L_d xi(q0) + D2 L_d xi(q1)|`, relative to the

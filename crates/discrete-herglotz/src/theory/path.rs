@@ -85,17 +85,26 @@ impl<const N: usize> DiscretePath<N> {
     }
 
     /// The residuals of the discrete Herglotz equations at the interior points:
-    /// `D1 L_d(q_k, q_{k+1}, z_k) + sigma_d(q_k, q_{k+1}, z_k) D2 L_d(q_{k-1}, q_k, z_{k-1})`, k = 1..N-1.
+    /// `D1 L_d(q_k, q_{k+1}, z_k) + sigma_d(q_k, q_{k+1}, z_k) D2 L_d(q_{k-1}, q_k, z_{k-1})`, k = 1..N-1. With
+    /// [discrete forces](DiscreteLagrangian::forces), `D1 L_d + F-` and `D2 L_d + F+` are in the place of the derivatives.
     ///
     /// # Errors
     /// Those of the discrete Lagrangian.
-    pub fn herglotz_residuals(
+    pub fn herglotz_residuals<D: DiscreteLagrangian<N>>(
         &self,
-        ld: &impl DiscreteLagrangian<N>,
+        ld: &D,
         t0: f64,
         z0: f64,
     ) -> Result<Vec<SVector<f64, N>>, StepError> {
-        let jets = self.jets(ld, t0, z0)?;
+        let mut jets = self.jets(ld, t0, z0)?;
+        if const { D::FORCED } {
+            for (k, (pair, (z, jet))) in self.points.windows(2).zip(&mut jets).enumerate() {
+                let x = DiscretePoint { q0: pair[0], q1: pair[1], z0: *z };
+                let [minus, plus] = ld.forces(t0 + k as f64 * ld.step_size(), &x)?;
+                jet.d1 += minus;
+                jet.d2 += plus;
+            }
+        }
         Ok(jets.windows(2).map(|pair| pair[1].1.d1 + pair[0].1.d2 * pair[1].1.sigma()).collect())
     }
 }

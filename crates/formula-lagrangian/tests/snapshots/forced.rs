@@ -41,6 +41,7 @@ impl Lagrangian<2> for ForcedSpring {
         Structure {
             z_affine: true,
             constant_rate: true,
+            separable: true,
             constant_mass: true,
             ..Structure::default()
         }

@@ -44,7 +44,7 @@ pub(crate) enum Command {
     /// Print what will be computed and what is skipped, and which properties of the formula are proved.
     Plan(plan::Plan),
     /// Check whether the motion is contact: conformal factors, momenta, Herglotz' equation, and the theorems of the
-    /// discrete theory; the exit code is 1 if not.
+    /// discrete theory; the exit code is 1 if not. With a force, check that the defect is its virtual work.
     Check(check::Check),
     /// Measure run time against error for all integrators that apply, and for dop853 of another library: writes
     /// compare.csv, and draws the best dozen with dop853 in compare.svg.

@@ -67,6 +67,10 @@ coordinates = [{blocks}]
 lagrangian = {lagrangian}
 parameters = {{ {parameters} }}
 
+# Forces that no Lagrangian contains, as quadratic drag; `rayleigh = "..."` is Rayleigh's function:
+# [force]
+# {first_key} = "-0.1*{first_velocity}*abs({first_velocity})"
+
 [start]
 {q}
 {v}
@@ -74,6 +78,7 @@ parameters = {{ {parameters} }}
 
 [run]
 time = {time}
+# breaks = [{middle}]  # times of jumps that the formulas do not show
 accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
 
 [want]
@@ -83,6 +88,7 @@ rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "ener
 # The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
 # columns = ["..."] are recorded at each event in addition to the state; from = TIME skips earlier events.
 events = [{{ when = "{first}", direction = "rising" }}]
+# then = {{ "{first_velocity}" = "-0.8*{first_velocity}" }} gives a new state at each event, impact = "elastic" or {{ restitution = 0.8 }} a rebound.
 # wrap = ["{first}"] shows an angle between -pi and pi in figures.
 
 # For `herglotz sweep FILE`.
@@ -91,6 +97,8 @@ events = [{{ when = "{first}", direction = "rising" }}]
 "#,
         about = entry.about,
         first_velocity = velocity_name(first),
+        first_key = key(first),
+        middle = number(entry.t + 25.0),
         time = number(entry.t + 50.0),
     ))
 }

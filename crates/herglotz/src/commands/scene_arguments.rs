@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use clap::Args;
 use herglotz::{Scene, SceneError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene file, with overrides.
 #[derive(Args)]
@@ -19,7 +19,8 @@ pub(crate) struct SceneArguments {
 impl SceneArguments {
     /// Reads the scene.
     pub fn read(&self) -> Result<Scene, Failure> {
-        Scene::read_with(&self.text()?, &self.changes).map_err(|error| self.explain(error))
+        let folder = self.file.parent().unwrap_or(Path::new(""));
+        Scene::read_in(&self.text()?, &self.changes, folder).map_err(|error| self.explain(error))
     }
 
     /// The text of the file.

@@ -56,8 +56,30 @@ pub struct Check {
     pub step_size: f64,
     /// The samples of the motion, in the order of the motion.
     pub samples: Vec<Sample>,
-    /// The theorems, with the largest residual over a few samples.
+    /// The theorems, with the largest residual over a few samples. With a force it is the statement that the contact
+    /// defect of a step of Gauss collocation is the virtual work of the force.
     pub statements: Vec<StatementResidual>,
+    /// Why contactness is not to be expected, if it is not.
+    pub not_contact: Option<NotContact>,
+}
+
+/// The reason why a motion is not contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NotContact {
+    /// A force acts.
+    Forced,
+    /// A reset replaces the state, or an impact with restitution.
+    Reset,
+}
+
+impl std::fmt::Display for NotContact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            NotContact::Forced => "not contact: forced; the defect is the virtual work of the force",
+            NotContact::Reset => "not contact: a reset that replaces the state preserves no contact form",
+        })
+    }
 }
 
 /// The largest defect of a step that counts as contact. Differences of sixth order give 1e-11 for steps of the
@@ -71,9 +93,21 @@ impl Check {
     }
 
     /// Whether every step that was checked is contact to within [`MAX_CONTACT_DEFECT`], with a conformal factor that is
-    /// finite and not 0: with the factor 0 the pullback is not a contact form.
+    /// finite and not 0: with the factor 0 the pullback is not a contact form. A motion with a force, or with a reset
+    /// that replaces the state, is not contact.
     pub fn is_contact(&self) -> bool {
-        self.contact_defect() <= MAX_CONTACT_DEFECT && !self.loses_the_form()
+        self.not_contact.is_none() && self.contact_defect() <= MAX_CONTACT_DEFECT && !self.loses_the_form()
+    }
+
+    /// Whether the steps have the contact defect that they are to have: none to within [`MAX_CONTACT_DEFECT`], with a
+    /// force its virtual work, and any after a reset that replaces the state.
+    pub fn is_as_expected(&self) -> bool {
+        let worst = || contact_geom::numbers::max_abs_or_nan(self.statements.iter().map(|stated| stated.residual));
+        match self.not_contact {
+            None => self.is_contact(),
+            Some(NotContact::Forced) => worst() <= MAX_CONTACT_DEFECT,
+            Some(NotContact::Reset) => true,
+        }
     }
 
     /// Whether the conformal factor of a step is 0 or not finite, as where the drag within one step exceeds the range

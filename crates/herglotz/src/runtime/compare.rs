@@ -68,7 +68,7 @@ pub struct Comparison {
     pub reference: String,
     /// The error of the reference: its distance from a run with half as many steps.
     pub reference_error: f64,
-    /// Integrators that do not apply, with the reason. Integrators in transformed time are omitted, since no formula
+    /// Integrators and peers that do not apply, with the reason. Integrators in transformed time are omitted, since no formula
     /// has a time transformation.
     pub left_out: Vec<(String, String)>,
     /// Whether the comparison was ended before all integrators were tried.
@@ -187,6 +187,14 @@ impl System {
             let measure = Measure { span, part, reference_error, of: (&by.to_string(), by.order()) };
             comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
         }
+        // A first-order system has no resets.
+        let peers = if self.formula().resets() > 0 {
+            let why = "it performs no resets".to_owned();
+            comparison.left_out.extend(peers.iter().map(|peer| (peer.name().to_owned(), why.clone())));
+            &[]
+        } else {
+            peers
+        };
         let first_order = if peers.is_empty() { None } else { Some(FirstOrder::new(self, motion, &reference)?) };
         for (peer, motion) in peers.iter().zip(first_order.iter().cycle()) {
             let run = |k: u32| {

@@ -52,6 +52,14 @@ pub enum RuntimeError {
         /// Its value.
         value: f64,
     },
+    /// A force has no finite value at the start.
+    #[error("the force on `{coordinate}` is {value} at the start; choose a start or a force where it is finite")]
+    ForceUndefined {
+        /// The coordinate.
+        coordinate: String,
+        /// The force.
+        value: f64,
+    },
     /// L is linear in some velocities, so that it is not regular.
     #[error(
         "the Lagrangian is not regular at the start: it is linear in {velocities}, so that it does not determine the \
@@ -61,10 +69,11 @@ pub enum RuntimeError {
         /// The velocities, by name.
         velocities: String,
     },
-    /// An event, or a column of one, contains the conformal factor, and the rate `L_z` of the motion is not constant.
+    /// An event, or a column of one, contains the conformal factor, and the rate `L_z` of the motion is not constant, or
+    /// an impact changes the factor.
     #[error(
         "an event or one of its columns contains `sigma` or `log_factor`, which are known within a step only if L_z \
-         is constant; use them in a column of rows, or use an event of time and state"
+         is constant and no impact is conformal; use them in a column of rows, or use an event of time and state"
     )]
     FactorInEvent,
     /// A parameter is used in no formula.
@@ -142,7 +151,7 @@ pub fn in_words(error: &InputError) -> String {
         }
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
         InputError::Forced { method } => format!(
-            "there is a force, and {method} takes none; choose a Gauss method such as \"gauss_8\", or write the force \
+            "there is a force that {method} does not take; choose a Gauss method such as \"gauss_8\", or write the force \
              into the Lagrangian"
         ),
         InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),

@@ -38,7 +38,7 @@ mod symmetry;
 mod system;
 
 pub use catalogue::{CATALOGUE, CatalogueEntry};
-pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, Sample, StatementResidual};
+pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, NotContact, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
 pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
@@ -54,9 +54,12 @@ pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem};
 pub use symmetry::FormulaSymmetry;
 pub use system::System;
 
+pub use contact_geom::switching::Impact;
+pub use contact_geom::table::{Interpolation, Table, TableError};
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, Status, Steps, UnknownIntegrator,
-    UnresolvedStep, boundary::PathStatus, ensemble::Tally,
+    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, Status, StepError, Steps,
+    UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
 };
+pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

@@ -94,10 +94,15 @@ impl EndsScene {
         let file: EndsFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let EndsFile { system: table, start, ends, run, .. } = &file;
         let entry = entry(text, table)?;
-        let formula = formula(text, table, entry)?;
+        let formula = formula(text, table, entry, &[])?;
         check_used(text, &formula, table, &[])?;
         let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
         let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;
+        if formula.has_forces() {
+            let message = "a path between two positions takes no force, since it is critical for an action; remove the \
+                           force, or run a motion from a start";
+            return Err(SceneError::at(text, system_at, message));
+        }
         let start_at = start.as_ref().map_or(table.span(), Location::span);
         let given = Ends::read(text, &formula, (start.as_deref(), start_at), (ends, ends.span()), entry)?;
         let by = match &run.integrator {

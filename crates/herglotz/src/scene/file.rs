@@ -33,6 +33,15 @@ pub(crate) struct File {
     /// system of the catalogue has a default initial state.
     #[serde(default)]
     pub start: Option<Location<Named<Numbers>>>,
+    /// Forces beside those of the Lagrangian: for a coordinate `x` the force f in `d/dt L_v - L_q - L_z L_v = f(t, q, v,
+    /// z)` as a formula, as in `x = "-c*x'*abs(x')"`; `"u[2]"` is an entry of an array, and `"u[i]"` are all of its
+    /// entries. `rayleigh` is Rayleigh's dissipation function R, whose force is `-dR/dv`. With a force the motion is not
+    /// contact: the defect is the virtual work of the force.
+    #[serde(default)]
+    pub force: Option<Location<Named<String>>>,
+    /// Functions of time by samples, with their names: the table `drive` is `drive(t)` in all formulas of the scene.
+    #[serde(default)]
+    pub tables: Named<SamplesTable>,
     /// The final time, and the accuracy or the steps.
     pub run: Location<RunTable>,
     /// The output.
@@ -76,6 +85,42 @@ pub(crate) struct RunTable {
     /// The size of each coordinate, in the order of the coordinates, where they differ much: the errors of each
     /// coordinate and its velocity are measured in units of its size.
     pub scales: Option<Location<Vec<f64>>>,
+    /// The times of jumps that the formulas do not show, in the order of the motion. Steps end there.
+    pub breaks: Option<Location<Vec<Location<f64>>>>,
+}
+
+/// The samples of a function of time: in a file with `csv`, or as lists `times` and `values`. Before the first and after
+/// the last sample the function is constant.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table with `csv`, or with `times` and `values`")]
+pub(crate) struct SamplesTable {
+    /// A file of comma-separated values whose first line has the names of the columns; its path is relative to the folder
+    /// of the scene.
+    pub csv: Option<Location<String>>,
+    /// The column of the times; `t` by default.
+    pub time: Option<Location<String>>,
+    /// The column of the values; by default the one with the name of the table.
+    pub value: Option<Location<String>>,
+    /// The times, which increase.
+    pub times: Option<Location<Vec<f64>>>,
+    /// The values, as many as there are times.
+    pub values: Option<Location<Vec<f64>>>,
+    /// How the function continues between its samples.
+    #[serde(default)]
+    pub pieces: PiecesName,
+}
+
+/// How a function continues between its samples.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum PiecesName {
+    /// Each value holds until the time of the next one.
+    Held,
+    /// Straight lines.
+    #[default]
+    Linear,
+    /// A cubic spline.
+    Cubic,
 }
 
 /// The output.
@@ -135,6 +180,29 @@ pub(crate) struct EventTable {
     /// ...`) or without. They are empty for other events.
     #[serde(default)]
     pub columns: Vec<Location<String>>,
+    /// A reset: the variables that get new values where the function changes its sign, as expressions of the state before
+    /// it, as in `{ "x'" = "-0.8*x'" }`. The motion goes on from the new state. events.csv has the state before the
+    /// reset, and the state after it in columns such as `x' after`.
+    pub then: Option<Location<Named<String>>>,
+    /// An impact in place of `then`, where the function falls. It depends on `t` and the coordinates alone and is positive
+    /// where motions are admitted: `"elastic"` conserves the energy, `{ restitution = 0.8 }` multiplies the normal
+    /// velocity by -0.8, and `{ conformal = 0.64 }` multiplies the contact form by 0.64.
+    pub impact: Option<Location<ImpactLaw>>,
+    /// With `then` or `impact`: where resets accumulate, the variables that get new values, from which the motion
+    /// continues, as in `{ "x'" = "0" }`. By default the run ends there.
+    pub rest: Option<Location<Named<String>>>,
+}
+
+/// The law of an impact.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum ImpactLaw {
+    /// The energy is conserved.
+    Elastic,
+    /// The normal velocity relative to the surface is multiplied by minus this number, from 0 to 1.
+    Restitution(f64),
+    /// The contact form is multiplied by this number, above 0 and at most 1.
+    Conformal(f64),
 }
 
 /// Which sign changes count, in the direction of the motion.

@@ -1,15 +1,21 @@
 //! Scenes of motions from an initial state.
 
 use super::checked::{check_version, finite};
-use super::file::{self, File};
-use super::location::{Location, Span};
+use super::file::{self, EventTable, File};
+use super::forces::with_forces;
+use super::location::{Location, Named, Span};
 use super::members::Members;
-use super::output::{self, EventColumns, Events, RowTimes};
+use super::output::{self, EventColumns, Events, RowTimes, times_in_order};
+use super::resets::with_resets;
 use super::step_control::step_control;
 use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
-use super::{SceneError, overrides, start};
-use crate::runtime::{Column, Crossing, Event, InputError, Motion, RuntimeError, Start, StepControl, System, in_words};
+use super::{SceneError, overrides, start, tables};
+use crate::runtime::{
+    AfterReset, Column, Crossing, Event, InputError, Motion, RuntimeError, Start, StepControl, System, Table, in_words,
+    velocity_name,
+};
+use std::path::Path;
 
 /// A scene that has been read and validated.
 #[derive(Clone)]
@@ -32,6 +38,8 @@ pub struct Scene {
     end: f64,
     step_control: StepControl,
     rows: RowTimes,
+    /// Forces, tables, breaks and resets in one text, to distinguish scenes.
+    additions: String,
     conformal_factor: bool,
     estimate: bool,
     scales: Option<Vec<f64>>,
@@ -43,6 +51,7 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug)]
 struct Spans {
     lagrangian: Span,
+    force: Span,
     start: Span,
     run: Span,
     time: Span,
@@ -86,6 +95,15 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] with the position in the text, or in the override.
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
+        Self::read_in(text, changes, Path::new(""))
+    }
+
+    /// The same for a scene in a folder, to which the paths of its tables are relative; otherwise they are relative to
+    /// the current directory.
+    ///
+    /// # Errors
+    /// Those of [`read_with`](Self::read_with).
+    pub fn read_in(text: &str, changes: &[String], folder: &Path) -> Result<Self, SceneError> {
         check_version(text)?;
         if let Some(lattice) = file::span_of_table(text, "lattice") {
             let message = "a lattice works only with `herglotz run`; the other commands are for systems of up to 16 \
@@ -102,16 +120,22 @@ impl Scene {
         for text_of_change in changes {
             overrides::apply(&mut file, entry, text_of_change)?;
         }
-        let formula = formula(text, &file.system, entry)?;
-        let system = &file.system;
+        let tables = tables::read(text, folder, &file.tables)?;
+        let formula = formula(text, &file.system, entry, &tables)?;
+        let formula = with_forces(text, formula, file.force.as_ref())?;
+        let (system, run) = (&file.system, &file.run);
+        let header = file.start.as_ref().map_or(system.span(), Location::span);
+        let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
+        let end = finite(text, &run.time, "time")?;
+        let breaks = run.breaks.as_deref().map(Vec::as_slice).unwrap_or_default();
+        let breaks = times_in_order(text, breaks, "breaks", (start.t, end))?;
+        let with_breaks = formula.with_breaks(&breaks);
+        let formula = with_breaks.map_err(|error| SceneError::at(text, run.span(), error.to_string()))?;
+        let (formula, resets) = with_resets(text, formula, &file.want.events)?;
         let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
         let lagrangian = system.lagrangian.as_ref().map_or(system.span(), Location::span);
         let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
-        let run = &file.run;
-        let header = file.start.as_ref().map_or(system.span(), Location::span);
-        let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
-        let end = finite(text, &run.time, "time")?;
         let step_control = step_control(text, run)?;
         let by = match step_control {
             StepControl::Accuracy { by, .. } => by,
@@ -121,8 +145,9 @@ impl Scene {
             let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
             runs.check_integrator(by).map_err(refused)?;
         }
-        let constant_rate = runs.structure().has_constant_rate();
-        let events = Events::read(text, (&formula, constant_rate), &file.want.events, (start.t, end))?;
+        let known_factor = runs.structure().has_constant_rate() && !formula.has_conformal_impacts();
+        let of_events = (file.want.events.as_slice(), resets.as_slice());
+        let events = Events::read(text, (&formula, known_factor), of_events, (start.t, end))?;
         let columns = output::columns(text, &formula, file.want.rows.as_ref())?;
         let of_state = output::state_of_event(&formula);
         let of_rows = columns.iter().map(|(name, _)| name);
@@ -138,6 +163,7 @@ impl Scene {
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
             expressions: expressions(&file).cloned().collect(),
+            additions: additions(&file, &tables),
             lagrangian: match (entry, &system.lagrangian) {
                 (Some(entry), _) => entry.lagrangian.to_owned(),
                 (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
@@ -151,6 +177,7 @@ impl Scene {
             text: text.to_owned(),
             spans: Spans {
                 lagrangian,
+                force: file.force.as_ref().map_or(header, Location::span),
                 start: header,
                 run: run.span(),
                 time: run.time.span(),
@@ -185,12 +212,23 @@ impl Scene {
         Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.step_control) }
     }
 
-    /// The columns of events.csv after the name of the event: the state there, and the columns of the events.
+    /// The columns of events.csv after the name of the event: the state there, the columns of the events, and with
+    /// resets the coordinates, velocities and action after a reset.
     pub fn columns_of_events(&self) -> Vec<String> {
-        output::state_of_event(self.system.formula())
-            .into_iter()
-            .chain(self.event_columns.names.iter().cloned())
-            .collect()
+        let mut columns = output::state_of_event(self.system.formula());
+        columns.extend(self.event_columns.names.iter().cloned());
+        if self.has_resets() {
+            let names = self.system.formula().coordinates();
+            let velocities = names.iter().map(|name| velocity_name(name));
+            let state = names.iter().cloned().chain(velocities).chain(["z".to_owned()]);
+            columns.extend(state.map(|name| format!("{name} after")));
+        }
+        columns
+    }
+
+    /// Whether an event changes the state.
+    fn has_resets(&self) -> bool {
+        self.events.iter().any(|(_, event)| event.reset.is_some())
     }
 
     /// The coordinates and the columns of the first event, by name.
@@ -202,12 +240,19 @@ impl Scene {
 
     /// The numbers of a sign change in these columns; `None` in columns of other events.
     pub fn numbers_of_event(&self, crossing: &Crossing) -> Vec<Option<f64>> {
-        let Crossing { t, event, q, v, p, z, columns, .. } = crossing;
+        let Crossing { t, event, q, v, p, z, columns, after, .. } = crossing;
         let of_state = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(Some);
         let EventColumns { names, of_event } = &self.event_columns;
         let own = of_event.get(*event).map(Vec::as_slice).unwrap_or_default();
         let place = |column: usize| own.iter().position(|known| *known == column);
-        of_state.chain((0..names.len()).map(|column| columns.get(place(column)?).copied())).collect()
+        let own = (0..names.len()).map(|column| columns.get(place(column)?).copied());
+        let mut numbers: Vec<Option<f64>> = of_state.chain(own).collect();
+        match after {
+            _ if !self.has_resets() => {}
+            Some(AfterReset { q, v, z, .. }) => numbers.extend(q.iter().chain(v).chain([z]).copied().map(Some)),
+            None => numbers.extend(std::iter::repeat_n(None, 2 * q.len() + 1)),
+        }
+        numbers
     }
 
     /// Whether a column of rows or events is an angle, which figures show from -pi to pi.
@@ -231,12 +276,13 @@ impl Scene {
     /// A text of everything that determines the output, used to distinguish scenes.
     pub fn fingerprint(&self) -> String {
         let events = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal, e.from)).collect::<Vec<_>>();
-        let Scene { start, end, step_control, rows, conformal_factor, expressions, event_columns, .. } = self;
+        let Scene { start, end, step_control, rows, conformal_factor, expressions, event_columns, additions, .. } =
+            self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
         let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
         format!(
-            "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?}"
+            "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?} {additions}"
         )
     }
 
@@ -255,6 +301,7 @@ impl Scene {
                 | E::Unclaimed { .. }
                 | E::Hypothesis { .. }
                 | E::NoTimeTransformation
+                | E::Forced { .. }
                 | E::Stages { .. } => spans.integrator,
                 E::FalseClaim { .. } => spans.lagrangian,
                 E::Times { .. } => spans.rows,
@@ -263,6 +310,7 @@ impl Scene {
                 }
                 _ => spans.run,
             },
+            RuntimeError::ForceUndefined { .. } => spans.force,
             RuntimeError::Length { what: "scales", .. } => spans.scales,
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => spans.start,
             _ => spans.run,
@@ -276,4 +324,19 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
     let columns = file.want.rows.iter().filter_map(|rows| rows.columns.as_ref()).flat_map(|columns| columns.iter());
     let events = file.want.events.iter().flat_map(|event| [&event.when].into_iter().chain(&event.columns));
     columns.chain(events).map(|text| &**text)
+}
+
+/// Forces, tables, breaks and resets in one text.
+fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
+    let pairs = |table: &Option<Location<Named<String>>>| {
+        let all = table.iter().flat_map(|table| &table.0);
+        all.map(|(name, value)| format!("{} = {}", **name, **value)).collect::<Vec<_>>()
+    };
+    let of_event = |event: &EventTable| {
+        let rest = event.rest.as_ref().map(|_| pairs(&event.rest));
+        format!("{:?} {:?} {rest:?}", pairs(&event.then), event.impact.as_deref())
+    };
+    let resets: Vec<String> = file.want.events.iter().map(of_event).collect();
+    let breaks: Vec<f64> = file.run.breaks.iter().flat_map(|breaks| breaks.iter()).map(|t| **t).collect();
+    format!("{:?} {} {breaks:?} {resets:?}", pairs(&file.force), tables::fingerprint(tables))
 }

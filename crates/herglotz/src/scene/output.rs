@@ -62,7 +62,7 @@ impl RowTimes {
                 }
                 Ok(RowTimes::Every(value))
             }
-            (None, Some(times), None) => Self::at(text, times, (t0, end)),
+            (None, Some(times), None) => Ok(RowTimes::At(times_in_order(text, times, "at", (t0, end))?)),
             (None, None, Some(steps)) if **steps == 0 => {
                 Err(SceneError::at(text, steps.span(), "`every_step` is 0; it must be at least 1"))
             }
@@ -71,21 +71,27 @@ impl RowTimes {
             _ => Err(SceneError::at(text, rows.span(), "give only one of `every`, `at` and `every_step`")),
         }
     }
+}
 
-    fn at(text: &str, times: &Location<Vec<Location<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
-        let mut last: Option<f64> = None;
-        for time in times.iter() {
-            let t = within(text, time, "at", (t0, end))?;
-            if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
-                let message = format!(
-                    "the time {t} does not follow the previous time in the direction of the motion; sort the times"
-                );
-                return Err(SceneError::at(text, time.span(), message));
-            }
-            last = Some(t);
+/// Times within the span of a motion, in its direction.
+pub(crate) fn times_in_order(
+    text: &str,
+    times: &[Location<f64>],
+    name: &str,
+    (t0, end): (f64, f64),
+) -> Result<Vec<f64>, SceneError> {
+    let mut last: Option<f64> = None;
+    for time in times {
+        let t = within(text, time, name, (t0, end))?;
+        if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
+            let message = format!(
+                "the time {t} does not follow the previous time in the direction of the motion; sort the times"
+            );
+            return Err(SceneError::at(text, time.span(), message));
         }
-        Ok(RowTimes::At(times.iter().map(|t| **t).collect()))
+        last = Some(t);
     }
+    Ok(times.iter().map(|t| **t).collect())
 }
 
 /// Checks that a time is between the start and the end of a motion.
@@ -168,27 +174,32 @@ pub(crate) struct EventColumns {
 }
 
 impl Events {
-    /// The events of a motion over a time span. `constant_rate` is whether `L_z` is constant.
+    /// The events of a motion over a time span, with the numbers of their resets. `known_factor` is whether the conformal
+    /// factor is known within steps.
     pub fn read(
         text: &str,
-        (formula, constant_rate): (&Formula, bool),
-        tables: &[EventTable],
+        (formula, known_factor): (&Formula, bool),
+        (tables, resets): (&[EventTable], &[Option<usize>]),
         span: (f64, f64),
     ) -> Result<Self, SceneError> {
         let expression = |source: &Location<String>, named: bool| {
             let read = if named { formula.named_expression(source) } else { formula.expression(source) };
             let refused = |error: FormulaError| with_nearest(of_formula(text, source.span(), &error.into()), formula);
             let read = read.map_err(refused)?;
-            if read.has_conformal_factor() && !constant_rate {
-                let message = "`sigma` and `log_factor` are known at events only if L_z is constant; use them in a \
-                               column of rows";
+            if read.has_conformal_factor() && !known_factor {
+                let message = if formula.has_conformal_impacts() {
+                    "`sigma` and `log_factor` are not known at events of a motion with conformal impacts; use them in \
+                     a column of rows"
+                } else {
+                    "`sigma` and `log_factor` are known at events only if L_z is constant; use them in a column of rows"
+                };
                 return Err(SceneError::at(text, source.span(), message));
             }
             Ok(read)
         };
         let mut read = Events { events: Vec::new(), columns: EventColumns::default() };
-        for table in tables {
-            let EventTable { when, direction, terminal, from, columns } = table;
+        for (table, reset) in tables.iter().zip(resets) {
+            let EventTable { when, direction, terminal, from, columns, .. } = table;
             let direction = match direction {
                 DirectionName::Rising => Direction::Rising,
                 DirectionName::Falling => Direction::Falling,
@@ -204,6 +215,7 @@ impl Events {
                 terminal: *terminal,
                 from: from.as_ref().map(|from| within(text, from, "from", span)).transpose()?,
                 columns: own,
+                reset: *reset,
                 ..Event::new(expression(when, false)?)
             };
             read.events.push(((**when).clone(), event));

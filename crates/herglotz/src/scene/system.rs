@@ -4,7 +4,7 @@ use super::SceneError;
 use super::checked::finite;
 use super::file::SystemTable;
 use super::location::Location;
-use crate::runtime::{CatalogueEntry, Formula, FormulaError, RuntimeError, check_parameters};
+use crate::runtime::{CatalogueEntry, Formula, FormulaError, RuntimeError, Table, check_parameters};
 
 /// The entry of the catalogue that a scene names.
 pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
@@ -32,10 +32,12 @@ pub(super) fn formula(
     text: &str,
     system: &Location<SystemTable>,
     entry: Option<&'static CatalogueEntry>,
+    tables: &[(Location<String>, Table)],
 ) -> Result<Formula, SceneError> {
     for (name, value) in &system.parameters.0 {
         finite(text, value, name)?;
     }
+    let of_tables = || tables.iter().map(|(name, _)| name);
     let at_system = |error: FormulaError| SceneError::at(text, system.span(), error.to_string());
     let Some(entry) = entry else {
         let (Some(coordinates), Some(lagrangian)) = (&system.coordinates, &system.lagrangian) else {
@@ -44,7 +46,8 @@ pub(super) fn formula(
         let names: Vec<&str> = coordinates.iter().map(|name| name.as_str()).collect();
         let values: Vec<(&str, f64)> =
             system.parameters.0.iter().map(|(name, value)| (name.as_str(), **value)).collect();
-        return Formula::parse(lagrangian, &names, &values).map_err(|error| match error {
+        let tables: Vec<(&str, Table)> = tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
+        return Formula::parse_with_tables(lagrangian, &names, &values, &tables).map_err(|error| match error {
             FormulaError::Parse(mut error) => {
                 if error.message.starts_with("unknown name") && error.nearest.is_none() {
                     error.message += "; a parameter needs a value in `parameters` of [system]";
@@ -53,7 +56,8 @@ pub(super) fn formula(
             }
             FormulaError::Name { ref name, .. } => {
                 let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
-                let at = coordinates.iter().chain(of_parameters).rfind(|known| ***known == *name).map(Location::span);
+                let known = coordinates.iter().chain(of_parameters).chain(of_tables());
+                let at = known.filter(|known| ***known == *name).last().map(Location::span);
                 SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
             }
             FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),
@@ -61,6 +65,10 @@ pub(super) fn formula(
         });
     };
     let mut formula = entry.formula().map_err(|error| SceneError::at(text, system.span(), error.to_string()))?;
+    for (name, table) in tables {
+        let refused = |error: FormulaError| SceneError::at(text, name.span(), error.to_string());
+        formula = formula.with_table(name, table).map_err(refused)?;
+    }
     for (name, value) in &system.parameters.0 {
         let known = || entry.parameters.iter().map(|(parameter, _)| *parameter);
         if let Err(error) = formula.set(name, **value) {

@@ -88,6 +88,7 @@ impl<'a> SparseGauss<'a> {
             return Err(InputError::Step { h }.into());
         }
         start.check(system)?;
+        system.check_frictionless("`SparseGauss`")?;
         let general = !system.general_terms.is_empty();
         if general && start.z.is_none() {
             return Err(SparseError::NoAction);

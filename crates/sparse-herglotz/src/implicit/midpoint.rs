@@ -103,6 +103,7 @@ impl<'a> SparseMidpoint<'a> {
         }
         start.check(system)?;
         system.check_separable()?;
+        system.check_frictionless("`SparseMidpoint`")?;
         system.check_masses(MassSource::Diagonal)?;
         SparseSystem::check_number("gamma", system.rate(start.t))?;
         let half = 0.5 * h * system.rate(start.t + 0.5 * h);

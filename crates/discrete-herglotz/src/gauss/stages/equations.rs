@@ -3,13 +3,14 @@
 //! [`PositionNewton`](crate::gauss::stages::position_newton::PositionNewton) has fewer unknowns.
 
 use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
+use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::solve::mass_matrix::BLOCK;
 use crate::{StepError, solve::ITERATION_LIMIT};
-use contact_geom::nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{
     ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan,
     support::seed,
@@ -34,6 +35,11 @@ impl Products {
 }
 
 impl Products {
+    /// The time `c_j h` of a stage, from the start of the step.
+    pub fn time(&self, j: usize) -> f64 {
+        self.c[j]
+    }
+
     /// The quadrature weight `b_j` of a stage.
     pub fn weight(&self, j: usize) -> f64 {
         self.b[j] / self.h
@@ -109,6 +115,9 @@ pub(crate) struct StageValue<const N: usize, T> {
     pub l: Dual<T, ChartVector<N, T>>,
     pub force: SVector<T, N>,
 }
+
+/// The unknowns of solved stages over a scalar with derivatives, with L and its gradient there.
+pub(crate) type LiftedStages<const N: usize, T> = (StageUnknowns<N, T>, Vec<StageValue<N, T>>);
 
 /// The workspace of Newton's method; made once for a run, so that steps do not allocate.
 pub(crate) struct Workspace<const N: usize> {
@@ -224,29 +233,6 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The derivatives of `L_q + f` in q, v and z, from those of `L_q`.
-    #[inline(always)]
-    fn force_derivatives(
-        &self,
-        t: f64,
-        y: &VelocityPoint<N>,
-        (qq, qv, qz): (&SMatrix<f64, N, N>, &SMatrix<f64, N, N>, &SVector<f64, N>),
-    ) -> (SMatrix<f64, N, N>, SMatrix<f64, N, N>, SVector<f64, N>) {
-        let (mut of_q, mut of_v, mut of_z) = (*qq, *qv, *qz);
-        if const { L::HINTS.forced } {
-            let y: VelocityPoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*y)).into();
-            let force = self.lagrangian.applied_force(Dual::constant(t), &y);
-            for d in 0..N {
-                for e in 0..N {
-                    of_q[(d, e)] += force[d].d.x[e];
-                    of_v[(d, e)] += force[d].d.y[e];
-                }
-                of_z[d] += force[d].d.z;
-            }
-        }
-        (of_q, of_v, of_z)
-    }
-
     /// The Jacobian of the residuals.
     pub fn jacobian(
         &self,
@@ -263,7 +249,11 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
             let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g, force) = (x.rho[k], &l[k].l.d, &l[k].force);
-            let (force_q, force_v, force_z) = self.force_derivatives(self.t + c[k], &y, (qq, qv, qz));
+            // The derivatives of L_q + f.
+            let (mut force_q, mut force_v, mut force_z) = (*qq, *qv, *qz);
+            if let Some(applied) = AppliedForce::of(self.lagrangian, self.t + c[k], &y) {
+                (force_q, force_v, force_z) = (force_q + applied.q, force_v + applied.v, force_z + applied.z);
+            }
             let weights: [f64; MAX_STAGES] = from_fn(|i| a[i][k]);
             // The contribution of stage k to the equations of stage i through its velocity, action and factor.
             for i in 0..s {
@@ -440,17 +430,31 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The end of the step over a scalar with derivatives, from the solution over `f64`: each correction by the inverse
-    /// Jacobian determines one more order of derivatives.
+    /// The end of the step over a scalar with derivatives, from the solution over `f64`.
     ///
     /// # Errors
-    /// [`StepError::Singular`], [`StepError::NotConverged`].
+    /// Those of [`lifted`](Self::lifted).
     pub fn lifted_end<T: Scalar>(
         &self,
         given: &Given<N, T>,
         plain: &Given<N, f64>,
         work: &mut Workspace<N>,
     ) -> Result<StepEnd<N, T>, StepError> {
+        let (x, l) = self.lifted(given, plain, work)?;
+        Ok(self.end(given, &x, &l))
+    }
+
+    /// The solved stages over a scalar with derivatives, from the solution over `f64`: each correction by the inverse
+    /// Jacobian determines one more order of derivatives.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`], [`StepError::NotConverged`].
+    pub fn lifted<T: Scalar>(
+        &self,
+        given: &Given<N, T>,
+        plain: &Given<N, f64>,
+        work: &mut Workspace<N>,
+    ) -> Result<LiftedStages<N, T>, StepError> {
         let n = self.unknowns(plain);
         self.jacobian(plain, &work.x, &work.l, &mut work.jacobian);
         let inverse = inverse(&work.jacobian).ok_or(StepError::Singular { pivot: 0.0 })?;
@@ -468,7 +472,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             // Apart from round-off the iteration is finite.
             if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
                 self.stages(given, &x, &mut l);
-                return Ok(self.end(given, &x, &l));
+                return Ok((x, l));
             }
             before = size;
         }

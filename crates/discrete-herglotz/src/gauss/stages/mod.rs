@@ -1,6 +1,7 @@
 //! The stages of a collocation step: their values in SIMD registers, their equations, and the iterations that solve
 //! them.
 
+pub(crate) mod applied_force;
 pub(crate) mod damping;
 pub(crate) mod equations;
 pub(crate) mod fixed_point;

@@ -6,6 +6,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::modes::Modes;
 use crate::gauss::tables::stage_table::StageTable;
@@ -119,6 +120,9 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
 ///
 /// `(W + mu (L_vq - L_qv) - mu^2 L_qq) dV + (L_vz - mu L_qz) dZ + (L_v - mu L_q) drho = r_V`,
 /// `dZ - mu ((L_v + mu L_q) dV + L_z dZ) = r_Z`, `drho + mu ((L_vz + mu L_qz) dV + L_zz dZ + L_z drho) = r_rho`.
+///
+/// With an applied force f, `L_q + f` and its derivatives are in the place of `L_q` and its derivatives in the first
+/// equation.
 pub(crate) struct StageNewton<const N: usize> {
     modes: &'static Modes,
     h: f64,
@@ -141,18 +145,29 @@ struct Block<const N: usize> {
 
 impl<const N: usize> Block<N> {
     /// `None` if the matrix is singular.
-    fn new(mu: Complex<f64>, g: &ChartVector<N>, hessian: &Hessian<N>) -> Option<Self> {
+    fn new(
+        mu: Complex<f64>,
+        g: &ChartVector<N>,
+        hessian: &Hessian<N>,
+        applied: Option<&AppliedForce<N>>,
+    ) -> Option<Self> {
         let Hessian { qq, qv, vv, qz, vz, zz } = hessian;
         let with = |at: &SVector<f64, N>, slope: &SVector<f64, N>, factor: Complex<f64>| {
             Vector::<N>::from_fn(|d, _| factor * slope[d] + at[d])
         };
         let (z, rho) = ((-mu * g.z + 1.0).inv(), (mu * g.z + 1.0).inv());
         let (z_v, rho_v) = (with(&g.y, &g.x, mu) * mu, with(vz, qz, mu) * mu);
-        let (of_z, of_rho, rho_z) = (with(vz, qz, -mu), with(&g.y, &g.x, -mu), mu * *zz);
+        let (mut of_z, mut of_rho, rho_z) = (with(vz, qz, -mu), with(&g.y, &g.x, -mu), mu * *zz);
+        if let Some(applied) = applied {
+            (of_z, of_rho) = (of_z - applied.z.map(|e| mu * e), of_rho - applied.value.map(|e| mu * e));
+        }
         let (z_of_v, rho_of_v) = (z_v * z, (rho_v + z_v * (rho_z * z)) * rho);
         // Entry by entry, to save stack space.
         let mut inverse = Matrix::<N>::from_fn(|d, e| {
-            let own = mu * (qv[(e, d)] - qv[(d, e)]) - mu * mu * qq[(d, e)] + vv[(d, e)];
+            let mut own = mu * (qv[(e, d)] - qv[(d, e)]) - mu * mu * qq[(d, e)] + vv[(d, e)];
+            if let Some(applied) = applied {
+                own -= mu * applied.v[(d, e)] + mu * mu * applied.q[(d, e)];
+            }
             own + of_z[d] * z_of_v[e] - of_rho[d] * rho_of_v[e]
         });
         invert(&mut inverse).then_some(Block { inverse, z, z_v, rho, rho_v, rho_z, of_z, of_rho })
@@ -175,11 +190,17 @@ impl<const N: usize> StageNewton<N> {
         StageNewton { modes, h: table.h, blocks: Vec::with_capacity(modes.iter().count()) }
     }
 
-    /// Factorises the equations of the modes with new derivatives of L; `false` if one of the matrices is singular.
-    pub fn factorise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
+    /// Factorises the equations of the modes with new derivatives of L and of the applied force; `false` if one of the
+    /// matrices is singular.
+    pub fn factorise(
+        &mut self,
+        gradient: &ChartVector<N>,
+        hessian: &Hessian<N>,
+        applied: Option<&AppliedForce<N>>,
+    ) -> bool {
         self.blocks.clear();
         for mode in self.modes.iter() {
-            match Block::new(mode.value * self.h, gradient, hessian) {
+            match Block::new(mode.value * self.h, gradient, hessian, applied) {
                 Some(block) => self.blocks.push(block),
                 None => return false,
             }

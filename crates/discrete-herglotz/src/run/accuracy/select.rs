@@ -1,6 +1,7 @@
 //! The selection of the integrator and of the number of steps for a requested error.
 
 use crate::gauss::MAX_STAGES;
+use crate::integration::is_separable;
 use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
 use crate::run::accuracy::divided::divided_steps;
 use crate::run::accuracy::first_guess::first_guess;
@@ -22,7 +23,7 @@ use std::sync::Arc;
 /// expensive, for many steps of few stages the number of steps.
 fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, wanted: f64) -> usize {
     let structure = &request.problem.structure;
-    let condensed = structure.separable && structure.has_constant_rate();
+    let condensed = is_separable(request.problem.lagrangian, structure) && structure.has_constant_rate();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
     if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MIN_STEPS_FOR_MAX_STAGES {
         MAX_STAGES
@@ -142,7 +143,7 @@ fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
     // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
     // does not predict.
     let structure = &trials.request.problem.structure;
-    let longer = structure.separable && structure.has_constant_rate();
+    let longer = is_separable(trials.request.problem.lagrangian, structure) && structure.has_constant_rate();
     let (count, error) = min_step_count(stages, wanted, &found, longer);
     Ok(selected(trials, integrator, count, error, &found))
 }

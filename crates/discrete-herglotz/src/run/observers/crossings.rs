@@ -3,46 +3,22 @@
 use crate::StepError;
 use crate::run::motion::{Motion, NearbyVelocity};
 use crate::run::observers::event::{Crossing, Event};
+use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
 use crate::run::observers::last_step::LastStep;
-use crate::run::observers::last_step::TaylorPolynomial;
 use crate::run::observers::output_request::RunInfo;
-use crate::solve::roots::{bracketed_root, bracketed_root_within};
+use crate::solve::chebyshev::{Samples, node};
+use crate::solve::sign_changes::{Scale, Separation, Separator, has_no_zero, separate};
 use contact_geom::PhasePoint;
-
-/// The relative round-off of a time and of a state, from the sums of a step, the iteration that solves it, and the root
-/// search.
-const RELATIVE_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 
 /// The value of an event function, relative to its size in the step, below which the function may be on its surface g =
 /// 0, or may have different signs on the motion and on the interpolant.
 const MAX_NEAR_VALUE: f64 = 0.01;
-
-/// The tolerance of the root of the interpolant between two points, as a fraction of their distance: smaller than the
-/// error of the interpolant, so that the first state of the motion is computed as near to the root as it can be.
-const ROOT_TOLERANCE: f64 = 1e-9;
-
-/// The distance over which the slope of the interpolant is computed, as a fraction of the distance of the two points.
-const SLOPE_DISTANCE: f64 = 1e-3;
-
-/// The smallest distance of two iterates, in units of [`SLOPE_DISTANCE`], whose secant replaces the slope of the
-/// interpolant: below it the round-off of the function dominates the secant.
-const MIN_SECANT_DISTANCE: f64 = 0.1;
-
-/// The largest distance of two iterates, in units of [`SLOPE_DISTANCE`], that may be due to round-off, if the function
-/// does not decrease by more than [`MIN_DECREASE`].
-const MAX_ROUND_OFF_DISTANCE: f64 = 0.01;
-
-/// The ratio of two values of the function above which it does not decrease.
-const MIN_DECREASE: f64 = 0.25;
 
 /// The assumed number of steps of a run whose number of steps is not known.
 const DEFAULT_COUNT: f64 = 64.0;
 
 /// The largest time scale of the round-off of times, in steps: for long runs it stays far below a step.
 const MAX_SPAN_IN_STEPS: f64 = 4096.0;
-
-/// The largest number of corrections of a root; after these the root is bracketed on the motion itself.
-const MAX_CORRECTIONS: usize = 6;
 
 /// The function of an event at the last point of evaluation.
 #[derive(Clone, Copy)]
@@ -73,13 +49,14 @@ enum Change<const N: usize> {
     Between([f64; 2]),
 }
 
-/// The settings of the search over the parts of a step.
+/// The settings of the search along a step.
 #[derive(Clone, Copy)]
-struct Scan<'s, const N: usize> {
-    /// Interpolated states between the parts. States of the motion are used if there are none, or where the function is
-    /// smaller than `near`.
-    interpolated: Option<&'s [PhasePoint<N>]>,
-    parts: usize,
+struct Scan<'s> {
+    /// The points that separate the sign changes.
+    points: &'s [Separator],
+    separation: Separation,
+    /// Whether states of the motion are used at all points, or only where the function is smaller than `near`.
+    on_motion: bool,
     near: f64,
     /// Where the function leaves its surface after the end of the step, if the end is on it.
     departure: Option<Departure>,
@@ -116,68 +93,100 @@ pub(crate) struct ScaledMotion<'r, const N: usize> {
 }
 
 impl<const N: usize> Event<'_, N> {
-    /// Finds the sign changes in a step, given interpolated states in it.
+    /// Finds the sign changes in a step, given interpolated states at its nodes. `points` is a workspace.
     pub(crate) fn in_step(
         &mut self,
         index: usize,
         (step, motion): (&mut LastStep<'_, N>, ScaledMotion<'_, N>),
-        interpolated: &[PhasePoint<N>],
+        (interpolated, points): (&[PhasePoint<N>], &mut Vec<Separator>),
         last_sign: &mut LastSign<N>,
         found: &mut Vec<Crossing<N>>,
     ) -> Result<(), StepError> {
-        let ((_, end), parts) = (step.ends(), interpolated.len() + 1);
+        let ((start, end), degree) = (step.ends(), interpolated.len() + 1);
         let value = self.value(end.0, &end.1);
-        let (mut quiet, mut size) = (value * last_sign.sign > 0.0, last_sign.value.abs());
-        for (k, x) in (1..parts).zip(interpolated) {
-            // Interpolated states may leave the domain of the function although the motion does not.
-            let there = self.value(step.time(k as f64 / parts as f64), x);
-            quiet &= there * last_sign.sign > 0.0;
-            size = size.max(there.abs());
-        }
+        let mut samples = Samples::new(degree, |j| match interpolated.get(j.wrapping_sub(1)) {
+            Some(x) => self.value(step.time(node(degree, j)), x),
+            None if j == 0 => last_sign.value,
+            None => value,
+        });
+        let size = samples.size();
+        let near = MAX_NEAR_VALUE * size;
         // The end may be on the surface if the value is below a hundredth of its size in the step.
-        let departure = if value.abs() < MAX_NEAR_VALUE * size {
-            self.departure_from(motion, (end.0, &end.1), value)
-        } else {
-            None
+        let departure = if value.abs() < near { self.departure_from(motion, (end.0, &end.1), value) } else { None };
+        let keeps_sign = value * last_sign.sign > 0.0 && last_sign.zero.is_none() && departure.is_none();
+        if keeps_sign && has_no_zero(&samples, near) {
+            (last_sign.value, last_sign.departure) = (value, None);
+            return Ok(());
+        }
+        let noise = self.noise((start.0, &start.1), last_sign.value).min(self.noise((end.0, &end.1), value));
+        let scale = Scale { size, near, noise: noise + RELATIVE_ROUND_OFF * size };
+        // Interpolated states may leave the domain of the function although the motion does not.
+        let mut on_motion = !samples.is_finite();
+        let separation = loop {
+            if on_motion {
+                samples = Samples::new(degree, |j| match j {
+                    0 => last_sign.value,
+                    _ if j == degree => value,
+                    _ => self.on_motion(step, node(degree, j)),
+                });
+            }
+            let along = |fraction: f64| match on_motion {
+                true => self.on_motion(step, fraction),
+                false => self.on_interpolant(step, fraction).unwrap_or(f64::NAN),
+            };
+            match separate(&samples, scale, along, points) {
+                Separation::Undefined if !on_motion => on_motion = true,
+                separation => break separation,
+            }
         };
-        if quiet && last_sign.zero.is_none() && departure.is_none() {
+        if keeps_sign && separation == Separation::Complete && points.is_empty() {
             (last_sign.value, last_sign.departure) = (value, None);
             return Ok(());
         }
         let (before, count) = (*last_sign, found.len());
-        let scan = Scan { interpolated: Some(interpolated), parts, near: MAX_NEAR_VALUE * size, departure };
+        let scan = Scan { points, separation, on_motion, near, departure };
         if !self.scan(index, step, scan, last_sign, found)? {
             (*last_sign, _) = (before, found.truncate(count));
-            self.scan(index, step, Scan { interpolated: None, ..scan }, last_sign, found)?;
+            self.scan(index, step, Scan { on_motion: true, ..scan }, last_sign, found)?;
         }
         last_sign.departure = departure;
         Ok(())
     }
 
-    /// Finds the sign changes between the parts of a step; `false` if the interpolated states show one that the motion
+    /// Finds the sign changes between the points of a step; `false` if the interpolated states show one that the motion
     /// does not have.
     fn scan(
         &mut self,
         index: usize,
         step: &mut LastStep<'_, N>,
-        Scan { interpolated, parts, near, departure }: Scan<'_, N>,
+        Scan { points, separation, on_motion, near, departure }: Scan<'_>,
         last_sign: &mut LastSign<N>,
         found: &mut Vec<Crossing<N>>,
     ) -> Result<bool, StepError> {
         let (start, end) = step.ends();
-        for k in 1..=parts {
-            let tau = k as f64 / parts as f64;
-            let interpolated_point =
-                interpolated.and_then(|interpolated| interpolated.get(k - 1)).map(|x| (step.time(tau), *x));
-            let interpolated_point =
-                interpolated_point.filter(|(t, x)| (near..=f64::MAX).contains(&self.value(*t, x).abs()));
-            let (t, state) = match interpolated_point {
-                _ if k == parts => end,
-                Some(interpolated_point) => interpolated_point,
+        let unresolved = match separation {
+            Separation::Unresolved(from) => Some(StepError::EventUnresolved { t: step.time(from) }),
+            _ => None,
+        };
+        let mut from = 0.0;
+        let at_end = unresolved.is_none().then_some((1.0, false));
+        for (tau, is_touch) in points.iter().map(|point| (point.fraction, point.is_touch)).chain(at_end) {
+            let is_end = tau == 1.0;
+            let interpolated = match is_end || on_motion {
+                true => None,
+                false => Some((step.time(tau), step.interpolate(tau)?)),
+            };
+            let interpolated = interpolated.filter(|(t, x)| (near..=f64::MAX).contains(&self.value(*t, x).abs()));
+            let (t, state) = match interpolated {
+                _ if is_end => end,
+                Some(interpolated) => interpolated,
                 None => (step.time(tau), step.at(step.time(tau))?),
             };
             let value = self.value(t, &state);
-            let mut from = (k - 1) as f64 / parts as f64;
+            if is_touch && value.abs() <= self.rounding(t, &state, value) {
+                // It touches zero up to round-off.
+                continue;
+            }
             if let Some(Departure { t, value: there }) = last_sign.departure {
                 let fraction = (t - start.0) / (end.0 - start.0);
                 if fraction >= tau {
@@ -186,137 +195,33 @@ impl<const N: usize> Event<'_, N> {
                 }
                 (from, last_sign.value, last_sign.departure) = (fraction, there, None);
             }
+            let ends = [std::mem::replace(&mut from, tau), tau];
             if !value.is_finite() {
-                found.extend(self.before_its_domain_ends(step, [from, tau], last_sign)?.map(|(t, state)| Crossing {
-                    t,
-                    event: index,
-                    state,
-                }));
+                let before = self.before_its_domain_ends(step, ends, last_sign)?;
+                found.extend(before.map(|(t, state)| Crossing { t, event: index, state }));
                 return Err(StepError::Event { t });
             }
-            let side = if k == parts { departure.map_or(value, |departure| departure.value) } else { value };
+            let side = if is_end { departure.map_or(value, |departure| departure.value) } else { value };
             match self.between(last_sign, [value, side], (t, &state)) {
                 Change::None => {}
                 Change::There(t, state) => found.push(Crossing { t, event: index, state }),
                 Change::Between(values) => {
-                    let root = match interpolated {
-                        Some(_) => self.root_by_newton(step, [from, tau])?,
-                        None => Some(self.root(step, [from, tau], values)?),
+                    let root = match on_motion {
+                        false => self.root_by_newton(step, ends)?,
+                        true => Some(self.root(step, ends, values)?),
                     };
                     let Some((t, state)) = root else { return Ok(false) };
                     found.push(Crossing { t, event: index, state });
                 }
             }
         }
-        Ok(true)
+        unresolved.map_or(Ok(true), Err)
     }
 
-    /// The root between two points of a step at which the function has opposite signs, to round-off.
-    fn root(
-        &mut self,
-        step: &LastStep<'_, N>,
-        ends: [f64; 2],
-        values: [f64; 2],
-    ) -> Result<(f64, PhasePoint<N>), StepError> {
-        let tau = bracketed_root(ends, values, |tau| self.at(step.time(tau), &step.at(step.time(tau))?))?;
-        Ok((step.time(tau), step.at(step.time(tau))?))
-    }
-
-    /// The same root by Newton's method, which starts from the root of the interpolant and uses its slope: two states
-    /// of the motion are enough if the step resolves the motion. `None` if the iteration does not converge, as when the
-    /// function jumps.
-    fn root_by_newton(
-        &mut self,
-        step: &mut LastStep<'_, N>,
-        [a, b]: [f64; 2],
-    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
-        let mut interpolant = |tau: f64| step.interpolate(tau).map(|x| self.value(step.time(tau), &x));
-        let ends = [interpolant(a)?, interpolant(b)?];
-        // Written so that a NaN is not a sign change.
-        let brackets = ends[0] * ends[1] < 0.0;
-        if !brackets {
-            return Ok(None);
-        }
-        let mut tau = bracketed_root_within(ROOT_TOLERANCE * (b - a), [a, b], ends, &mut interpolant)?;
-        let distance = SLOPE_DISTANCE * (b - a);
-        let (lower, upper) = ((tau - distance).max(0.0), (tau + distance).min(1.0));
-        let mut slope = (interpolant(upper)? - interpolant(lower)?) / (upper - lower);
-        let mut last: Option<(f64, f64, (f64, PhasePoint<N>))> = None;
-        for _ in 0..MAX_CORRECTIONS {
-            let at = (step.time(tau), step.at(step.time(tau))?);
-            let g = self.value(at.0, &at.1);
-            if let Some((before, g_before, _)) = last
-                && (tau - before).abs() > MIN_SECANT_DISTANCE * distance
-            {
-                slope = (g - g_before) / (tau - before);
-            }
-            let change = g / slope;
-            // With a slope that overflows any point would pass as a root.
-            if !(slope.is_finite() && change.is_finite()) {
-                return Ok(None);
-            }
-            if change.abs() <= 0.5 * RELATIVE_ROUND_OFF {
-                return Ok(Some(at));
-            }
-            if change.abs() <= TaylorPolynomial::<N>::MAX_DISTANCE
-                && let Some(found) = self.root_by_taylor(step, (tau, &at.1), slope, change)?
-            {
-                return Ok(Some(found));
-            }
-            // This close to two states the motion is linear to round-off, and the line through them replaces another
-            // correction.
-            if let Some((before, _, (_, from))) = last
-                && let gap = tau - before
-                && (change * gap).abs() <= f64::EPSILON / 16.0
-                && change * change < 0.5 * RELATIVE_ROUND_OFF * gap.abs()
-            {
-                let part = -change / gap;
-                let (q, p) = (at.1.q + (at.1.q - from.q) * part, at.1.p + (at.1.p - from.p) * part);
-                let state = PhasePoint { q, p, z: at.1.z + (at.1.z - from.z) * part };
-                return Ok(Some((step.time(tau - change), state)));
-            }
-            // If two iterates differ by round-off only, the one with the smaller value is taken.
-            if let Some((_, g_before, before)) = last
-                && g.abs() > MIN_DECREASE * g_before.abs()
-                && change.abs() <= MAX_ROUND_OFF_DISTANCE * distance
-            {
-                return Ok(Some(if g.abs() < g_before.abs() { at } else { before }));
-            }
-            last = Some((tau, g, at));
-            tau -= change;
-            if !(a - distance..=b + distance).contains(&tau) || !(0.0..=1.0).contains(&tau) {
-                return Ok(None);
-            }
-        }
-        Ok(None)
-    }
-
-    /// The root near a state of the motion, by the Taylor polynomial about that state, if the correction is so small
-    /// that no second state is needed.
-    fn root_by_taylor(
-        &mut self,
-        step: &mut LastStep<'_, N>,
-        (tau, state): (f64, &PhasePoint<N>),
-        slope: f64,
-        mut ahead: f64,
-    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
-        let Some(polynomial) = step.taylor_polynomial(tau, state)? else { return Ok(None) };
-        ahead = -ahead;
-        for _ in 0..MAX_CORRECTIONS {
-            let (t, there) = (step.time(tau + ahead), polynomial.at(ahead));
-            let change = self.value(t, &there) / slope;
-            if change.abs() <= 0.5 * RELATIVE_ROUND_OFF {
-                return Ok(Some((t, there)));
-            }
-            ahead -= change;
-            // Written so that a NaN is out of range.
-            let within =
-                ahead.abs() <= 2.0 * TaylorPolynomial::<N>::MAX_DISTANCE && (0.0..=1.0).contains(&(tau + ahead));
-            if !within {
-                return Ok(None);
-            }
-        }
-        Ok(None)
+    /// The value on the motion at a fraction of a step; NaN where the motion is not defined.
+    fn on_motion(&mut self, step: &LastStep<'_, N>, fraction: f64) -> f64 {
+        let t = step.time(fraction);
+        step.at(t).map_or(f64::NAN, |x| self.value(t, &x))
     }
 
     /// The sign change that counts between the last point and a point at which the function is not defined, if there is
@@ -415,6 +320,23 @@ impl<const N: usize> Event<'_, N> {
         let (x, _) = motion.state_within_step(&(t, *state), there, near, None).ok()?;
         let value = self.value(there, &x);
         value.is_finite().then_some(Departure { t: there, value })
+    }
+
+    /// The effect of the round-off of the time and of the coordinates on the function, each rounded relative to itself.
+    fn noise(&mut self, (t, state): (f64, &PhasePoint<N>), g: f64) -> f64 {
+        let factor = 1.0 + RELATIVE_ROUND_OFF;
+        let mut change =
+            |t: f64, x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
+        let mut sum = change(t * factor, *state) + change(t, PhasePoint { z: state.z * factor, ..*state });
+        for i in 0..N {
+            let mut rounded = *state;
+            rounded.q[i] *= factor;
+            sum += change(t, rounded);
+            rounded = *state;
+            rounded.p[i] *= factor;
+            sum += change(t, rounded);
+        }
+        sum
     }
 
     /// The effect of the round-off of a state on the function, with q, p and z each rounded relative to its own size.

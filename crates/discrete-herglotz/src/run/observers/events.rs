@@ -3,18 +3,24 @@
 use crate::run::observers::crossings::{LastSign, ScaledMotion, TimeScales};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
+use crate::solve::sign_changes::Separator;
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use std::ops::ControlFlow;
 
 /// Locates events along a run, each to the round-off of the time, for any integrator.
 ///
-/// Within a step the functions are evaluated at a few points of an interpolant: at the ends of `s + 2` parts for a
-/// Gauss step with s stages, of four parts for other methods. If a function has different signs at neighbouring points,
-/// the sign change is located on states as accurate as those of the run, which are computed by steps of the same
-/// integrator that end there; two such steps are enough if the step resolves the motion. Two sign changes within one
-/// part are missed, so a function that varies faster than the motion needs shorter steps. A zero without a sign change
-/// is missed too. A function value that is not finite ends the run.
+/// All sign changes within a step are found. The functions are evaluated on an interpolant of the motion, at the
+/// Chebyshev-Lobatto nodes of the step: `s + 3` nodes, from 5 to 17, for a Gauss step with s stages, 5 for other
+/// methods. The Chebyshev coefficients of a function usually prove that it has no zero in the step. Otherwise the step
+/// is divided until the sign changes are separated. Each is located on states as accurate as those of the run, which
+/// are computed by steps of the same integrator that end there; two such steps are enough if the step resolves the
+/// motion.
+///
+/// The function should be smooth along the motion; kinks and jumps are found by bisection. If it varies so fast that
+/// the sign changes within a step cannot be told apart, the run ends with [`StepError::EventUnresolved`]. What no
+/// evaluation shows is missed: a pulse that is much narrower than the distance of the nodes. A zero without a sign
+/// change is missed too. A function value that is not finite ends the run.
 ///
 /// An event is a sign change along the motion. It is counted once, and if a run continues another one, in exactly one
 /// of the two:
@@ -51,6 +57,8 @@ pub struct Events<'f, const N: usize> {
     scales: TimeScales,
     /// Interpolated states within the last step.
     interpolated: Vec<PhasePoint<N>>,
+    /// Points that separate the sign changes of a function.
+    points: Vec<Separator>,
     /// The time at the end of the last step, and the time derivatives of the state there if they were computed: they
     /// are those at the start of the next step.
     rates: Option<(f64, PhasePoint<N>)>,
@@ -60,7 +68,7 @@ impl<'f, const N: usize> Events<'f, N> {
     /// An observer of these events; crossings refer to them by their index.
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
-        let (crossings, last_signs, interpolated) = (Vec::new(), Vec::new(), Vec::new());
+        let (crossings, last_signs, interpolated, points) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Events {
             crossings,
             events,
@@ -68,6 +76,7 @@ impl<'f, const N: usize> Events<'f, N> {
             last_signs,
             scales: TimeScales::of(&RunInfo::NONE),
             interpolated,
+            points,
             rates: None,
         }
     }
@@ -90,15 +99,16 @@ impl<'f, const N: usize> Events<'f, N> {
         let backward = step.span().1 < step.span().0;
         let before = |a: f64, b: f64| if backward { a > b } else { a < b };
         for (index, (event, last_sign)) in self.events.iter_mut().zip(&mut self.last_signs).enumerate() {
-            if let Err(error) = event.in_step(index, (step, motion), &self.interpolated, last_sign, &mut found) {
-                cause = match (cause, error) {
-                    (Some(StepError::Event { t: first }), StepError::Event { t }) if !before(t, first) => cause,
+            let workspace = (self.interpolated.as_slice(), &mut self.points);
+            if let Err(error) = event.in_step(index, (step, motion), workspace, last_sign, &mut found) {
+                cause = match (cause.and_then(time_of), time_of(error)) {
+                    (Some(first), Some(t)) if !before(t, first) => cause,
                     _ => Some(error),
                 };
             }
         }
-        if let Some(StepError::Event { t }) = cause {
-            // Only the crossings before the time at which a function is not defined.
+        if let Some(t) = cause.and_then(time_of) {
+            // Only the crossings before the time at which a function is not defined or not resolved.
             found.retain(|crossing| !before(t, crossing.t));
         }
         found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
@@ -169,6 +179,14 @@ impl<'f, const N: usize> Events<'f, N> {
             Some(cause) => ControlFlow::Break(Stop::failed(cause)),
             None => ControlFlow::Continue(()),
         }
+    }
+}
+
+/// The time of an error of an event.
+fn time_of(error: StepError) -> Option<f64> {
+    match error {
+        StepError::Event { t } | StepError::EventUnresolved { t } => Some(t),
+        _ => None,
     }
 }
 

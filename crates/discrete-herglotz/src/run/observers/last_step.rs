@@ -2,13 +2,14 @@
 
 use crate::integration::Piece;
 use crate::run::motion::Motion;
+use crate::solve::chebyshev::node;
 use crate::{DenseStep, StepError, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
-/// The number of parts into which a search along a step divides it, if the method has no dense output: the cubic
-/// interpolant through both ends has at most three sign changes.
-const INTERPOLATED_PARTS: usize = 4;
+/// The degree of interpolation of a function along a step, if the method has no dense output: larger by one than that
+/// of the cubic curve through both ends.
+const SAMPLING_DEGREE: usize = 4;
 
 /// The distance, as a fraction of a step, over which the curvature of the interpolant is computed.
 const CURVATURE_DISTANCE: f64 = 1e-3;
@@ -127,15 +128,16 @@ impl<'r, const N: usize> LastStep<'r, N> {
         self.rates[1]
     }
 
-    /// Interpolated states at the ends of the parts in which a search along the step evaluates it; no step is taken.
+    /// Interpolated states at the Chebyshev-Lobatto nodes between the ends of the step, at which a search along it
+    /// first evaluates a function; no step is taken.
     pub(crate) fn interpolated_states(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
         to.clear();
         if let Some(curve) = self.curve() {
-            curve.states_between_parts(to);
+            curve.states_at_nodes(to);
             return Ok(());
         }
-        for k in 1..INTERPOLATED_PARTS {
-            to.push(self.interpolate(k as f64 / INTERPOLATED_PARTS as f64)?);
+        for j in 1..SAMPLING_DEGREE {
+            to.push(self.interpolate(node(SAMPLING_DEGREE, j))?);
         }
         Ok(())
     }

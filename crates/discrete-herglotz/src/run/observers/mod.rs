@@ -5,6 +5,7 @@ pub(crate) mod crossings;
 #[cfg(feature = "csv")]
 pub(crate) mod csv_rows;
 pub(crate) mod event;
+pub(crate) mod event_roots;
 pub(crate) mod events;
 pub(crate) mod interruption;
 pub(crate) mod last_step;

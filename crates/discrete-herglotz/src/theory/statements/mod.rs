@@ -1,5 +1,5 @@
 //! Section 3 of the paper as residuals: each statement is evaluated for a discrete Lagrangian at a point, relative to
-//! the size of its terms.
+//! the size of its terms. The statements on forces are beyond the paper.
 //!
 //! The residual of a true statement is round-off times the condition numbers of the matrices involved. The tolerances
 //! belong to the tests that call this module.
@@ -8,6 +8,7 @@
 #![deny(clippy::disallowed_methods)]
 
 mod flow;
+mod forces;
 mod forms;
 mod measures;
 mod paths;
@@ -19,6 +20,7 @@ use flow::{
     both_local_diffeomorphisms, discrete_flow_is_conformal, flow_exists, hamiltonian_flow_is_conformal,
     momentum_matching, sigma_is_positive, three_expressions,
 };
+pub use forces::{FORCED_STATEMENTS, forced_residual};
 use forms::{contact_forms, forms_are_related, reeb, volume};
 use paths::{action_differential, principle, two_steps};
 use symmetries::momentum_is_dissipated;

@@ -2,12 +2,16 @@
 
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
-use crate::runtime::{Check, Interrupt, MomentumSample, Motion, RuntimeError, Sample, StatementResidual, StepControl};
+use crate::runtime::{
+    Check, Interrupt, MomentumSample, Motion, NotContact, RuntimeError, Sample, StatementResidual, StepControl,
+};
 use contact_geom::{
-    ChartVector, Lagrangian, OneParameterGroup, PhasePoint,
+    ChartVector, Lagrangian, OneParameterGroup, PhasePoint, Statement,
     numbers::{max_abs_or_nan, max_or_nan},
 };
-use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, theory::legendre_inverse,
+};
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
 
@@ -134,11 +138,16 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
     }
     let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
     let stages = plan.integrator.collocation.unwrap_or(DEFAULT_STAGES);
+    let forced = Lagrangian::has_force(lagrangian);
+    let not_contact = match forced {
+        true => Some(NotContact::Forced),
+        false => lagrangian.formula().has_noncontact_resets().then_some(NotContact::Reset),
+    };
     let mut shorter = h;
     let stated = loop {
-        if Lagrangian::has_force(lagrangian) {
+        if forced {
             // The theorems are about discrete Lagrangians, which do not exist with a force.
-            break Vec::new();
+            break virtual_work(lagrangian, stages, h, &of_theorems)?;
         }
         if interrupted() {
             return Err(InputError::Interrupted.into());
@@ -151,7 +160,30 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             ended => break ended?,
         }
     };
-    Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, samples: along, statements: stated })
+    let integrator = plan.integrator.name.to_string();
+    Ok(Check { integrator, step_size: h, samples: along, statements: stated, not_contact })
+}
+
+/// The contact defect of Gauss steps beside the virtual work of the force: the largest residual over some samples. Those
+/// from which no step of this length is possible are left out, unless that holds for all of them.
+fn virtual_work<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    stages: usize,
+    h: f64,
+    samples: &[&(f64, PhasePoint<N>, f64)],
+) -> Result<Vec<StatementResidual>, RuntimeError> {
+    let of = |(t, x, _): &&(f64, PhasePoint<N>, f64)| -> Result<f64, RuntimeError> {
+        let guess = legendre_inverse(lagrangian, *t, x, &x.p)?.v;
+        Ok(VirtualWork::of_step(lagrangian, stages, h, *t, x, &guess)?.residual())
+    };
+    let found: Vec<Result<f64, RuntimeError>> = samples.iter().map(of).collect();
+    let (known, failed): (Vec<_>, Vec<_>) = found.into_iter().partition(Result::is_ok);
+    if let (true, Some(Err(error))) = (known.is_empty(), failed.into_iter().next()) {
+        return Err(error);
+    }
+    let residual = max_abs_or_nan(known.into_iter().flatten());
+    let method = AnyIntegrator::Gauss { stages }.to_string();
+    Ok(vec![StatementResidual { statement: Statement::VirtualWork, method, step_size: h, residual }])
 }
 
 /// The theorems for the discrete Lagrangian of contact Gauss collocation with step h: the largest residuals over the

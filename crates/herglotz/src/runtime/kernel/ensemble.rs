@@ -241,6 +241,7 @@ fn is_common(cause: &InputError) -> bool {
             | E::Unclaimed { .. }
             | E::Hypothesis { .. }
             | E::NoTimeTransformation
+            | E::Forced { .. }
     )
 }
 

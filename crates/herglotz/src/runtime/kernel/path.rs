@@ -14,6 +14,11 @@ use formula_lagrangian::{Formula, FormulaLagrangian};
 /// Searches for a path of a formula. It is compiled for fewer dimensions than motions are: compiling more would cost
 /// more than the unused coordinates cost a search.
 pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
+    if formula.has_forces() {
+        let why = "has a force, but a path between two ends is critical for an action; remove the force, or run a motion \
+                   from a start";
+        return Err(RuntimeError::argument("system", why));
+    }
     match formula.dimension() {
         1 => within::<1>(formula, problem),
         2 => within::<2>(formula, problem),

@@ -166,7 +166,8 @@ pub(super) fn check_events<const N: usize>(
         ));
     }
     let has_factor = events.iter().flat_map(crate::runtime::Event::expressions).any(Expression::has_conformal_factor);
-    if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
+    let is_known = lagrangian.constant_rate().is_some() && !lagrangian.formula().has_conformal_impacts();
+    if has_factor && !is_known { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
 }
 
 /// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.

@@ -49,7 +49,13 @@ impl<const N: usize> Sized<N> {
     /// The problem of a start, validated.
     pub fn problem(&self, start: &Start) -> Result<Problem<'_, FormulaLagrangian<N>, N>, RuntimeError> {
         let at = self.start(start)?;
-        Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))
+        let problem = Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))?;
+        let force = self.0.applied_force(start.t, problem.start());
+        let names = self.0.formula().coordinates();
+        match names.into_iter().zip(force.iter().copied()).find(|(_, value)| !value.is_finite()) {
+            Some((coordinate, value)) => Err(RuntimeError::ForceUndefined { coordinate, value }),
+            None => Ok(problem),
+        }
     }
 
     /// The problem of a motion, with the interrupt of the motion for its trial runs.

@@ -11,6 +11,7 @@ mod state_words;
 
 use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON};
 use crate::gauss::resolution::tail::Tail;
+use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::equations::{Products, Workspace};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::mass_matrix::Mass;
@@ -23,7 +24,7 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -160,13 +161,15 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         self.warm = false;
     }
 
-    /// Switches to simplified Newton iteration with these derivatives of L; `false` if the Jacobian is singular or not
-    /// finite.
-    fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
+    /// Switches to simplified Newton iteration with the derivatives of L at a point; `false` if the Jacobian is singular
+    /// or not finite.
+    fn linearise(&mut self, t: f64, x: &VelocityPoint<N>) -> bool {
         if self.newton.is_none() {
             self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
         }
-        self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
+        let (gradient, hessian) = (self.lagrangian.gradient(t, x), self.lagrangian.hessian(t, x));
+        let applied = AppliedForce::of(self.lagrangian, t, x);
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(&gradient, &hessian, applied.as_ref()))
     }
 
     /// Sets the solved stages of the next step: their velocities, values of L and integrating factors.
@@ -197,7 +200,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         let i = self.table.s / 2;
         let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
         let (t, x) = (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] });
-        if !self.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x)) {
+        if !self.linearise(t, &x) {
             self.warm = false;
         }
     }

@@ -11,7 +11,7 @@ use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::work_summary::GaussRoute;
 use crate::{StepError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 
 impl<L: Lagrangian<N>, const N: usize> General<'_, L, Physical, N> {
@@ -73,7 +73,7 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for General<'_, L, Physical
         let near = General::last_velocity(self);
         let Ok(x) = legendre_inverse(self.lagrangian, t, &self.phase_point(), &near) else { return false };
         self.guess(&x.v);
-        self.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
+        self.linearise(t, &x)
     }
 
     fn suspend_newton(&mut self) {
