@@ -117,6 +117,52 @@ def test_a_ball_that_loses_speed():
         hz.solve(**given, t=5.0)
 
 
+def test_a_ball_that_comes_to_rest():
+    # The coordinate m has no force: m = 0 in flight, m = 1 at rest.
+    floor = hz.Event("x", "falling", reset={"x'": "-x'/2"}, rest={"x": "0", "x'": "0", "m": "1"})
+    given = dict(coordinates=["x", "m"], force={"x": "-(1 - m)"}, events=floor)
+    sol = hz.solve("(x'^2 + m'^2)/2", [1.0, 0.0], [0.0, 0.0], [0.0, 4.0, 6.0], integrator="gauss_4", step=0.1, **given)
+    assert sol.status == "completed" and sol.q[-1].tolist() == [0.0, 1.0] and sol.v[-1].tolist() == [0.0, 0.0]
+    assert sol.events[0].t[-1] == pytest.approx(3 * np.sqrt(2), abs=1e-9)
+    assert sol(5.0).q.tolist() == [0.0, 1.0] and abs(sol(4.0).q[0] - sol.q[1, 0]) < 1e-13
+
+
+LAWS = {"elastic": 1.0, ("restitution", 0.8): 0.8, ("conformal", 0.64): 0.8, ("restitution", 1): 1.0}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_impact_laws(law):
+    e, fall = LAWS[law], np.sqrt(2)
+    given = dict(q0=[1.0], v0=[0.0], t=3.0, accuracy=1e-12, conformal_factor=True)
+    sol = hz.solve("x'^2/2 - x", coordinates=["x"], events=hz.Event("x", impact=law), **given)
+    (bounce,) = sol.events
+    assert np.allclose(bounce.after_v, -e * bounce.v, rtol=0, atol=1e-13) and abs(bounce.t[0] - fall) < 1e-13
+    s = 3.0 - fall
+    assert abs(sol.q[-1, 0] - (e * fall * s - s**2 / 2)) < 1e-12
+    if isinstance(law, tuple) and law[0] == "conformal":
+        assert sol.log_factor[-1] == pytest.approx(np.log(0.64), abs=1e-13)
+    by_function = hz.solve(lambda t, q, v, z: v @ v / 2 - q[0], events=hz.Event(lambda t, q, v, z: q[0], impact=law), **given)
+    assert abs(by_function.q[-1, 0] - sol.q[-1, 0]) < 1e-12
+
+
+def test_an_elastic_impact_is_the_elastic_reset():
+    sol = hz.solve(ball, [1.0], [0.0], T, events=hz.Event(lambda t, q, v, z: q[0], impact="elastic"), accuracy=1e-13)
+    assert abs(sol.q[-1, 0] - Q) < 1e-12 and abs(sol.v[-1, 0] - V) < 1e-12 and len(sol.events[0].t) == 2
+
+
+def test_an_impact_on_a_slope():
+    slope = hz.Event("y - x", impact="elastic")
+    sol = hz.solve("(x'^2 + y'^2)/2", [0.0, 1.0], [0.0, -1.0], 2.0, coordinates=["x", "y"], events=slope)
+    assert np.allclose(sol.v[-1], [-1.0, 0.0], atol=1e-12) and np.allclose(sol.q[-1], [-1.0, 0.0], atol=1e-9)
+
+
+def test_what_is_lost_at_a_reset():
+    given = dict(L="x'^2/2 - x", q0=[1.0], v0=[0.0], t=2.0, coordinates=["x"], integrator="gauss_4", step=0.5)
+    assert not hz.check(**given, events=hz.Event("x", impact="elastic")).losses
+    found = hz.check(**given, events=hz.Event("x", impact=("restitution", 0.5)))
+    assert not found and "preserves no contact form" in str(found)
+
+
 def test_a_kick_at_a_time_and_a_change_of_position_and_action():
     kick = hz.Event(lambda t, q, v, z: t - 1.0, reset=lambda t, q, v, z: (q + 2.0, v + 3.0, z + t))
     sol = hz.solve("x'^2/2", [0.0], [1.0], 2.0, coordinates=["x"], events=kick, accuracy=1e-12)
@@ -181,6 +227,17 @@ WRONG = {
     "no value": (at_floor(lambda t, q, v, z, e: (q, -e * v)), "the parameter 'e' of <lambda> has no value"),
     "a list as a value": (at_floor({"x'": [1.0]}), r"`reset\[\"x'\"\]` is \[1.0\]"),
     "a terminal event": (at_floor({"x'": "-x'"}, terminal=True), "'x' is terminal and has a reset"),
+    "a reset and an impact": (at_floor({"x'": "-x'"}, impact="elastic"), "'x' has a reset and an impact"),
+    "a rest alone": (at_floor(None, rest={"x'": "0"}), "'x' has a state of rest without a reset or an impact"),
+    "a wrong rest": (at_floor({"x'": "-x'"}, rest={"y": "0"}), "the reset of the event \"x\".*y"),
+    "an unknown law": (at_floor(None, impact="plastic"), 'the impact "plastic" of the event "x" must be "elastic"'),
+    "a law without its number": (at_floor(None, impact="restitution"), 'the impact "restitution".* needs a number'),
+    "a number as a law": (at_floor(None, impact=0.8), r"the impact 0.8 of the event 'x' must be"),
+    "too large a restitution": (at_floor(None, impact=("restitution", 1.5)), "a restitution outside of 0 to 1"),
+    "too large a factor": (at_floor(None, impact=("conformal", 2.0)), "a conformal factor that is not positive and at"),
+    "a text as a number": (at_floor(None, impact=("restitution", "a")), "the restitution of the event .* finite number"),
+    "an impact that rises": (BALL | dict(events=hz.Event("x", "rising", impact="elastic")), "change the sign"),
+    "a surface of velocities": (BALL | dict(events=hz.Event("x'", impact="elastic")), "a function of velocities or z"),
     "a constant": (BALL | dict(events=hz.Event("1", reset={"x'": "-x'"})), "has a constant in place of a function"),
     "a direction of SciPy": (
         BALL | dict(events=hz.Event("x", -1, reset={"x'": "-x'"})),
