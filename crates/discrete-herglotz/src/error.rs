@@ -310,7 +310,7 @@ pub enum StepError {
     /// Resets accumulate.
     #[error(
         "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or say \
-         how the motion continues there (`Lagrangian::at_accumulation`)"
+         how the motion continues there"
     )]
     Accumulation {
         /// The limit of their times.

@@ -12,7 +12,7 @@ fn oscillator() -> Formula {
     let text = "force[x] = if(m > 0.5, x, -0.3*sign(x'))\nx'^2/2 - x^2/2 + m'^2/2";
     let formula = Formula::parse(text, &["x", "m"], &[]).unwrap();
     let then = &[("x'", "0"), ("m", "if(abs(x) < 0.3, 1, 0)")];
-    formula.with_reset(Reset { when: "x'", direction: Direction::Both, then }).unwrap()
+    formula.with_reset(Reset { when: "x'", direction: Direction::Both, then, rest: None }).unwrap()
 }
 
 /// From 2 at rest the amplitudes are 2, 1.4, 0.8 and 0.2, at multiples of pi, and the body sticks at t = 3 pi.

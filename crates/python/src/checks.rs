@@ -36,8 +36,9 @@ pub fn geometry<'py>(
 /// predictions.
 type Sample = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
 
-/// A check: the integrator, the step, the samples, the theorems, and whether every step is a contact transformation.
-type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool);
+/// A check: the integrator, the step, the samples, the theorems, whether every step is a contact transformation, and the
+/// reason why it is not to be expected.
+type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool, Option<String>);
 
 /// Whether the steps of a motion are contact transformations, and the residuals of the theorems of the discrete theory
 /// along it.
@@ -63,7 +64,8 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     let samples = found.samples.into_iter().map(sample).collect();
     let stated = |s: herglotz::runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
-    Ok((found.integrator, found.step_size, samples, statements, is_contact))
+    let reason = found.not_contact.map(|reason| reason.to_string());
+    Ok((found.integrator, found.step_size, samples, statements, is_contact, reason))
 }
 
 /// A run of a comparison: integrator, order, step, steps, evaluations, error and seconds.

@@ -3,7 +3,9 @@
 use crate::arrays::{matrix, numbers, value_error, vector};
 use crate::motion::{Motion, columns};
 use crate::signals::Signals;
-use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
+use herglotz::runtime::{
+    AnyIntegrator, Column, Crossing, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps,
+};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -20,6 +22,8 @@ struct Nodes {
 
 struct NodeStore {
     nodes: Nodes,
+    /// The times of the resets, with the states before them.
+    resets: Vec<Start>,
     /// The time beyond which no node is needed, and whether it has been reached.
     until: f64,
     done: bool,
@@ -40,6 +44,12 @@ impl RunMonitor for NodeStore {
         self.nodes.z.push(z);
     }
 
+    fn crossing(&mut self, reset: &Crossing) -> ControlFlow<()> {
+        let Crossing { t, q, v, p, z, .. } = reset.clone();
+        self.resets.push(Start { t, q, velocity: InitialVelocity::MomentumNear { p, v }, z });
+        ControlFlow::Continue(())
+    }
+
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
         if self.done { ControlFlow::Break(()) } else { self.signals.check() }
     }
@@ -51,6 +61,8 @@ pub struct Dense {
     system: herglotz::runtime::System,
     by: AnyIntegrator,
     nodes: Nodes,
+    /// The times of the resets, with the states before them.
+    resets: Vec<Start>,
     /// The end of the motion, which may lie within a step that could not be completed.
     until: f64,
 }
@@ -63,7 +75,7 @@ type States =
 #[pyfunction]
 pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     let signals = motion.signals.clone();
-    let mut store = NodeStore { nodes: Nodes::default(), until, done: false, signals };
+    let mut store = NodeStore { nodes: Nodes::default(), resets: Vec::new(), until, done: false, signals };
     let by = py.detach(|| {
         let plan = motion.system.plan(&motion.motion)?;
         let by = match motion.motion.step_control {
@@ -76,7 +88,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             step_control: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
             columns: Vec::new(),
-            events: Vec::new(),
+            events: motion.motion.events.iter().filter(|event| event.reset.is_some()).cloned().collect(),
             conformal_factor: false,
             nodes: true,
             ..motion.motion.clone()
@@ -94,12 +106,24 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
                                            `integrator`",
         )
     })?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, until })
+    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, resets: store.resets, until })
 }
 
 impl Dense {
+    /// The state before a reset at a time.
+    fn before_reset(&self, t: f64) -> Option<&Start> {
+        let sign = if self.nodes.t.first().is_some_and(|first| self.until < *first) { -1.0 } else { 1.0 };
+        let k = self.resets.partition_point(|reset| sign * reset.t < sign * t);
+        self.resets.get(k).filter(|reset| reset.t == t)
+    }
+
     /// The rows at times within one step, in the direction of the motion.
     fn within(&self, k: usize, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
+        if let [time] = times.as_slice()
+            && let Some(before) = self.before_reset(*time)
+        {
+            return self.rows(before.clone(), *time, times, all);
+        }
         let (n, Nodes { t, q, v, p, z }) = (self.system.dimension(), &self.nodes);
         let part = |x: &[f64]| x.get(k * n..(k + 1) * n).unwrap_or_default().to_vec();
         let at = |x: &[f64], k: usize| x.get(k).copied().unwrap_or(f64::NAN);
@@ -109,11 +133,16 @@ impl Dense {
             velocity: InitialVelocity::MomentumNear { p: part(p), v: part(v) },
             z: at(z, k),
         };
+        self.rows(start, t.get(k + 1).copied().unwrap_or(self.until), times, all)
+    }
+
+    /// The rows at times of one step from a state.
+    fn rows(&self, start: Start, end: f64, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
         let step_control = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
         let motion = herglotz::runtime::Motion {
             rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
-            ..herglotz::runtime::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), step_control)
+            ..herglotz::runtime::Motion::new(start, end, step_control)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)
     }
@@ -157,7 +186,13 @@ impl Dense {
             py.check_signals()?;
             let k = nodes.partition_point(|node| sign * node < sign * t).saturating_sub(1);
             let end = nodes.get(k + 1).copied().unwrap_or(last);
-            let (these, others) = rest.split_at(rest.partition_point(|(t, _)| sign * t <= sign * end).max(1));
+            // The time of a reset is by itself, since its state is known.
+            let is_reset = |t: f64| self.before_reset(t).is_some();
+            let count = match is_reset(t) {
+                true => rest.partition_point(|(other, _)| sign * other <= sign * t),
+                false => rest.iter().take_while(|(t, _)| sign * t <= sign * end && !is_reset(*t)).count(),
+            };
+            let (these, others) = rest.split_at(count.max(1));
             rest = others;
             let mut different: Vec<f64> = these.iter().map(|(t, _)| *t).collect();
             different.dedup();

@@ -72,7 +72,7 @@ impl EnsembleMonitor for RowStore {
                 (Status::Completed | Status::Stopped { .. }, unresolved) => {
                     unresolved.map(|unresolved| unresolved.to_string())
                 }
-                (status, _) => Some(crate::run::in_words(status)),
+                (status, _) => Some(status.to_string()),
             },
         };
         let reached = |status| match status {

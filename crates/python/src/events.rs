@@ -4,26 +4,30 @@ use crate::arrays::{shown, value_error};
 use crate::motion::named;
 use crate::system::System;
 use formula_lagrangian::Reset;
-use herglotz::runtime::{Direction, Event};
+use herglotz::runtime::{Direction, Event, Formula, Impact};
 use pyo3::prelude::*;
 
-/// The text of an event, its direction, whether it ends the motion, and the new values of variables at it.
-pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool, Option<Vec<(String, String)>>);
+/// Variables with the formulas of their new values.
+type Assignments = Vec<(String, String)>;
+
+/// The change of the state at an event, as new values or as the name and the number of an impact law, and the new values
+/// where changes accumulate.
+type GivenChange<'py> = (Option<Assignments>, Option<(String, Option<Bound<'py, PyAny>>)>, Option<Assignments>);
+
+/// The text of an event, its direction, whether it ends the motion, and how the state changes there.
+pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool, Option<GivenChange<'py>>);
 
 /// The requested events, and the system with their resets.
 pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz::runtime::System, Vec<Event>)> {
     let mut formula = of.formula.clone();
     let mut events = Vec::with_capacity(given.len());
-    for (text, direction, terminal, then) in given {
+    for (text, direction, terminal, change) in given {
         let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
         let direction = self::direction(&text, &direction)?;
         let mut event = Event { direction, terminal, ..Event::new(function) };
-        if let Some(then) = then {
-            let then: Vec<(&str, &str)> =
-                then.iter().map(|(variable, value)| (variable.as_str(), value.as_str())).collect();
-            let reset = Reset { when: &text, direction: of_reset(direction), then: &then, rest: None };
+        if let Some(change) = change {
             event.reset = Some(formula.resets());
-            formula = named("the reset of the event", &text, formula.with_reset(reset).map_err(Into::into))?;
+            formula = with_change(&formula, &text, direction, change)?;
         }
         events.push(event);
     }
@@ -33,6 +37,50 @@ pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz::ru
         of.inner.clone()
     };
     Ok((system, events))
+}
+
+/// The formula with the reset or the impact of an event.
+fn with_change(
+    formula: &Formula,
+    text: &str,
+    direction: Direction,
+    (then, impact, rest): GivenChange<'_>,
+) -> PyResult<Formula> {
+    let rest = rest.as_ref().map(borrowed);
+    let Some((law, number)) = impact else {
+        let given = then.unwrap_or_default();
+        let then = borrowed(&given);
+        let reset = Reset { when: text, direction: of_reset(direction), then: &then, rest: rest.as_deref() };
+        return named("the reset of the event", text, formula.with_reset(reset).map_err(Into::into));
+    };
+    if direction == Direction::Rising {
+        return Err(value_error(format!(
+            "the event {text:?} has an impact, which is where its function falls; change the sign of the function, and \
+             remove the direction"
+        )));
+    }
+    let number = |what: &str| match &number {
+        Some(x) => crate::arrays::number(&format!("the {what} of the event {text:?}"), x),
+        None => {
+            Err(value_error(format!("the impact {law:?} of the event {text:?} needs a number, as in ({law:?}, 0.8)")))
+        }
+    };
+    let law = match law.as_str() {
+        "elastic" => Impact::Elastic,
+        "restitution" => Impact::Restitution(number("restitution")?),
+        "conformal" => Impact::Conformal(number("conformal factor")?),
+        _ => {
+            return Err(value_error(format!(
+                "the impact {law:?} of the event {text:?} must be \"elastic\", (\"restitution\", 0.8) or \
+                 (\"conformal\", 0.64)"
+            )));
+        }
+    };
+    named("the impact of the event", text, formula.with_impact(text, law, rest.as_deref()).map_err(Into::into))
+}
+
+fn borrowed(of: &Assignments) -> Vec<(&str, &str)> {
+    of.iter().map(|(variable, value)| (variable.as_str(), value.as_str())).collect()
 }
 
 fn of_reset(direction: Direction) -> formula_lagrangian::Direction {

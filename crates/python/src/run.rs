@@ -3,7 +3,6 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use discrete_herglotz::StepError;
 use herglotz::runtime::{
     AfterReset, Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor,
     RuntimeError, Status,
@@ -165,17 +164,6 @@ fn outcome_of_start(motion: &Motion) -> Outcome {
     }
 }
 
-/// How a motion ended, for users who have no `at_accumulation`.
-pub fn in_words(status: &Status) -> String {
-    match status {
-        Status::Failed { step, t, cause: StepError::Accumulation { t: limit } } => format!(
-            "failed in step {step} at t = {t}: resets accumulate at t = {limit}: infinitely many of them occur before this \
-             time; end the motion before it"
-        ),
-        status => status.to_string(),
-    }
-}
-
 impl RowStore {
     fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
@@ -229,7 +217,7 @@ pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<
         columns,
         crossings,
         end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
-        status: in_words(&outcome.status),
+        status: outcome.status.to_string(),
         // A terminal event is a regular end.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
         unresolved: outcome.unresolved.map(|unresolved| unresolved.to_string()),

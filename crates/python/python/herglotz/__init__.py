@@ -21,8 +21,9 @@ from ._additions import table
 from ._core import System, Table
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
+from ._events import Event
 from ._solution import Crossings, Interrupted, Plan, Resets, Solution, States
-from ._solve import Event, solve
+from ._solve import solve
 from ._system import system
 from ._trace import array, where
 

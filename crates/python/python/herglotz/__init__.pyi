@@ -12,6 +12,7 @@ Direction: TypeAlias = Literal["both", "rising", "falling"]
 Pieces: TypeAlias = Literal["linear", "held", "cubic"]
 # A function (t, q, v, z, **parameters), formulas by coordinate, or the formula for a single coordinate.
 Force: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float] | str
+Impact: TypeAlias = Literal["elastic"] | tuple[Literal["restitution", "conformal"], float]
 # A function (t, q, v, z, **parameters) -> (q, v) or (q, v, z), or formulas by variable.
 Reset: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float]
 Events: TypeAlias = Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event]
@@ -75,8 +76,16 @@ class Event:
     direction: Direction
     terminal: bool
     reset: Reset | None
+    impact: Impact | None
+    rest: Reset | None
     def __init__(
-        self, when: Expression, direction: Direction = "both", terminal: bool = False, reset: Reset | None = None
+        self,
+        when: Expression,
+        direction: Direction = "both",
+        terminal: bool = False,
+        reset: Reset | None = None,
+        impact: Impact | None = None,
+        rest: Reset | None = None,
     ) -> None: ...
 
 class Crossings(NamedTuple):
@@ -426,6 +435,7 @@ def check(
     integrator: str | None = None,
     step: float | None = None,
     steps: int | None = None,
+    events: Events = (),
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
     force: Force | None = None,

@@ -61,7 +61,7 @@ def additions_of(force, rayleigh, tables, breaks, names):
     """The additions from the arguments of `system`, in the names of coordinates, velocities and parameters."""
     found = _checked_tables(tables)
     forces = tuple(_forces_of(force, names, found)) if force is not None else ()
-    rayleighs = (_text("rayleigh", rayleigh, names, found),) if rayleigh is not None else ()
+    rayleighs = (text_of("rayleigh", rayleigh, names, found),) if rayleigh is not None else ()
     return Additions(tuple(found.items()), forces, rayleighs, breaks_of(breaks))
 
 
@@ -82,7 +82,7 @@ def _forces_of(force, names, tables):
     """The forces by coordinate."""
     coordinates = names[0]
     if hasattr(force, "items"):
-        return [(str(coordinate), _text(f"force[{coordinate!r}]", of, names, tables)) for coordinate, of in force.items()]
+        return [(str(coordinate), text_of(f"force[{coordinate!r}]", of, names, tables)) for coordinate, of in force.items()]
     if isinstance(force, str):
         if len(coordinates) != 1:
             raise ValueError(
@@ -99,7 +99,7 @@ def _forces_of(force, names, tables):
     )
 
 
-def _text(what, of, names, tables):
+def text_of(what, of, names, tables):
     """The formula of a force, of Rayleigh's function or of a new value: of a text, a function or a number."""
     if isinstance(of, str):
         return of
@@ -132,29 +132,6 @@ def breaks_of(breaks, span=None):
             if not min(first, last) <= time <= max(first, last):
                 raise ValueError(f"`breaks` contains {time}, but the motion runs from {first} to {last}")
     return tuple(map(float, times))
-
-
-def reset_of(reset, system, tables):
-    """The new values of variables at an event, in the form of the core: pairs of a variable and a formula."""
-    names = coordinates, velocities, _ = names_of(system)
-    if hasattr(reset, "items"):
-        return [(str(variable), _text(f"reset[{variable!r}]", of, names, tables)) for variable, of in reset.items()]
-    if not callable(reset):
-        raise ValueError(
-            f"the reset of an event is {reset!r}; it must be a function (t, q, v, z) -> (q, v) or (q, v, z), or give "
-            f'formulas by variable, as in reset={{"{velocities[0]}": "-{velocities[0]}"}}'
-        )
-    found = _trace.call_traced(reset, names)
-    if not isinstance(found, tuple) or len(found) not in (2, 3):
-        raise ValueError(
-            f"the reset {_trace._name(reset)} returns {found!r}; it must return a tuple (q, v) or (q, v, z)"
-        )
-    n = len(coordinates)
-    q, v = (_trace.texts_of(x, n, what, reset, names, tables) for x, what in zip(found, ("q", "v")))
-    z = [_trace.value_text(found[2], reset, names, tables)] if len(found) == 3 else []
-    # Variables that keep their values are not assigned.
-    pairs = zip((*coordinates, *velocities, "z"), (*q, *v, *z))
-    return [(variable, text) for variable, text in pairs if text != variable]
 
 
 def names_of(system):

@@ -6,8 +6,9 @@ import numpy as np
 
 from . import _core, _trace
 from ._additions import breaks_of
+from ._events import events_of
 from ._solve import system_and_start
-from ._system import system
+from ._system import system, with_tables
 
 
 class Geometry(NamedTuple):
@@ -122,7 +123,7 @@ class Check(NamedTuple):
     step: float
     places: list
     statements: list  # (statement, discrete Lagrangian, residual)
-    losses: list  # what contact flows have and this motion loses because of its forces, with the reasons
+    losses: list  # what contact flows have and this motion does not, because of a force or a reset, with the reasons
 
     def __bool__(self):
         return self.is_contact
@@ -131,10 +132,10 @@ class Check(NamedTuple):
         defect = max((place.contact_defect for place in self.places), default=0.0)
         is_so = "contact" if self.is_contact else "not contact"
         first = f"{is_so}: {len(self.places)} steps of {self.step!r} by {self.integrator}, largest defect {defect:.1e}"
-        return "\n".join([first, *(f"lost with the force: {loss}" for loss in self.losses)])
+        return "\n".join([first, *(f"  {loss}" for loss in self.losses)])
 
 
-def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more):
+def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=()):
     L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
     breaks = more[3]
     if (v0 is None) == (p0 is None):
@@ -144,7 +145,9 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more):
         raise ValueError("`t` is not given: give the final time")
     if breaks is not None:
         breaks_of(breaks, t)
-    return L, _core.Motion(L, start, t, None, way, [], [], False, False, None)
+    tables = {}
+    events = events_of(events, L, tables) if events else []
+    return L, _core.Motion(with_tables(L, tables), start, t, None, way, events, [], False, False, None)
 
 
 def check(
@@ -160,6 +163,7 @@ def check(
     integrator=None,
     step=None,
     steps=None,
+    events=(),
     coordinates=None,
     parameters=None,
     force=None,
@@ -169,8 +173,9 @@ def check(
 ):
     """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
 
-    The arguments are those of `solve`; `places` is the number of steps that are checked. The steps of a motion with a
-    force are not contact, and the theorems do not apply: ``losses`` says what is lost.
+    The arguments are those of `solve`; `places` is the number of steps that are checked. A motion with a force is not
+    contact: ``losses`` says what is lost, and in place of the theorems ``statements`` compares the contact defect of a
+    step with the virtual work of the force. A reset, or an impact with a restitution below 1, is not contact either.
 
     Returns
     -------
@@ -178,9 +183,10 @@ def check(
     """
     way = accuracy, integrator, step, steps
     more = force, rayleigh, tables, breaks
-    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more)
-    integrator, step, found, statements, contact = _core.check(motion, places)
-    return Check(contact, integrator, step, [Place(*place) for place in found], statements, of.losses)
+    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events)
+    integrator, step, found, statements, contact, reason = _core.check(motion, places)
+    losses = of.losses or ([reason] if reason else [])
+    return Check(contact, integrator, step, [Place(*place) for place in found], statements, losses)
 
 
 class Work(NamedTuple):

@@ -6,8 +6,9 @@ import numpy as np
 
 from . import _core
 from ._additions import breaks_of
+from ._events import events_of, has_reset, texts_of_events
 from ._solution import Interrupted, crossings
-from ._solve import columns_of, events_of, functions_of, system_and_start, texts_of_events
+from ._solve import columns_of, functions_of, system_and_start
 from ._system import check_parameters, with_tables
 
 
@@ -105,7 +106,7 @@ def ensemble(
         threads,
     )
     event_names = tuple(events) if isinstance(events, dict) else len(given)
-    found = Ensemble(system, record, event_names, tuple(observe or ()), [event[3] is not None for event in given])
+    found = Ensemble(system, record, event_names, tuple(observe or ()), list(map(has_reset, given)))
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(found)
@@ -160,7 +161,7 @@ class Ensemble:
         The number of members that were advanced together in SIMD lanes.
     """
 
-    def __init__(self, system, record, event_names, observed, has_reset):
+    def __init__(self, system, record, event_names, observed, resets):
         self.system = system
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
@@ -168,7 +169,7 @@ class Ensemble:
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
         self.z = record.z.reshape(count, *many)
-        kinds = [MemberResets if reset else MemberCrossings for reset in has_reset]
+        kinds = [MemberResets if reset else MemberCrossings for reset in resets]
         self.events = crossings(kinds, record.crossings, event_names, n) if event_names else []
         self._observed = {name: record.columns[:, i].reshape(count, *many) for i, name in enumerate(observed)}
 

@@ -1,7 +1,8 @@
 """One motion: its request and its run."""
 
 from . import _core
-from ._additions import breaks_of, reset_of
+from ._additions import breaks_of
+from ._events import events_of, texts_of_events
 from ._solution import Interrupted, Solution
 from ._system import check_parameters, copied, expression, system, with_tables
 
@@ -153,45 +154,6 @@ def functions_of(force, rayleigh):
 CATALOGUE = {entry[0]: entry for entry in _core.catalogue()}
 
 
-class Event:
-    """A function of time and state whose sign changes are located, and what happens to the state there.
-
-    Parameters
-    ----------
-    when : str or function
-        An expression, in the syntax of formulas: ``"theta"``, ``"x'*y - 1"``; or a function of (t, q, v, z), which is
-        traced.
-    direction : {"both", "rising", "falling"}
-        Which sign changes count, in the direction of the motion.
-    terminal : bool
-        Whether the first sign change ends the motion.
-    reset : function or dict of str, optional
-        The state after the sign change, from which the motion continues: a function (t, q, v, z, **parameters) of the
-        state before it that returns (q, v), where z remains, or (q, v, z); or formulas of the variables that change,
-        ``{"x'": "-0.8*x'"}``. The state must be on the surface or on the side from which the motion comes.
-
-    Examples
-    --------
-    A ball that loses a fifth of its speed at each bounce:
-
-    >>> import herglotz as hz
-    >>> floor = hz.Event("x", "falling", reset={"x'": "-0.8*x'"})
-    >>> sol = hz.solve("x'^2/2 - 9.81*x", [1.0], [0.0], 3.0, coordinates=["x"], events=floor)
-    >>> bounces = sol.events[0]
-    >>> bounces.t.shape, bounces.v[0], bounces.after_v[0]
-    ((5,), array([-4.42944692]), array([3.54355753]))
-    """
-
-    __slots__ = ("when", "direction", "terminal", "reset")
-
-    def __init__(self, when, direction="both", terminal=False, reset=None):
-        self.when, self.direction, self.terminal, self.reset = when, direction, terminal, reset
-
-    def __repr__(self):
-        reset = "" if self.reset is None else f", reset={self.reset!r}"
-        return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal}{reset})"
-
-
 def columns_of(observe, L, tables):
     """The texts of the observed expressions."""
     if not observe:
@@ -199,28 +161,3 @@ def columns_of(observe, L, tables):
     if not hasattr(observe, "values"):
         raise ValueError(f'`observe` is {observe!r}; it must give expressions by name, as in observe={{"square": "x^2"}}')
     return [expression(column, L, tables) for column in observe.values()]
-
-
-def texts_of_events(events):
-    """All formulas of events in the form of the core."""
-    for text, _, _, reset in events:
-        yield text
-        yield from (value for _, value in reset or ())
-
-
-def events_of(events, L, tables):
-    """The events in the form of the core; the tables in their functions are added to `tables`."""
-    if isinstance(events, (str, Event)) or callable(events):
-        events = [events]
-    elif isinstance(events, dict):
-        events = events.values()
-    result = []
-    for event in events:
-        if not isinstance(event, Event):
-            event = Event(event)
-        text = expression(event.when, L, tables)
-        if event.terminal and event.reset is not None:
-            raise ValueError(f"the event {text!r} is terminal and has a reset: remove one of the two")
-        reset = None if event.reset is None else reset_of(event.reset, L, tables)
-        result.append((text, event.direction, bool(event.terminal), reset))
-    return result

@@ -265,7 +265,7 @@ def call_traced(function, names):
         for name in required:
             if name not in parameters:
                 raise ValueError(
-                    f"the parameter {name!r} of {_name(function)} has no value: give parameters={{{name!r}: ...}}"
+                    f"the parameter {name!r} of {name_of(function)} has no value: give parameters={{{name!r}: ...}}"
                 )
         given = {name: value for name, value in zip(parameters, values) if name in required or name in others}
     return function(t, _vector(q), _vector(v), z, **given)
@@ -277,7 +277,7 @@ def texts_of(values, n, what, function, names, tables):
     if found.ndim > 1 or found.size != n or (found.ndim == 0 and n != 1):
         shape = f"an array of shape {found.shape}" if found.ndim else repr(values)
         raise ValueError(
-            f"{_name(function)} returns {shape} as {what}, but there are {n} coordinates: return an array of shape ({n},)"
+            f"{name_of(function)} returns {shape} as {what}, but there are {n} coordinates: return an array of shape ({n},)"
         )
     return [value_text(value, function, names, tables) for value in np.ravel(found)]
 
@@ -288,15 +288,15 @@ def components_of(function, n, tables):
     _, q, p, z, _ = symbols(n, 0)
     found = function(_vector(q), _vector(p), z)
     if not isinstance(found, (tuple, list)) or len(found) != 3:
-        raise ValueError(f"{_name(function)} returns {found!r}; it must return a tuple (q, p, z)")
+        raise ValueError(f"{name_of(function)} returns {found!r}; it must return a tuple (q, p, z)")
     found = list(np.ravel(np.array(found[0], dtype=object))), list(np.ravel(np.array(found[1], dtype=object))), found[2]
     for what, x in (("q", found[0]), ("p", found[1])):
         if len(x) != n:
-            raise ValueError(f"{_name(function)} returns a {what} with {len(x)} numbers, but there are {n} coordinates")
+            raise ValueError(f"{name_of(function)} returns a {what} with {len(x)} numbers, but there are {n} coordinates")
     return [value_text(x, function, (*names, []), tables) for x in (*found[0], *found[1], found[2])]
 
 
-def _name(function):
+def name_of(function):
     return getattr(function, "__name__", "the function")
 
 
@@ -320,7 +320,7 @@ def value_text(value, function, names, tables):
     if isinstance(value, np.ndarray):
         if value.ndim:
             raise ValueError(
-                f"{_name(function)} returns an array of shape {value.shape}; it must return a number: take a component, or a sum"
+                f"{name_of(function)} returns an array of shape {value.shape}; it must return a number: take a component, or a sum"
             )
         value = value[()]
     if isinstance(value, Symbol):
@@ -328,7 +328,7 @@ def value_text(value, function, names, tables):
         return value.text(*names)
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         return repr(float(value))
-    raise ValueError(f"{_name(function)} returns {value!r}; it must return a number: check its return statement")
+    raise ValueError(f"{name_of(function)} returns {value!r}; it must return a number: check its return statement")
 
 
 __all__ = ["Traced", "array", "formula_of", "velocity_names", "where"]
