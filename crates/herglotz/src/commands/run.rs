@@ -7,8 +7,8 @@ use crate::output::{Directory, Table, exact, json, print, print_json, read_rows,
 use crate::plot;
 use clap::Args;
 use herglotz::runtime::{
-    AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RunMonitor, RuntimeError, Status, StepControl, StepError,
-    Steps, velocity_name,
+    AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RunMonitor, RuntimeError, Status, StepControl, Steps,
+    velocity_name,
 };
 use herglotz::{EndsScene, LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -334,11 +334,9 @@ impl Run {
                 "interrupted at t = {t}; the same command with --resume continues from there"
             ))),
             Status::Completed | Status::Stopped { .. } => Ok(()),
-            Status::Failed { cause: StepError::Accumulation { t }, .. } => Err(Failure::Run(format!(
-                "the run ends at t = {t}, where resets accumulate: infinitely many of them occur before this time; end \
-                 the run before it, or add to the event the state from which the motion continues, as in \
-                 rest = {{ \"x'\" = \"0\" }}"
-            ))),
+            Status::Failed { cause, .. } if scene.accumulation(&cause).is_some() => {
+                Err(Failure::Run(scene.accumulation(&cause).unwrap_or_default()))
+            }
             status => Err(Failure::Run(status.to_string())),
         }
     }

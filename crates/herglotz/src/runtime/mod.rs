@@ -58,8 +58,8 @@ pub use contact_geom::switching::Impact;
 pub use contact_geom::table::{Interpolation, Table, TableError};
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, Status, StepError, Steps,
-    UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
+    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
+    Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
 };
 pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

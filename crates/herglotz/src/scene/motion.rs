@@ -12,8 +12,8 @@ use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
 use super::{SceneError, overrides, start, tables};
 use crate::runtime::{
-    AfterReset, Column, Crossing, Event, InputError, Motion, RuntimeError, Start, StepControl, System, Table, in_words,
-    velocity_name,
+    AfterReset, Column, Crossing, Event, InputError, Motion, RuntimeError, SelectionFailure, Start, StepControl,
+    StepError, System, Table, in_words, velocity_name,
 };
 use std::path::Path;
 
@@ -315,7 +315,29 @@ impl Scene {
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => spans.start,
             _ => spans.run,
         };
-        SceneError::at(&self.text, span, error.to_string())
+        let accumulation = failed_step(error).and_then(|cause| self.accumulation(cause));
+        SceneError::at(&self.text, span, accumulation.unwrap_or_else(|| error.to_string()))
+    }
+
+    /// What is said of a step that fails where resets accumulate.
+    pub fn accumulation(&self, cause: &StepError) -> Option<String> {
+        let StepError::Accumulation { t } = cause else { return None };
+        let names = self.system.formula().coordinates();
+        let velocity = velocity_name(names.first().map_or("x", String::as_str));
+        Some(format!(
+            "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or \
+             add to the event the state from which the motion continues, as in rest = {{ \"{velocity}\" = \"0\" }}"
+        ))
+    }
+}
+
+/// The cause for which a step fails however short it is, of an accuracy that is not reached.
+fn failed_step(error: &RuntimeError) -> Option<&StepError> {
+    match error {
+        RuntimeError::Input(InputError::Accuracy { cause: SelectionFailure::StepFailed { cause, .. }, .. }) => {
+            Some(cause)
+        }
+        _ => None,
     }
 }
 

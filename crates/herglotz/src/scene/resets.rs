@@ -130,6 +130,14 @@ fn of_event(
             return of_assignment(text, (name, value), &error);
         }
     }
-    let then = event.then.as_ref().map_or(event.when.span(), Location::span);
-    SceneError::at(text, then, error.to_string())
+    // A variable that is assigned twice is known by its second name.
+    let named = |error: &FormulaError| {
+        let FormulaError::Target(error) = error else { return None };
+        let mut tables = event.then.iter().chain(&event.rest).flat_map(|table| &table.0);
+        tables.rfind(|(name, _)| ***name == *error.text)
+    };
+    match named(error) {
+        Some(pair) => of_assignment(text, (&pair.0, &pair.1), error),
+        None => SceneError::at(text, event.then.as_ref().map_or(event.when.span(), Location::span), error.to_string()),
+    }
 }

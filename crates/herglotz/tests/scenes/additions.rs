@@ -28,7 +28,7 @@ values = [0.0, 1.0]
 pieces = "held"
 [start]
 height = 1.0
-u = [0.0, 1.0]
+u = [0.0, 0.5]
 "height'" = 0.0
 "u'" = 0.5
 [run]
@@ -334,10 +334,19 @@ fn bounces_that_accumulate() {
     let long = changed(BALL, &[("time = 6.0", "time = 20.0")]);
     // 1 + 2 e (1 + e + ...) = 1 + 2 e/(1 - e)
     let limit = 9.0;
-    let (_, status) = crossings(&read(&long).unwrap());
-    let told = status.to_string();
-    let at: f64 = told.split("accumulate at t = ").nth(1).unwrap().split(':').next().unwrap().parse().unwrap();
-    assert!((at - limit).abs() < 1e-6, "{told}");
+    let says_the_limit = |told: &str| {
+        let at: f64 = told.split("accumulate at t = ").nth(1).unwrap().split(':').next().unwrap().parse().unwrap();
+        assert!((at - limit).abs() < 1e-6, "{told}");
+    };
+    let by_steps = changed(&long, &[("accuracy = 1e-9", "integrator = \"gauss_4\"\nstep = 0.1")]);
+    let (found, status) = crossings(&read(&by_steps).unwrap());
+    says_the_limit(&status.to_string());
+    assert!(found.len() > 20 && found.iter().all(|crossing| crossing.t < limit), "{}", found.len());
+    // An accuracy over a span that the motion does not have is refused.
+    let scene = read(&long).unwrap();
+    let error = scene.explain(&scene.system.plan(&scene.motion()).unwrap_err()).to_string();
+    says_the_limit(&error);
+    assert!(error.contains("rest = { \"x'\" = \"0\" }"), "{error}");
     let resting = changed(
         &long,
         &[
@@ -430,4 +439,45 @@ fn resets_after_an_interruption() {
     let from = parts.0.clone().unwrap();
     let found = scene.system.resume(&motion, from, &mut parts).unwrap();
     assert_eq!((found, parts.1), (expected, whole.0));
+}
+
+fn scene(name: &str) -> Scene {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes"));
+    read_in(&std::fs::read_to_string(folder.join(name)).unwrap(), folder).unwrap()
+}
+
+/// The first integral of a projectile with the drag `-c |v| v`: `1/v_x^2 + (c/g) (s sqrt(1 + s^2) + asinh s)` with
+/// `s = v_y/v_x`; by the chosen integrator, and by a splitting, which takes this drag.
+#[test]
+fn the_projectile_has_its_first_integral() {
+    let projectile = scene("projectile.toml");
+    let (names, c_over_g) = (["x'", "y'"], 0.02 / 9.81);
+    let place = names.map(|name| projectile.columns.iter().position(|(column, _)| column == name).unwrap());
+    let by = StepControl::Steps { by: "kahan_li_6".parse().unwrap(), steps: Steps::Size(0.01) };
+    for (control, bound) in [(projectile.motion().step_control, 1e-10), (by, 1e-8)] {
+        let motion = Motion { step_control: control, ..projectile.motion() };
+        let (_, rows) = projectile.system.record(&motion).unwrap();
+        let kept = rows.iter().map(|row| {
+            let (vx, s) = (row[place[0]], row[place[1]] / row[place[0]]);
+            1.0 / (vx * vx) + c_over_g * (s * s.hypot(1.0) + s.asinh())
+        });
+        let kept: Vec<f64> = kept.collect();
+        assert!(kept.len() > 200 && kept.iter().all(|x| (x / kept[0] - 1.0).abs() < bound), "{control:?} {kept:?}");
+    }
+}
+
+/// The stick-slip motion in closed form: the block is carried from x = 0.2 to x = 1, and slips back as an oscillator
+/// around x = fd/k.
+#[test]
+fn sticking_and_slipping_alternate_with_their_period() {
+    let (found, status) = crossings(&scene("stick_slip.toml"));
+    assert_eq!(status, Status::Completed);
+    let (stick, slip) = (0.8 / 0.3, std::f64::consts::PI + 2.0 * f64::atan2(0.3, 0.4));
+    let mut t = 1.0 / 0.3;
+    for (k, crossing) in found.iter().enumerate() {
+        assert!(crossing.event == k % 2 && (crossing.t - t).abs() < 1e-8, "{k}: {crossing:?} {t}");
+        assert!((crossing.v[0] - 0.3).abs() < 1e-9, "{crossing:?}");
+        t += if k % 2 == 0 { slip } else { stick };
+    }
+    assert_eq!(found.len(), 11);
 }
