@@ -114,7 +114,7 @@ def test_a_ball_that_loses_speed():
     assert "end the run before it" in end.status
     assert end.t_end < 3 * np.sqrt(2) and len(end.events[0].t) > 4
     with pytest.raises(ValueError, match="resets accumulate at t = 4.2426406871192"):
-        hz.solve(**given, t=5.0)
+        hz.solve(**given, t=5.0, accuracy=1e-3)
 
 
 def test_a_ball_that_comes_to_rest():
@@ -182,7 +182,8 @@ def test_members_of_ensembles_have_their_own_resets():
         mine = many.events[0].member == i
         assert np.allclose(many.q[i], one.q[-1], atol=1e-10) and np.sum(mine) == len(one.events[0].t)
         assert np.allclose(many.events[0].after_v[mine], -e[i] * many.events[0].v[mine], rtol=1e-14)
-    stuck = hz.ensemble(q0=heights, v0=np.zeros((3, 1)), t=20.0, parameters={"e": 0.5}, **given | dict(accuracy=1e-6))
+    given = {name: value for name, value in given.items() if name != "accuracy"} | dict(integrator="gauss_4", step=0.1)
+    stuck = hz.ensemble(q0=heights, v0=np.zeros((3, 1)), t=20.0, parameters={"e": 0.5}, **given)
     assert not stuck.success.any() and "accumulate at t = " in stuck.troubles[0]
 
 

@@ -87,7 +87,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        if const { D::FORCED } {
+        if ld.has_forces() {
             return Err(InputError::Forced { method: "a boundary value problem" });
         }
         if steps < 2 {

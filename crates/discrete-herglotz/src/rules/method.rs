@@ -214,6 +214,10 @@ macro_rules! each {
 impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for AnyDiscreteLagrangian<L, N> {
     const FORCED: bool = L::HINTS.forced;
 
+    fn has_forces(&self) -> bool {
+        each!(self, ld => DiscreteLagrangian::<N>::has_forces(ld))
+    }
+
     fn step_size(&self) -> f64 {
         each!(self, ld => DiscreteLagrangian::<N>::step_size(ld))
     }

@@ -340,6 +340,10 @@ fn place<T: Scalar, const N: usize>(node: &Node, h: f64, x: &DiscretePoint<N, T>
 impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadrature<L, R> {
     const FORCED: bool = L::HINTS.forced;
 
+    fn has_forces(&self) -> bool {
+        self.lagrangian.has_force()
+    }
+
     fn step_size(&self) -> f64 {
         self.h
     }

@@ -87,6 +87,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for ActionStrang<L, F, N> {
     const FORCED: bool = L::HINTS.forced;
 
+    fn has_forces(&self) -> bool {
+        self.form.lagrangian.has_force()
+    }
+
     fn step_size(&self) -> f64 {
         self.h
     }

@@ -85,6 +85,10 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
 impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
     const FORCED: bool = L::HINTS.forced;
 
+    fn has_forces(&self) -> bool {
+        self.form.lagrangian.has_force()
+    }
+
     fn step_size(&self) -> f64 {
         self.h
     }

@@ -31,6 +31,11 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
 
+    /// Whether there are discrete forces; by default, where there may be some.
+    fn has_forces(&self) -> bool {
+        Self::FORCED
+    }
+
     /// The discrete forces `[F-, F+]` on the two ends of a step. Set [`FORCED`](Self::FORCED) as well; by default there are
     /// none.
     ///
@@ -193,6 +198,10 @@ pub trait DiscreteLagrangian<const N: usize> {
 
 impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     const FORCED: bool = D::FORCED;
+
+    fn has_forces(&self) -> bool {
+        (**self).has_forces()
+    }
 
     fn step_size(&self) -> f64 {
         (**self).step_size()
