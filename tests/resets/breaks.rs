@@ -25,7 +25,7 @@ impl Lagrangian<1> for Pushed {
 impl Pushed {
     /// From rest at t = 0: `q = push (cos(t - to) - cos(t - from))` after the push.
     fn exact(&self, t: f64) -> f64 {
-        self.push * (f64::cos(t - self.to.min(t)) - f64::cos(t - self.from))
+        self.push * (f64::cos(if self.to < t { t - self.to } else { 0.0 }) - f64::cos(t - self.from))
     }
     fn breaking(self) -> Breaks<Self> {
         Breaks::new(self, vec![self.from, self.to]).unwrap()

@@ -59,7 +59,8 @@ fn impacts(flight: &Flight, plane: &Plane, law: Impact, start: ([f64; 2], [f64; 
             if after >= t_end - t {
                 return times;
             }
-            (before, after) = (after, (1.01 * after).min(t_end - t));
+            let next = 1.01 * after;
+            (before, after) = (after, if next < t_end - t { next } else { t_end - t });
         }
         if before == 0.0 {
             // The flight is shorter than the first sample.
