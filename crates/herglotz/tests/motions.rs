@@ -294,7 +294,13 @@ fn a_factor_that_is_none_is_not_contact() {
     let check = |sigma: f64| {
         let (contact_defect, herglotz_defect, momenta) = (0.0, 0.0, Vec::new());
         let sample = Sample { t: 0.0, sigma, log_factor: 0.0, contact_defect, herglotz_defect, momenta };
-        Check { integrator: String::new(), step_size: 1.0, samples: vec![sample], statements: Vec::new() }
+        Check {
+            integrator: String::new(),
+            step_size: 1.0,
+            samples: vec![sample],
+            statements: Vec::new(),
+            not_contact: None,
+        }
     };
     assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
     for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {

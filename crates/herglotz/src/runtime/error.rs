@@ -93,7 +93,7 @@ pub enum RuntimeError {
         /// Which part.
         part: &'static str,
         /// The error of the formula.
-        error: FormulaError,
+        error: Box<FormulaError>,
     },
     /// An invalid argument of a system of many coordinates.
     #[error("`{argument}` {why}")]

@@ -242,14 +242,16 @@ impl LatticeScene {
 fn explain(text: &str, spans: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
     let place = |name: &str| spans.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
     match error {
-        RuntimeError::Part { part, error: FormulaError::Parse(error) } => {
-            let mut error = error.clone();
-            if error.message.starts_with("unknown name") && error.nearest.is_none() {
-                error.message += "; a parameter needs a value in `parameters` of [lattice]";
+        RuntimeError::Part { part, error } => match &**error {
+            FormulaError::Parse(error) => {
+                let mut error = error.clone();
+                if error.message.starts_with("unknown name") && error.nearest.is_none() {
+                    error.message += "; a parameter needs a value in `parameters` of [lattice]";
+                }
+                SceneError::in_string(text, place(part), &error)
             }
-            SceneError::in_string(text, place(part), &error)
-        }
-        RuntimeError::Part { part, error } => SceneError::at(text, place(part), error.to_string()),
+            error => SceneError::at(text, place(part), error.to_string()),
+        },
         RuntimeError::Argument { argument, .. } => SceneError::at(text, place(argument), error.to_string()),
         error => SceneError::at(text, otherwise, error.to_string()),
     }

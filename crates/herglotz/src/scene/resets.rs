@@ -133,8 +133,8 @@ fn of_event(
     // A variable that is assigned twice is known by its second name.
     let named = |error: &FormulaError| {
         let FormulaError::Target(error) = error else { return None };
-        let tables = event.then.iter().chain(&event.rest).flat_map(|table| &table.0);
-        tables.filter(|(name, _)| ***name == *error.text).last()
+        let mut tables = event.then.iter().chain(&event.rest).flat_map(|table| &table.0);
+        tables.rfind(|(name, _)| ***name == *error.text)
     };
     match named(error) {
         Some(pair) => of_assignment(text, (&pair.0, &pair.1), error),

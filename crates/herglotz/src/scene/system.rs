@@ -56,8 +56,8 @@ pub(super) fn formula(
             }
             FormulaError::Name { ref name, .. } => {
                 let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
-                let known = coordinates.iter().chain(of_parameters).chain(of_tables());
-                let at = known.filter(|known| ***known == *name).last().map(Location::span);
+                let mut known = coordinates.iter().chain(of_parameters).chain(of_tables());
+                let at = known.rfind(|known| ***known == *name).map(Location::span);
                 SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
             }
             FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),

@@ -186,3 +186,65 @@ fn wrapped_columns_are_folded_in_pictures() {
         assert!(!at.read(&format!("free/{name}")).contains(HALF_TURN), "{picture}");
     }
 }
+
+/// A ball that bounces: a reset is written with the state before and after it, in runs, in runs that are resumed, and in
+/// sweeps; forces and tables of a file beside the scene act.
+#[test]
+fn resets_are_written_with_the_state_before_and_after() {
+    const BALL: &str = r#"[system]
+coordinates = ["x"]
+lagrangian = "x'^2/2 - g*x"
+parameters = { g = 2.0, e = 0.8 }
+[force]
+x = "lift(t)"
+[tables.lift]
+csv = "lift.csv"
+[start]
+x = 1.0
+"x'" = 0.0
+[run]
+time = 6.0
+integrator = "gauss_3"
+steps = 2000
+[[want.events]]
+when = "x"
+direction = "falling"
+then = { "x'" = "-e*x'" }
+columns = ["speed = abs(x')"]
+[[want.events]]
+when = "x'"
+[sweep]
+e = [0.8, 0.9]
+"#;
+    let at = Directory::new("resets");
+    at.write("lift.csv", "t,lift\n0,0\n3,0\n");
+    let file = at.write("scene.toml", BALL);
+    succeed(&["run", &file, "--out", &at.path("out")]);
+    let all = at.read("out/events.csv");
+    assert!(all.starts_with("event,t,x,x',p_x,z,speed,x after,x' after,z after\n"), "{all}");
+    let bounces = lines_with(&all, "event", "x");
+    let [t, before, speed, after] = ["t", "x'", "speed", "x' after"].map(|name| column(&bounces, name));
+    // It falls for 1, and flies for the velocity after each bounce.
+    assert!((t[0] - 1.0).abs() < 1e-12 && (before[0] + 2.0).abs() < 1e-12 && t.len() == 5, "{bounces}");
+    for i in 0..t.len() {
+        assert!((after[i] + 0.8 * before[i]).abs() < 1e-12 && speed[i] == -before[i], "{bounces}");
+        assert!(i == 0 || (t[i] - t[i - 1] - after[i - 1]).abs() < 1e-12, "{bounces}");
+    }
+    // Other events have no state after.
+    let turns = lines_with(&all, "event", "x'");
+    assert!(turns.lines().count() > 3 && turns.lines().skip(1).all(|line| line.ends_with(",,,,")), "{turns}");
+
+    let parts = ["run", &file, "--out", &at.path("parts")];
+    assert_eq!(crate::support::fail(&[&parts[..], &["--interrupt-at", "0.5"]].concat()).0, Some(1));
+    succeed(&[&parts[..], &["--resume"]].concat());
+    assert_eq!(all, at.read("parts/events.csv"));
+    let told = succeed(&["sweep", &file, "--out", &at.path("sweep")]);
+    assert!(told.starts_with("2 members: 2 completed"), "{told}");
+    let of_sweep = at.read("sweep/events.csv");
+    assert!(of_sweep.starts_with("index,e,event,t,x,x',p_x,z,speed,x after,x' after,z after\n"), "{of_sweep}");
+    assert!(of_sweep.contains(bounces.lines().nth(1).unwrap()), "{of_sweep}");
+    // A lift above the weight from t = 3 on: the ball does not come back.
+    at.write("lift.csv", "t,lift\n0,0\n3,0\n3.001,5\n");
+    succeed(&["run", &file, "--out", &at.path("lifted")]);
+    assert!(lines_with(&at.read("lifted/events.csv"), "event", "x").lines().count() < 4);
+}

@@ -152,7 +152,7 @@ impl Lattice {
 
     fn parse(&self, part: &'static str, text: &str, names: &[&str]) -> Result<Formula, RuntimeError> {
         let values: Vec<(&str, f64)> = self.parameters.iter().map(|(name, x)| (name.as_str(), *x)).collect();
-        Formula::parse(text, names, &values).map_err(|error| RuntimeError::Part { part, error })
+        Formula::parse(text, names, &values).map_err(|error| RuntimeError::Part { part, error: Box::new(error) })
     }
 
     /// The ends of the bonds along a direction, row by row.
@@ -172,7 +172,7 @@ impl Lattice {
 }
 
 fn lagrangian<const N: usize>(part: &'static str, formula: &Formula) -> Result<FormulaLagrangian<N>, RuntimeError> {
-    formula.lagrangian::<N>().map_err(|error| RuntimeError::Part { part, error })
+    formula.lagrangian::<N>().map_err(|error| RuntimeError::Part { part, error: Box::new(error) })
 }
 
 /// The origin, where quantities that do not depend on the state are evaluated.
