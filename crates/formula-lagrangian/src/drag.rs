@@ -44,8 +44,8 @@ impl ProvedForce {
         }
     }
 
-    /// The structure of a Lagrangian with these forces, as that of [`Forced`](contact_geom::Forced): the claims on the form
-    /// of L remain.
+    /// The structure of a Lagrangian with these forces, as that of [`Forced`](contact_geom::Forced): the claims on the
+    /// form of L remain.
     pub fn structure(&self, unforced: Structure) -> Structure {
         if let ProvedForce::None = self {
             return unforced;

@@ -58,8 +58,8 @@ impl Formula {
     /// let thrown = Formula::parse("(x'^2 + y'^2)/2 - 9.81*y", &["x", "y"], &[])?;
     /// // A slope of 45 degrees: the normal velocity is reversed.
     /// let l = thrown.with_impact("y - x", Impact::Elastic, None)?.lagrangian::<2>()?;
-    /// let Control::Conformal { to, factor } = l.at_switch(0, 0.0, &VelocityPoint::new([0.0, 0.0], [0.0, -2.0], 0.0), false)
-    /// else { panic!() };
+    /// let falling = VelocityPoint::new([0.0, 0.0], [0.0, -2.0], 0.0);
+    /// let Control::Conformal { to, factor } = l.at_switch(0, 0.0, &falling, false) else { panic!() };
     /// assert!((to.v[0] + 2.0).abs() < 1e-15 && to.v[1].abs() < 1e-15 && factor == 1.0);
     /// # Ok::<(), formula_lagrangian::FormulaError>(())
     /// ```

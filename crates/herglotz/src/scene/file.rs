@@ -33,10 +33,10 @@ pub(crate) struct File {
     /// system of the catalogue has a default initial state.
     #[serde(default)]
     pub start: Option<Location<Named<Numbers>>>,
-    /// Forces beside those of the Lagrangian: for a coordinate `x` the force f in `d/dt L_v - L_q - L_z L_v = f(t, q, v,
-    /// z)` as a formula, as in `x = "-c*x'*abs(x')"`; `"u[2]"` is an entry of an array, and `"u[i]"` are all of its
-    /// entries. `rayleigh` is Rayleigh's dissipation function R, whose force is `-dR/dv`. With a force the motion is not
-    /// contact: the defect is the virtual work of the force.
+    /// Forces beside those of the Lagrangian: for a coordinate `x` the force f in `d/dt L_v - L_q - L_z L_v = f(t, q,
+    /// v, z)` as a formula, as in `x = "-c*x'*abs(x')"`; `"u[2]"` is an entry of an array, and `"u[i]"` are all of its
+    /// entries. `rayleigh` is Rayleigh's dissipation function R, whose force is `-dR/dv`. With a force the motion is
+    /// not contact: the defect is the virtual work of the force.
     #[serde(default)]
     pub force: Option<Location<Named<String>>>,
     /// Functions of time by samples, with their names: the table `drive` is `drive(t)` in all formulas of the scene.
@@ -89,13 +89,13 @@ pub(crate) struct RunTable {
     pub breaks: Option<Location<Vec<Location<f64>>>>,
 }
 
-/// The samples of a function of time: in a file with `csv`, or as lists `times` and `values`. Before the first and after
-/// the last sample the function is constant.
+/// The samples of a function of time: in a file with `csv`, or as lists `times` and `values`. Before the first and
+/// after the last sample the function is constant.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `csv`, or with `times` and `values`")]
 pub(crate) struct SamplesTable {
-    /// A file of comma-separated values whose first line has the names of the columns; its path is relative to the folder
-    /// of the scene.
+    /// A file of comma-separated values whose first line has the names of the columns; its path is relative to the
+    /// folder of the scene.
     pub csv: Option<Location<String>>,
     /// The column of the times; `t` by default.
     pub time: Option<Location<String>>,
@@ -180,13 +180,13 @@ pub(crate) struct EventTable {
     /// ...`) or without. They are empty for other events.
     #[serde(default)]
     pub columns: Vec<Location<String>>,
-    /// A reset: the variables that get new values where the function changes its sign, as expressions of the state before
-    /// it, as in `{ "x'" = "-0.8*x'" }`. The motion goes on from the new state. events.csv has the state before the
-    /// reset, and the state after it in columns such as `x' after`.
+    /// A reset: the variables that get new values where the function changes its sign, as expressions of the state
+    /// before it, as in `{ "x'" = "-0.8*x'" }`. The motion goes on from the new state. events.csv has the state before
+    /// the reset, and the state after it in columns such as `x' after`.
     pub then: Option<Location<Named<String>>>,
-    /// An impact in place of `then`, where the function falls. It depends on `t` and the coordinates alone and is positive
-    /// where motions are admitted: `"elastic"` conserves the energy, `{ restitution = 0.8 }` multiplies the normal
-    /// velocity by -0.8, and `{ conformal = 0.64 }` multiplies the contact form by 0.64.
+    /// An impact in place of `then`, where the function falls. It depends on `t` and the coordinates alone and is
+    /// positive where motions are admitted: `"elastic"` conserves the energy, `{ restitution = 0.8 }` multiplies the
+    /// normal velocity by -0.8, and `{ conformal = 0.64 }` multiplies the contact form by 0.64.
     pub impact: Option<Location<ImpactLaw>>,
     /// With `then` or `impact`: where resets accumulate, the variables that get new values, from which the motion
     /// continues, as in `{ "x'" = "0" }`. By default the run ends there.

@@ -282,7 +282,8 @@ impl Scene {
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
         let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
         format!(
-            "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?} {additions}"
+            "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} \
+             {event_columns:?} {additions}"
         )
     }
 

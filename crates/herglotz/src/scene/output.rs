@@ -174,8 +174,8 @@ pub(crate) struct EventColumns {
 }
 
 impl Events {
-    /// The events of a motion over a time span, with the numbers of their resets. `known_factor` is whether the conformal
-    /// factor is known within steps.
+    /// The events of a motion over a time span, with the numbers of their resets. `known_factor` is whether the
+    /// conformal factor is known within steps.
     pub fn read(
         text: &str,
         (formula, known_factor): (&Formula, bool),

@@ -214,7 +214,7 @@ columns = ["speed = abs(x')"]
 [[want.events]]
 when = "x'"
 [sweep]
-e = [0.8, 0.6]
+e = [0.8, 0.9]
 "#;
     let at = Directory::new("resets");
     at.write("lift.csv", "t,lift\n0,0\n3,0\n");
