@@ -62,7 +62,7 @@ fn schemes_keep_their_orders() {
         (SplittingScheme::STRANG, &[32, 48, 64, 96][..]),
         (SplittingScheme::YOSHIDA_6, &[32, 40, 48, 64]),
         (SplittingScheme::KAHAN_LI_8, &[12, 16, 20]),
-        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[8, 12]),
+        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[6, 8]),
         (SplittingScheme::BLANES_MOAN_4, &[24, 32, 48, 64]),
         (SplittingScheme::BLANES_MOAN_6, &[12, 16, 20, 24]),
         (SplittingScheme::BLANES_CASAS_8, &[8, 12, 16]),

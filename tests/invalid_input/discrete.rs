@@ -40,6 +40,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("DiscreteLagrangian::is_explicit", "takes no number"),
     ("DiscreteLagrangian::constant_rate", "takes no number"),
     ("DiscreteLagrangian::order", "takes no number"),
+    ("DiscreteLagrangian::has_forces", "takes no number"),
     ("EnergyDrift::first", "takes no number"),
     ("exact_sum", "arithmetic: a result that is not finite follows from input that is not"),
     ("Drift::*", "arithmetic: a result that is not finite follows from input that is not"),

@@ -29,6 +29,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Structure::has_constant_rate", "takes no number"),
     ("Structure::is_affine_in_z", "takes no number"),
     ("Forced::new", "stores its arguments; every start checks them"),
+    ("Scalar::piecewise", "the caller's function; tables are tested"),
     ("Statement::*", "takes no number but its own; its test tries all"),
     ("ChartVector::from_fn", "the caller's function"),
     ("$name::new", "stores its arguments; check() and every start check them"),

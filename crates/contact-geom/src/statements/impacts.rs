@@ -18,6 +18,9 @@ pub(super) fn impact<const N: usize>(
     let wave = |i: usize| (1.3 * i as f64 + 0.4).sin();
     let normal = SVector::<f64, N>::from_fn(|i, _| wave(i) + if i + 1 == N { 1.5 } else { 0.0 });
     let approach = normal.dot(&x.v) + 0.1;
+    if !(x.q.iter().chain(&x.v).all(|e| e.is_finite()) && x.z.is_finite() && t.is_finite()) {
+        return Ok(f64::NAN);
+    }
     // A motion that arrives slowly may not arrive after a rounding.
     if approach.abs() < 1e-3 * (normal.abs().dot(&x.v.abs()) + 0.1) {
         return Ok(0.0);

@@ -228,7 +228,7 @@ fn select(points: &mut Vec<Separator>, scale: Scale, to_end: bool) {
             continue;
         }
         match largest {
-            Some(j) if points[j].value * value > 0.0 => {
+            Some(j) if same_sign(points[j].value, value) => {
                 if value.abs() > points[j].value.abs() {
                     largest = Some(i);
                 }
@@ -246,7 +246,8 @@ fn select(points: &mut Vec<Separator>, scale: Scale, to_end: bool) {
     for i in 1..last {
         let [before, value, after] = [i - 1, i, i + 1].map(|i| points[i].value);
         // Written so that a NaN is no extremum.
-        let is_touch = before * after > 0.0 && value.abs() < scale.near && value / before <= 1.0 && value / after < 1.0;
+        let is_touch =
+            same_sign(before, after) && value.abs() < scale.near && value / before <= 1.0 && value / after < 1.0;
         points[i].is_touch = is_touch;
         points[i].kept |= is_touch;
     }
@@ -254,6 +255,16 @@ fn select(points: &mut Vec<Separator>, scale: Scale, to_end: bool) {
         end.kept |= !end.value.is_finite();
     }
     points.retain(|point| point.kept && point.fraction > 0.0 && point.fraction < 1.0);
+}
+
+/// Whether two numbers have opposite signs; a product of them might underflow.
+pub(crate) fn opposite_signs(a: f64, b: f64) -> bool {
+    (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0)
+}
+
+/// Whether two numbers have the same sign, and neither is zero.
+fn same_sign(a: f64, b: f64) -> bool {
+    (a < 0.0 && b < 0.0) || (a > 0.0 && b > 0.0)
 }
 
 #[cfg(test)]
@@ -274,7 +285,7 @@ mod tests {
             [0.0].into_iter().chain(points.iter().map(|point| point.fraction)).chain([1.0]).collect();
         let between = |pair: &[f64]| {
             let ([a, b], values) = ([pair[0], pair[1]], [g(pair[0]), g(pair[1])]);
-            let changes = values[0] * values[1] < 0.0;
+            let changes = opposite_signs(values[0], values[1]);
             changes.then(|| bracketed_root_within(1e-12, [a, b], values, |x| Ok::<_, Infallible>(g(x))).unwrap_or(2.0))
         };
         (separation, places.windows(2).filter_map(between).collect(), count)

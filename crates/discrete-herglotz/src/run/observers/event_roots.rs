@@ -4,6 +4,7 @@ use crate::StepError;
 use crate::run::observers::event::Event;
 use crate::run::observers::last_step::{LastStep, TaylorPolynomial};
 use crate::solve::roots::{bracketed_root, bracketed_root_within};
+use crate::solve::sign_changes::opposite_signs;
 use contact_geom::PhasePoint;
 
 /// The relative round-off of a time and of a state, from the sums of a step, the iteration that solves it, and the root
@@ -63,7 +64,7 @@ impl<const N: usize> Event<'_, N> {
         let mut interpolant = |tau: f64| self.on_interpolant(step, tau);
         let ends = [interpolant(a)?, interpolant(b)?];
         // Written so that a NaN is not a sign change.
-        let brackets = ends[0] * ends[1] < 0.0;
+        let brackets = opposite_signs(ends[0], ends[1]);
         if !brackets {
             return Ok(None);
         }
