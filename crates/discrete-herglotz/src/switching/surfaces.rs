@@ -224,6 +224,36 @@ impl Surfaces {
         }
     }
 
+    /// Whether a point is on a surface up to round-off.
+    pub fn is_on<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        index: usize,
+        at: &TimedState<N>,
+        h: f64,
+    ) -> bool {
+        let x = at.point();
+        let rounding = self.rounding(lagrangian, index, (at.t, &x), h);
+        self.value(lagrangian, index, (at.t, &x)).abs() <= rounding
+    }
+
+    /// The other surfaces that the curve of a step crosses at the same point, which is the zero of one function. They
+    /// are crossed there at once: L on the other side of one of them alone need not be that of any motion.
+    pub fn simultaneous<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        curve: &StepCurve<N>,
+        index: usize,
+        at: &TimedState<N>,
+        h: f64,
+    ) -> Vec<usize> {
+        let (t, end) = curve.at(1.0);
+        let others = (0..self.sides.len()).filter(|i| *i != index);
+        let changed =
+            |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(lagrangian, i, (t, &end))) < 0.0;
+        others.filter(|i| changed(self, *i) && self.is_on(lagrangian, *i, at, h)).collect()
+    }
+
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
     /// not on the surface, or stays on it to second order. `h` is the length of a step.
     pub fn departure<const N: usize>(

@@ -53,7 +53,8 @@ impl Accumulation {
         let shortest = (MIN_REMAINING_TIME * h.abs()).max(MIN_REMAINING_ROUNDINGS * spacing);
         // A flight under a constant acceleration reaches a quarter of its time times its initial rate.
         let height = 0.25 * (last * ratio * rate).abs();
-        let is_short = remaining.abs() <= shortest || height <= MIN_HEIGHT_ROUNDINGS * rounding;
+        let is_low = rate != 0.0 && height <= MIN_HEIGHT_ROUNDINGS * rounding && remaining.abs() <= h.abs();
+        let is_short = remaining.abs() <= shortest || is_low;
         // Written so that NaN is no limit.
         ((0.0..1.0).contains(&ratio) && is_short).then_some(t + remaining)
     }

@@ -129,13 +129,21 @@ where
             if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
-            let resets = self.resets.len();
-            let (next, factor) = self.through(to, change.index, span, spacing)?;
-            if self.resets.len() > resets {
-                self.end_piece(&mut piece, &to);
-                piece = OpenPiece { from: next, parts: 0, dense: None };
+            let together = self.surfaces.simultaneous(self.problem.lagrangian, &curve, change.index, &to, self.h);
+            at = to;
+            for index in std::iter::once(change.index).chain(together) {
+                // A reset may have moved the motion away from another surface.
+                if index != change.index && !self.surfaces.is_on(self.problem.lagrangian, index, &at, self.h) {
+                    continue;
+                }
+                let resets = self.resets.len();
+                let (next, factor) = self.through(at, index, span, spacing)?;
+                if self.resets.len() > resets {
+                    self.end_piece(&mut piece, &at);
+                    piece = OpenPiece { from: next, parts: 0, dense: None };
+                }
+                (at, sigma) = (next, sigma * factor);
             }
-            (at, sigma) = (next, sigma * factor);
             // The curve of a part that is much longer than the next flight would round it away.
             longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
             switches = true;
