@@ -198,9 +198,11 @@ impl Surfaces {
             let there = self.value(lagrangian, index, (t, &x));
             if there.is_finite() { (there - here).abs() } else { 0.0 }
         };
-        let (dt, v) = (POINT_ROUND_OFF * t.abs().max(h.abs()), POINT_ROUND_OFF * x.v.amax());
+        let acceleration = herglotz_field(lagrangian, t, x).map_or(SVector::zeros(), |field| field.y);
+        let dt = POINT_ROUND_OFF * t.abs().max(h.abs());
+        let v = POINT_ROUND_OFF * x.v.amax().max((acceleration * h).amax());
         let q = POINT_ROUND_OFF * x.q.amax().max((x.v * h).amax());
-        let mut sum = change(t + dt, VelocityPoint { q: x.q + x.v * dt, ..*x })
+        let mut sum = change(t + dt, VelocityPoint { q: x.q + x.v * dt, v: x.v + acceleration * dt, z: x.z })
             + change(t, VelocityPoint { z: x.z * (1.0 + POINT_ROUND_OFF), ..*x });
         for i in 0..N {
             let mut moved = *x;
@@ -243,12 +245,13 @@ impl Surfaces {
         &mut self,
         lagrangian: &impl Lagrangian<N>,
         curve: &StepCurve<N>,
-        index: usize,
+        change: &SignChange,
         at: &TimedState<N>,
         h: f64,
     ) -> Vec<usize> {
-        let (t, end) = curve.at(1.0);
-        let others = (0..self.sides.len()).filter(|i| *i != index);
+        // Where the function of the zero has its new sign.
+        let (t, end) = curve.at(change.ends[1]);
+        let others = (0..self.sides.len()).filter(|i| *i != change.index);
         let changed =
             |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(lagrangian, i, (t, &end))) < 0.0;
         others.filter(|i| changed(self, *i) && self.is_on(lagrangian, *i, at, h)).collect()

@@ -129,7 +129,7 @@ where
             if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
-            let together = self.surfaces.simultaneous(self.problem.lagrangian, &curve, change.index, &to, self.h);
+            let together = self.surfaces.simultaneous(self.problem.lagrangian, &curve, &change, &to, self.h);
             at = to;
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
