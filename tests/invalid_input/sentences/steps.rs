@@ -182,7 +182,7 @@ fn step_errors() {
         }, ["the reset at t = ", "the other side of its own surface", "assign a state"];
         StepError::Accumulation { .. } => {
             Impacting(Impact::Restitution(0.0)).fails()
-        }, ["accumulate at t = 1", "at_accumulation"];
+        }, ["accumulate at t = 1", "how the motion continues"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();

@@ -7,6 +7,7 @@ use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
 use crate::run::observers::last_step::LastStep;
 use crate::run::observers::output_request::RunInfo;
 use crate::solve::chebyshev::{Samples, node};
+use crate::solve::sign_changes::opposite_signs;
 use crate::solve::sign_changes::{Scale, Separation, Separator, has_no_zero, separate};
 use contact_geom::PhasePoint;
 
@@ -245,7 +246,7 @@ impl<const N: usize> Event<'_, N> {
                 continue;
             }
             match self.between(last_sign, [value, value], (t, &state)) {
-                Change::None if value * before >= 0.0 => from = tau,
+                Change::None if !opposite_signs(value, before) => from = tau,
                 Change::None => return Ok(None),
                 Change::There(t, state) => return Ok(Some((t, state))),
                 Change::Between(values) => return self.root(step, [from, tau], values).map(Some),
@@ -273,7 +274,7 @@ impl<const N: usize> Event<'_, N> {
         match zero {
             Some((t, state)) => Change::There(t, state),
             // The point is on the surface, and the function is about to leave it.
-            None if value * before >= 0.0 => Change::There(t, *state),
+            None if !opposite_signs(value, before) => Change::There(t, *state),
             None => Change::Between([before, value]),
         }
     }
@@ -297,8 +298,8 @@ impl<const N: usize> Event<'_, N> {
             let window = state_rounding + (departure.value - g).abs() * (rounding / ahead);
             let on = g.abs() <= window
                 // The function may jump across its surface.
-                || g * departure.value < 0.0
-                    && self.after((motion, near), (t, state), rounding.copysign(scales.h)).is_some_and(|x| g * x.value < 0.0);
+                || opposite_signs(g, departure.value)
+                    && self.after((motion, near), (t, state), rounding.copysign(scales.h)).is_some_and(|x| opposite_signs(g, x.value));
             if !on {
                 return None;
             }
