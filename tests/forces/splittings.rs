@@ -34,7 +34,8 @@ impl<const N: usize> Force<N> for SwirlAndDrag {
 }
 
 /// The order of a scheme on a problem, in q, p and z together. With a scheme of order 10 the error reaches round-off
-/// before its slope is asymptotic; it is then bounded by 0.7.
+/// before its slope is asymptotic. The scheme is symmetric, so that the slope differs from the order by a multiple of
+/// `h^2`: it is extrapolated from two pairs of steps, of which the second has half the lengths of the first.
 fn assert_order<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     x: VelocityPoint<N>,
@@ -45,8 +46,14 @@ fn assert_order<const N: usize>(
     let error = |n: usize| relative_distance(run(lagrangian, x, scheme, 2.0, n), truth);
     let points: Vec<_> = counts.iter().map(|n| (2.0 / *n as f64, error(*n))).collect();
     let (observed, order) = (slope(&points), f64::from(scheme.order()));
-    let bound = if scheme.order() < 10 { 0.15 } else { 0.7 };
-    assert!((observed - order).abs() < bound, "{}: {observed:.3} {points:?}", scheme.name());
+    let observed = match points.as_slice() {
+        [coarse @ .., _, _] if scheme.order() == 10 => {
+            let fine = slope(&points[coarse.len()..]);
+            fine + (fine - slope(coarse)) / 3.0
+        }
+        _ => observed,
+    };
+    assert!((observed - order).abs() < 0.15, "{}: {observed:.3} {points:?}", scheme.name());
 }
 
 /// Schemes keep their orders with kicks by a force of time and positions, with linear and with quadratic drag, and with
@@ -62,7 +69,7 @@ fn schemes_keep_their_orders() {
         (SplittingScheme::STRANG, &[32, 48, 64, 96][..]),
         (SplittingScheme::YOSHIDA_6, &[32, 40, 48, 64]),
         (SplittingScheme::KAHAN_LI_8, &[12, 16, 20]),
-        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[6, 8]),
+        (SplittingScheme::SOFRONIOU_SPALETTA_10, &[16, 20, 32, 40]),
         (SplittingScheme::BLANES_MOAN_4, &[24, 32, 48, 64]),
         (SplittingScheme::BLANES_MOAN_6, &[12, 16, 20, 24]),
         (SplittingScheme::BLANES_CASAS_8, &[8, 12, 16]),

@@ -39,6 +39,9 @@ const POINT_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
 const DEPARTURE: f64 = 1e-5;
 
+/// The number of changes of a function, over [`DEPARTURE`] and by round-off, beyond which it is far from zero.
+const FAR: f64 = 64.0;
+
 /// Whether a Lagrangian has switching functions or breaks.
 ///
 /// # Errors
@@ -172,12 +175,8 @@ impl Surfaces {
         let old = self.clone();
         *self = Surfaces::at(lagrangian, t, to, h);
         for i in 0..self.sides.len() {
-            let mut is_on = |x: &VelocityPoint<N>| {
-                let rounding = self.rounding(lagrangian, i, (t, x), h);
-                self.value(lagrangian, i, (t, x)).abs() <= rounding
-            };
             let side = if i == index { departure.map(|departure| departure.side) } else { None };
-            let stays = i != index && is_on(from) && is_on(to);
+            let stays = i != index && [from, to].into_iter().all(|x| self.is_on(lagrangian, i, (t, x), h));
             if let Some(of) = self.sides.get_mut(i) {
                 *of = side.unwrap_or(if stays { old.side(i) } else { *of });
             }
@@ -215,9 +214,32 @@ impl Surfaces {
         sum
     }
 
-    /// Gives each function that is zero up to round-off the sign that it takes next along the motion.
+    /// Gives each function that is zero up to round-off the sign that it takes next along the motion. Two evaluations of
+    /// all functions show which of them are far from zero; the others are examined one by one.
     fn leave<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
-        for index in 0..self.sides.len() {
+        if self.sides.is_empty() {
+            return;
+        }
+        let here = self.values.clone();
+        let dt = DEPARTURE * h;
+        let grown = 1.0 + POINT_ROUND_OFF;
+        let points = [
+            (t + dt, VelocityPoint { q: x.q + x.v * dt, ..*x }),
+            (t, VelocityPoint { q: x.q * grown, v: x.v * grown, z: x.z * grown }),
+        ];
+        let mut changes = vec![0.0; here.len()];
+        for (t, x) in points {
+            self.values.clear();
+            lagrangian.switching_functions(t, &x, &mut self.values);
+            for ((change, before), after) in changes.iter_mut().zip(&here).zip(&self.values) {
+                *change += (after - before).abs();
+            }
+        }
+        for (index, (value, change)) in here.iter().zip(changes).enumerate() {
+            // Written so that a NaN is examined.
+            if value.abs() > FAR * change {
+                continue;
+            }
             let tolerance = self.rounding(lagrangian, index, (t, x), h);
             let departure = self.departure(lagrangian, index, (t, x), h, tolerance);
             if let (Some(Departure { side, .. }), Some(of)) = (departure, self.sides.get_mut(index)) {
@@ -231,12 +253,11 @@ impl Surfaces {
         &mut self,
         lagrangian: &impl Lagrangian<N>,
         index: usize,
-        at: &TimedState<N>,
+        (t, x): (f64, &VelocityPoint<N>),
         h: f64,
     ) -> bool {
-        let x = at.point();
-        let rounding = self.rounding(lagrangian, index, (at.t, &x), h);
-        self.value(lagrangian, index, (at.t, &x)).abs() <= rounding
+        let rounding = self.rounding(lagrangian, index, (t, x), h);
+        self.value(lagrangian, index, (t, x)).abs() <= rounding
     }
 
     /// The other surfaces that the curve of a step crosses at the same point, which is the zero of one function. They
@@ -254,7 +275,7 @@ impl Surfaces {
         let others = (0..self.sides.len()).filter(|i| *i != change.index);
         let changed =
             |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(lagrangian, i, (t, &end))) < 0.0;
-        others.filter(|i| changed(self, *i) && self.is_on(lagrangian, *i, at, h)).collect()
+        others.filter(|i| changed(self, *i) && self.is_on(lagrangian, *i, (at.t, &at.point()), h)).collect()
     }
 
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is

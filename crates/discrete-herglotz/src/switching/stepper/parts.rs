@@ -133,7 +133,9 @@ where
             at = to;
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
-                if index != change.index && !self.surfaces.is_on(self.problem.lagrangian, index, &at, self.h) {
+                if index != change.index
+                    && !self.surfaces.is_on(self.problem.lagrangian, index, (at.t, &at.point()), self.h)
+                {
                     continue;
                 }
                 let resets = self.resets.len();
