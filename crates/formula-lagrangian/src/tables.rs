@@ -23,7 +23,7 @@ impl Graph {
     /// let drive = graph.interpolate(&table, t);
     /// let slope = graph.gradient(drive, &[t], 100).unwrap_or_default();
     /// assert_eq!((graph.tables().len(), slope.len()), (1, 1));
-    /// # Ok::<(), contact_geom::TableError>(())
+    /// # Ok::<(), contact_geom::table::TableError>(())
     /// ```
     pub fn interpolate(&mut self, table: &Table, argument: Id) -> Id {
         let index = self.add_table(table);

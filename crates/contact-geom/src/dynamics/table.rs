@@ -76,7 +76,7 @@ pub enum TableError {
 /// assert_eq!([-1.0, 0.5, 2.0, 9.0].map(|t: f64| ramp.value(t)), [0.0, 1.0, 2.0, 2.0]);
 /// assert_eq!(ramp.derivative(1, 0.5), 2.0);
 /// assert!(Table::new(&[0.0, 0.0], &[1.0, 2.0], Interpolation::Held).is_err());
-/// # Ok::<(), contact_geom::TableError>(())
+/// # Ok::<(), contact_geom::table::TableError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
