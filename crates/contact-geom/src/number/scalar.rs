@@ -144,7 +144,7 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// The arc tangent.
     fn atan(self) -> Self;
-    /// Numbers that are piecewise constant functions of this one, such as the coefficients of a [`Table`](crate::Table).
+    /// Numbers that are piecewise constant functions of this one, such as the coefficients of a [`Table`](crate::table::Table).
     /// `of` is applied to the value, in SIMD lanes to that of each lane. The differentials are 0.
     #[inline(always)]
     fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
