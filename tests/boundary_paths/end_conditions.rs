@@ -77,7 +77,7 @@ fn periodic_paths_of_forced_systems() {
     closes(&ld, 0.3, &found, [1.0]);
 }
 
-fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: &CriticalPath<N>, shift: [f64; N]) {
+pub fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: &CriticalPath<N>, shift: [f64; N]) {
     check(ld, (0.0, z0), found, 1.0);
     let steps = found.points.len() - 1;
     let point = |k: usize| DiscretePoint { q0: found.points[k], q1: found.points[k + 1], z0: found.actions[k] };

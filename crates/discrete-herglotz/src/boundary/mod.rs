@@ -11,6 +11,7 @@ mod index;
 mod newton;
 mod path_check;
 mod problem;
+mod step_forces;
 mod thomas;
 
 pub use branch::branch;
