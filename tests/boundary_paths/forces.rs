@@ -86,7 +86,7 @@ fn assert_is_the_run<D: DiscreteLagrangian<N>, const N: usize>(name: &str, ld: &
     let size = largest_of(&states.iter().map(|x| x.q).collect::<Vec<_>>());
     // The rounding of a position, eps q in each step, is one of eps q / h in a momentum, which moves the positions
     // within the span by up to k h eps q / h = k eps q.
-    let bound = 16.0 * EPS * steps as f64 * size;
+    let bound = 2.0 * EPS * steps as f64 * size;
     let given = |p: SVector<f64, N>| End::Momentum(p);
     let (q0, q1) = (End::Position(first.q), End::Position(last.q));
     for (what, ends) in [

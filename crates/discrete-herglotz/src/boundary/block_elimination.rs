@@ -105,7 +105,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
             let t = self.t0 + k as f64 * self.ld.step_size();
             let jet = self.ld.jet(t, &point).map_err(undefined)?;
             p = jet.d2;
-            if const { D::FORCED } && k + 1 == self.steps {
+            if const { D::FORCED } && k + 1 == self.steps && self.ld.has_forces() {
                 p += self.ld.forces(t, &point).map_err(undefined)?[1];
             }
             x.z[k + 1] = x.z[k] + jet.value;

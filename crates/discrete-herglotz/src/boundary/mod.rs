@@ -1,4 +1,4 @@
-//! The discrete Herglotz principle as a boundary-value problem.
+//! The discrete Herglotz principle as a boundary-value problem, with discrete forces if there are any.
 
 mod block_elimination;
 mod branch;
