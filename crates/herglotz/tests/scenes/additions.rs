@@ -421,16 +421,16 @@ fn paths_with_forces() {
         scene.system.path(&scene.problem).unwrap()
     });
     assert!(found.is_found() && found.unresolved.is_none() && found.iterations <= 8, "{found:?}");
-    assert_eq!(found, same);
+    // The same equations, up to the order of their sums.
+    assert!(found.q.iter().zip(&same.q).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {same:?}");
     let error = found.t.iter().zip(&found.q).map(|(t, x)| (x - distance(*t)).abs()).fold(0.0, f64::max);
     // Of order h^2 with h = 0.01; the estimate is in units of the range of x.
     let estimate = found.error_estimate.unwrap() * distance(2.0);
     assert!(error < 1e-3 && estimate > 0.5 * error && estimate < 2.0 * error, "{estimate:e} for {error:e}");
-    assert!(found.v[0].abs() < 1e-3 && found.p == found.v, "{}", found.v[0]);
+    assert!(found.v[0].abs() < 1e-3 && found.v.iter().zip(&found.p).all(|(v, p)| (v - p).abs() < 1e-13), "{found:?}");
     for (from, to, word) in [
         ("midpoint", "gauss_2", "\"midpoint\" or \"trapezoidal\""),
         (", integrator = \"midpoint\"", "", "no discrete Lagrangian with forces"),
-        ("midpoint", "yoshida_4", "\"midpoint\" or \"trapezoidal\""),
     ] {
         let scene = EndsScene::read(&changed(&text, &[(from, to)])).unwrap();
         let error = scene.explain(&scene.system.path(&scene.problem).unwrap_err());
