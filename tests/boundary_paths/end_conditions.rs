@@ -2,7 +2,8 @@
 
 use super::{EPS, at, by, check, largest_of};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Duffing, FreeParticle, Pendulum, QuadraticInZ, Relativistic};
+use contact_geom::switching::{Impact, Impacts, Surface};
+use contact_geom::systems::{Duffing, FreeParticle, Pendulum, QuadraticInZ, Relativistic, UniformField};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
 use discrete_herglotz::rules::{Method, Midpoint};
@@ -77,7 +78,7 @@ fn periodic_paths_of_forced_systems() {
     closes(&ld, 0.3, &found, [1.0]);
 }
 
-fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: &CriticalPath<N>, shift: [f64; N]) {
+pub fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: &CriticalPath<N>, shift: [f64; N]) {
     check(ld, (0.0, z0), found, 1.0);
     let steps = found.points.len() - 1;
     let point = |k: usize| DiscretePoint { q0: found.points[k], q1: found.points[k + 1], z0: found.actions[k] };
@@ -117,6 +118,23 @@ fn undefined_paths_are_a_status() {
     let ld = by(Method::LeftMidpoint, FreeParticle { gamma: -3.0 }, 0.5);
     let found = BoundaryPath::new(&ld, 4, [at([0.0]), at([1.0])]).unwrap().search();
     assert!(matches!(found.status, PathStatus::SigmaVanished { step: 0, sigma } if sigma == -0.5), "{}", found.status);
+}
+
+/// A path knows no impacts: it passes through the surface, here below the ground.
+#[test]
+fn paths_pass_through_surfaces() {
+    struct Ground;
+    impl Surface<1> for Ground {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
+            q[0]
+        }
+    }
+    let field = UniformField::<1> { field: [1.0], gamma: -0.1 };
+    let ball = Impacts::new(field, Ground, Impact::Elastic);
+    let ends = [at([0.1]), at([0.1])];
+    let found = BoundaryPath::new(Midpoint::new(ball, 0.1).unwrap(), 20, ends).unwrap().search();
+    let free = BoundaryPath::new(Midpoint::new(field, 0.1).unwrap(), 20, ends).unwrap().search();
+    assert!(found.is_found() && found.points == free.points && found.points[10][0] < 0.0, "{}", found.points[10]);
 }
 
 #[test]

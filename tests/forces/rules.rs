@@ -5,7 +5,6 @@ use crate::common::{relative_distance, slope};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledPlane, Kepler, OneCoordinate, QuadraticInZ, System, TwoCoordinates};
 use contact_geom::{DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
-use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint};
 use discrete_herglotz::splitting::{ActionStrang, Strang};
@@ -121,6 +120,4 @@ fn what_takes_no_force_refuses_it() {
     let forced = Forced { lagrangian: Kepler::<2>::default(), force: Swirl };
     let refused = |found: Option<InputError>| assert!(matches!(found, Some(InputError::Forced { .. })), "{found:?}");
     refused(Gauss::new::<2>(&forced, 2, 0.1).err());
-    let ends = [End::Position([1.0, 0.0].into()), End::Position([0.0, 1.0].into())];
-    refused(BoundaryPath::new(Midpoint::new(&forced, 0.1).unwrap(), 4, ends).err());
 }

@@ -60,6 +60,27 @@ def test_a_guess_leads_to_another_path():
     assert swung and np.max(np.abs(swung.q)) > 0.5
 
 
+@pytest.mark.parametrize(
+    "way",
+    [
+        dict(force="-k*x'*abs(x')"),
+        dict(force=lambda t, q, v, z, k: -k * v * np.abs(v)),
+        dict(rayleigh="k*abs(x')^3/3"),
+    ],
+)
+def test_a_fall_with_quadratic_drag(way):
+    """From rest it covers ln(cosh(sqrt(g k) t))/k; the error of a rule of order two with h = 0.01."""
+    g, k = 9.81, 0.3
+    distance = lambda t: np.log(np.cosh(np.sqrt(g * k) * t)) / k
+    given = dict(coordinates=["x"], parameters={"k": k}, steps=200, **way)
+    found = hz.path("x'^2/2 + 9.81*x", [0.0], [distance(2.0)], 2.0, integrator="midpoint", **given)
+    error = np.max(np.abs(found.q[:, 0] - distance(found.t)))
+    assert found and found.unresolved is None and error < 1e-3
+    assert 0.5 * error < found.error_estimate * distance(2.0) < 2.0 * error
+    with pytest.raises(ValueError, match="gauss_4.*no discrete Lagrangian with forces.*midpoint"):
+        hz.path("x'^2/2 + 9.81*x", [0.0], [distance(2.0)], 2.0, **given)
+
+
 def test_bad_arguments_are_named():
     good = dict(q0=[0.0], q1=[1.0], t=2.0, steps=40) | OSCILLATOR
     for change, said in [

@@ -3,6 +3,7 @@
 
 use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
 use super::end::Conditions;
+use super::step_forces::StepForces;
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, SecondDiscreteJet, numbers::max_or_nan, support::linear};
@@ -25,7 +26,7 @@ pub(super) struct Eliminated<const N: usize> {
 /// The momentum at the end of a step, with the derivative in the action.
 #[derive(Clone, Copy)]
 pub(super) struct Carry<const N: usize> {
-    /// `D2 L_d`, the momentum at the end of the step.
+    /// `D2 L_d + F+`, the momentum at the end of the step.
     pub p: SVector<f64, N>,
     /// `Dz L_d`.
     pub dz: f64,
@@ -35,8 +36,8 @@ pub(super) struct Carry<const N: usize> {
 
 impl<const N: usize> Carry<N> {
     #[inline(always)]
-    pub fn of(jet: &SecondDiscreteJet<N>) -> Self {
-        Carry { p: jet.first.d2, dz: jet.first.dz, sigma: jet.first.sigma() }
+    pub fn of<D: DiscreteLagrangian<N>>(jet: &SecondDiscreteJet<N>, forces: &StepForces<D, N>) -> Self {
+        Carry { p: forces.momentum(jet), dz: jet.first.dz, sigma: jet.first.sigma() }
     }
 }
 
@@ -51,7 +52,7 @@ pub(super) struct BlockElimination<const N: usize> {
     last: SVector<f64, N>,
     /// The momenta along the path of the last elimination.
     pub momenta: Vec<Carry<N>>,
-    /// Whether a second derivative of the discrete Lagrangian in the action has been nonzero.
+    /// Whether a momentum of a step has been found to depend on the action.
     pub coupled: bool,
 }
 
@@ -100,12 +101,31 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
         let mut p = SVector::zeros();
         for k in 0..self.steps {
             let point = DiscretePoint { q0: x.q[k], q1: x.q[k + 1], z0: x.z[k] };
-            let jet = self.ld.jet(self.t0 + k as f64 * self.ld.step_size(), &point);
-            let jet = jet.map_err(|cause| Undefined { step: k, cause })?;
+            let undefined = |cause| Undefined { step: k, cause };
+            let t = self.t0 + k as f64 * self.ld.step_size();
+            let jet = self.ld.jet(t, &point).map_err(undefined)?;
             p = jet.d2;
+            if const { D::FORCED } && k + 1 == self.steps && self.ld.has_forces() {
+                p += self.ld.forces(t, &point).map_err(undefined)?[1];
+            }
             x.z[k + 1] = x.z[k] + jet.value;
         }
         Ok(p)
+    }
+
+    /// The discrete forces of a step, with finite entries.
+    #[inline(always)]
+    fn forces(
+        &self,
+        k: usize,
+        q0: &SVector<f64, N>,
+        q1: &SVector<f64, N>,
+        z0: f64,
+    ) -> Result<StepForces<D, N>, Undefined> {
+        let t = self.t0 + k as f64 * self.ld.step_size();
+        let forces = StepForces::at(self.ld, t, &DiscretePoint { q0: *q0, q1: *q1, z0 });
+        let forces = forces.map_err(|cause| Undefined { step: k, cause })?;
+        if forces.is_finite() { Ok(forces) } else { Err(Undefined { step: k, cause: StepError::NonFinite }) }
     }
 
     /// The second jet of a step, with finite entries. It is not inlined, unlike in the elimination
@@ -131,8 +151,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
     }
 }
 
-/// The discrete Herglotz equation at a point, `H = D1 + sigma p` with `p = D2` of the previous step (or a given
-/// momentum), and its derivatives in the position and action of the point and in the next position, at fixed p.
+/// The discrete Herglotz equation at a point, `H = D1 + F- + sigma p` with `p = D2 + F+` of the previous step (or a
+/// given momentum), and its derivatives in the position and action of the point and in the next position, at fixed p.
 pub(super) struct HerglotzEquation<const N: usize> {
     value: SVector<f64, N>,
     /// The sizes of its terms.
@@ -144,24 +164,33 @@ pub(super) struct HerglotzEquation<const N: usize> {
 
 impl<const N: usize> HerglotzEquation<N> {
     #[inline(always)]
-    pub fn new(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
+    pub fn new<D: DiscreteLagrangian<N>>(
+        p: &SVector<f64, N>,
+        (jet, forces): (&SecondDiscreteJet<N>, &StepForces<D, N>),
+        neighbour: &SVector<f64, N>,
+    ) -> Self {
         let sigma = jet.first.sigma();
-        let next = jet.d12 + p * jet.d2z.transpose();
+        let next = forces.pull_in_q1(jet) + p * jet.d2z.transpose();
         HerglotzEquation {
-            value: jet.first.d1 + p * sigma,
+            value: forces.pull(jet) + p * sigma,
             // Includes the effect of the round-off of the three positions in the equation.
-            size: jet.first.d1.abs() + p.abs() * sigma.abs() + next.abs() * neighbour.abs() * 4.0,
-            here: jet.d11 + p * jet.d1z.transpose(),
-            action: jet.d1z + p * jet.dzz,
+            size: forces.pull_size(jet) + p.abs() * sigma.abs() + next.abs() * neighbour.abs() * 4.0,
+            here: forces.pull_in_q0(jet) + p * jet.d1z.transpose(),
+            action: forces.pull_in_z(jet) + p * jet.dzz,
             next,
         }
     }
 
-    /// The condition `D2 = p` at the end of a path.
-    fn at_end(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
+    /// The condition `D2 + F+ = p` at the end of a path.
+    fn at_end<D: DiscreteLagrangian<N>>(
+        p: &SVector<f64, N>,
+        (jet, forces): (&SecondDiscreteJet<N>, &StepForces<D, N>),
+        neighbour: &SVector<f64, N>,
+    ) -> Self {
+        let momentum = forces.momentum(jet);
         HerglotzEquation {
-            value: jet.first.d2 - p,
-            size: jet.first.d2.abs() + p.abs() + jet.d12.abs().transpose() * neighbour.abs() * 2.0,
+            value: momentum - p,
+            size: momentum.abs() + p.abs() + forces.momentum_in_q0(jet).abs() * neighbour.abs() * 2.0,
             here: SMatrix::zeros(),
             action: SVector::zeros(),
             next: SMatrix::zeros(),
@@ -169,26 +198,26 @@ impl<const N: usize> HerglotzEquation<N> {
     }
 
     /// The linearised equation of point k+1 in the corrections of the positions, by which those of both actions are
-    /// expressed. `before` is the jet of step k, `sigma` the factor of p.
+    /// expressed. `before` is the jet of step k with its forces, `sigma` the factor of p.
     #[inline(always)]
-    fn rows<const PERIODIC: bool>(
+    fn rows<D: DiscreteLagrangian<N>, const PERIODIC: bool>(
         &self,
-        before: &SecondDiscreteJet<N>,
+        (before, forces): (&SecondDiscreteJet<N>, &StepForces<D, N>),
         sigma: f64,
         action: &ActionRow<N>,
         next_action: &ActionRow<N>,
     ) -> BlockRows<N> {
-        let by_action = before.d2z * sigma;
+        let by_action = forces.momentum_in_z(before) * sigma;
         let first = if PERIODIC {
             -by_action * action.first.transpose() - self.action * next_action.first.transpose()
         } else {
             SMatrix::zeros()
         };
         BlockRows {
-            here: before.d12.transpose() * sigma
+            here: forces.momentum_in_q0(before) * sigma
                 - by_action * action.here.transpose()
                 - self.action * next_action.here.transpose(),
-            next: self.here + before.d22 * sigma
+            next: self.here + forces.momentum_in_q1(before) * sigma
                 - by_action * action.next.transpose()
                 - self.action * next_action.next.transpose(),
             after: self.next,
@@ -303,33 +332,40 @@ impl<const N: usize> BlockElimination<N> {
         self.after.clear();
         let mut measured = Measured::new();
         let mut now = of.jet(0, &x.q[0], &x.q[1], x.z[0])?;
+        let mut forces = of.forces(0, &x.q[0], &x.q[1], x.z[0])?;
         let (start, end) = of.conditions.momenta();
         let mut panel = Panel::new(PERIODIC);
         if let Some(p) = &start {
-            let at = HerglotzEquation::new(p, &now, &x.q[1]);
+            let at = HerglotzEquation::new(p, (&now, &forces), &x.q[1]);
             measured.take(&at.value, &at.size);
             panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
         }
-        // The jet of the first step, for a periodic path; and whether no pivot has vanished so far.
-        let (opening, mut regular) = (now, true);
+        // The jet and the forces of the first step, for a periodic path; and whether no pivot has vanished so far.
+        let (opening, opening_forces, mut regular) = (now, forces, true);
         let mut diagonal = SVector::<f64, N>::zeros();
         // The row of the action at point k; zero at the start, where the action is given.
         let mut action = ActionRow::zero();
         for k in 0..steps {
             measured.factor(k, now.first.sigma());
-            self.momenta[k] = Carry::of(&now);
+            self.momenta[k] = Carry::of(&now, &forces);
             x.z[k + 1] = x.z[k] + now.first.value;
             panel.action = action.recursion(&now.first);
-            let ahead = if k + 1 < steps { Some(of.jet(k + 1, &x.q[k + 1], &x.q[k + 2], x.z[k + 1])?) } else { None };
+            let ahead = if k + 1 < steps {
+                let (q0, q1, z0) = (&x.q[k + 1], &x.q[k + 2], x.z[k + 1]);
+                Some((of.jet(k + 1, q0, q1, z0)?, of.forces(k + 1, q0, q1, z0)?))
+            } else {
+                None
+            };
+            let p_next = forces.momentum(&now);
             let bottom = match (&ahead, &end) {
-                (Some(jet), _) => {
-                    let at = HerglotzEquation::new(&now.first.d2, jet, &x.q[k + 2]);
+                (Some((jet, of_jet)), _) => {
+                    let at = HerglotzEquation::new(&p_next, (jet, of_jet), &x.q[k + 2]);
                     Some((at, jet.first.sigma()))
                 }
-                (None, Some(p)) => Some((HerglotzEquation::at_end(p, &now, &x.q[k]), 1.0)),
+                (None, Some(p)) => Some((HerglotzEquation::at_end(p, (&now, &forces), &x.q[k]), 1.0)),
                 // The momentum at the end of a periodic path is that of its start.
                 (None, None) if PERIODIC => {
-                    let at = HerglotzEquation::new(&now.first.d2, &opening, &x.q[1]);
+                    let at = HerglotzEquation::new(&p_next, (&opening, &opening_forces), &x.q[1]);
                     // Its derivatives in the first two positions were stored at the start of the elimination.
                     let (here, next) = (SMatrix::zeros(), SMatrix::zeros());
                     Some((HerglotzEquation { here, next, action: SVector::zeros(), ..at }, opening.first.sigma()))
@@ -341,12 +377,13 @@ impl<const N: usize> BlockElimination<N> {
                 break;
             };
             measured.take(&at.value, &at.size);
-            panel.bottom = at.rows::<PERIODIC>(&now, sigma, &action, &panel.action);
+            panel.bottom = at.rows::<D, PERIODIC>((&now, &forces), sigma, &action, &panel.action);
             diagonal = panel.bottom.next.diagonal().abs();
             if k == 0 && start.is_none() {
                 // The first position is given, or it is the last unknown of a periodic path.
                 if PERIODIC {
-                    let at = HerglotzEquation::new(&of.last_momentum(x)?, &opening, &SVector::zeros());
+                    let last = of.last_momentum(x)?;
+                    let at = HerglotzEquation::new(&last, (&opening, &opening_forces), &SVector::zeros());
                     panel.open(at.here, at.next);
                 }
             } else {
@@ -363,7 +400,7 @@ impl<const N: usize> BlockElimination<N> {
             panel.advance::<PERIODIC>();
             action = panel.action;
             if let Some(ahead) = ahead {
-                now = ahead;
+                (now, forces) = ahead;
             }
         }
         measured.log_factor += measured.factors.ln();

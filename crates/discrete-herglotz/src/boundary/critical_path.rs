@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 /// How the search for a critical path ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathStatus {
-    /// The path satisfies the discrete Herglotz equations to round-off. An [unresolved step](CriticalPath::unresolved)
+    /// The path satisfies the discrete Herglotz equations (with their forces) to round-off. An [unresolved step](CriticalPath::unresolved)
     /// indicates that it may not approximate a motion.
     Found,
     /// The search did not converge within the limit of iterations.
@@ -86,7 +86,7 @@ pub struct CriticalPath<const N: usize> {
     /// The first-order estimate of the effect of the local truncation error on the path, in units of the range of the
     /// path. It uses the inverse of the last Jacobian, so that it is of order one where the ends are conjugate to
     /// within the error of the steps. Available for found paths of a discrete Lagrangian of
-    /// [order](crate::DiscreteLagrangian::order) one or two.
+    /// [order](crate::DiscreteLagrangian::order) two, and of order one without forces.
     pub error_estimate: Option<f64>,
     /// The first unresolved step, as in a run with the same discrete Lagrangian; otherwise the step with the largest
     /// error estimate, if that exceeds a quarter. Such a path may be far from every motion: it may cross a centre of

@@ -8,9 +8,12 @@ pub enum End<const N: usize> {
     /// The position is given.
     Position(SVector<f64, N>),
     /// The momentum is given: at the start `p_0` of F-L_d, so that `D1 L_d(q_0, q_1, z_0) + sigma_d p_0 = 0`; at the
-    /// end `p_N` of F+L_d, `D2 L_d(q_{N-1}, q_N, z_{N-1}) = p_N`.
+    /// end `p_N` of F+L_d, `D2 L_d(q_{N-1}, q_N, z_{N-1}) = p_N`. With
+    /// [discrete forces](crate::DiscreteLagrangian::forces), `D1 L_d + F-` and `D2 L_d + F+` are in the place of the
+    /// derivatives.
     Momentum(SVector<f64, N>),
-    /// The position is free, and the action is critical in it: the natural boundary condition, a vanishing momentum.
+    /// The position is free: the natural boundary condition, a vanishing momentum. Without forces the action is critical
+    /// in this position.
     Free,
 }
 

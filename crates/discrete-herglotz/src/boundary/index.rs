@@ -5,8 +5,8 @@ use super::end::Conditions;
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 
-/// The numbers of negative and of vanishing directions of the second variation; `None` for a periodic path, and where a
-/// `sigma_d` is not positive.
+/// The numbers of negative and of vanishing directions of the second variation; `None` for a periodic path, for one with
+/// forces, and where a `sigma_d` is not positive.
 ///
 /// At a critical path the Hessian of `A_d` in the free positions is block tridiagonal, because the action at a point
 /// depends on the positions before the last one only to second order. Divided by the product of the sigma_d after point
@@ -21,6 +21,9 @@ pub(super) fn inertia<D: DiscreteLagrangian<N>, const N: usize>(
     let Conditions::Ends(start, end) = of.conditions else {
         return Ok(None);
     };
+    if of.ld.has_forces() {
+        return Ok(None);
+    }
     let steps = of.steps;
     // The momentum and the second derivative D22 of the previous step, and the matrix `F_k^T S_k^-1 F_k`.
     let (mut p, mut d22, mut carried) =

@@ -1,4 +1,4 @@
-//! The discrete Herglotz principle as a boundary-value problem.
+//! The discrete Herglotz principle as a boundary-value problem, with discrete forces if there are any.
 
 mod block_elimination;
 mod branch;
@@ -11,6 +11,7 @@ mod index;
 mod newton;
 mod path_check;
 mod problem;
+mod step_forces;
 mod thomas;
 
 pub use branch::branch;

@@ -18,6 +18,10 @@ use contact_geom::nalgebra::SVector;
 /// condition of an [`End`] at each end. They are found by Newton's method with a line search; the linear systems are
 /// solved by block elimination at a cost proportional to the number of steps.
 ///
+/// With [discrete forces](DiscreteLagrangian::forces) F- and F+ the equations are those of `D1 L_d + F-` and `D2 L_d +
+/// F+`, by the discrete Lagrange-d'Alembert-Herglotz principle. The path is then not critical for the action, and has no
+/// [index](Self::index).
+///
 /// ```
 /// use contact_geom::systems::Pendulum;
 /// use discrete_herglotz::{boundary::{BoundaryPath, End}, rules::Midpoint};
@@ -86,9 +90,6 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     fn with(ld: D, steps: usize, conditions: Conditions<N>) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
-        }
-        if ld.has_forces() {
-            return Err(InputError::Forced { method: "a boundary value problem" });
         }
         if steps < 2 {
             return Err(InputError::Count { what: "the number of steps of the path", least: 2, found: steps });
@@ -180,7 +181,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     /// theorem: Milnor, "Morse theory" (1963).
     ///
     /// `None` where the index is not defined: for a periodic path, which is not critical for the action in all its
-    /// points, where a sigma_d is not positive, and where the second variation is degenerate.
+    /// points, for a path with forces, which is not critical for it at all, where a sigma_d is not positive, and where
+    /// the second variation is degenerate.
     ///
     /// # Errors
     /// [`InputError::PathLength`] unless the path has as many steps as the problem, [`InputError::Undefined`] where the

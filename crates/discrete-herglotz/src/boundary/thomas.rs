@@ -2,6 +2,7 @@
 //! not close to conjugate points of the start.
 
 use super::block_elimination::{BlockElimination, Carry, Eliminated, Equations, Measured, Nodes, Undefined};
+use super::step_forces::StepForces;
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, SecondDiscreteJet};
@@ -16,7 +17,7 @@ const MIN_REGULARITY: f64 = 1e-6;
 
 /// The reason why a path needs the general elimination.
 enum PivotFailure {
-    /// Second derivatives of the discrete Lagrangian in the action do not vanish.
+    /// The momenta of a step depend on the action.
     Coupled,
     /// A pivot is too small, or a number is not finite.
     Pivot,
@@ -25,12 +26,12 @@ enum PivotFailure {
 /// The momentum and the action at a point as affine functions of its correction, after the elimination of all previous
 /// positions.
 struct Carried<const N: usize> {
-    /// `D2 L_d` of the previous step, the momentum at the point.
+    /// `D2 L_d + F+` of the previous step, the momentum at the point.
     p: SVector<f64, N>,
     /// `dp = schur dq + rhs`.
     schur: SMatrix<f64, N, N>,
     rhs: SVector<f64, N>,
-    /// The diagonal of `D22` of the previous step, which is that of `schur` before the elimination.
+    /// The diagonal of the derivative of p in q, which is that of `schur` before the elimination.
     diagonal: SVector<f64, N>,
     /// `dz = slope . dq + change`.
     slope: SVector<f64, N>,
@@ -44,6 +45,7 @@ impl<const N: usize> BlockElimination<N> {
     /// `S = D22 - D12^T X` and `s = D12^T r` of the previous step, and the action by `a . dq_k + c`. The discrete
     /// Herglotz equation `D1 + sigma p = 0` then has the blocks `D11 + sigma S` and `D12`, with terms of rank one where
     /// second derivatives in the action do not vanish. Where they vanish, the correction of the action is not needed.
+    /// With discrete forces the derivatives of `D1 + F-` and of `D2 + F+` are in the place of the second derivatives.
     #[inline(always)]
     pub fn without_exchanges<D: DiscreteLagrangian<N>>(
         &mut self,
@@ -78,38 +80,41 @@ impl<const N: usize> BlockElimination<N> {
         };
         self.after.clear();
         for k in 0..of.steps {
-            let (q0, q1) = (&x.q[k], &x.q[k + 1]);
-            let jet = of.ld.second_jet(of.t0 + k as f64 * h, &DiscretePoint { q0: *q0, q1: *q1, z0: x.z[k] });
+            let (q0, q1, t) = (&x.q[k], &x.q[k + 1], of.t0 + k as f64 * h);
+            let at = DiscretePoint { q0: *q0, q1: *q1, z0: x.z[k] };
+            let jet = of.ld.second_jet(t, &at);
             let jet = match &jet {
                 Ok(jet) => jet,
                 Err(cause) => return Err(Undefined { step: k, cause: *cause }),
             };
-            if !COUPLED && is_coupled(jet) {
+            let forces = StepForces::at(of.ld, t, &at).map_err(|cause| Undefined { step: k, cause })?;
+            if !COUPLED && (is_coupled(jet) || forces.depend_on_action()) {
                 return Ok(Err(PivotFailure::Coupled));
             }
             let sigma = jet.first.sigma();
             measured.factor(k, sigma);
-            self.momenta[k] = Carry::of(jet);
+            self.momenta[k] = Carry::of(jet, &forces);
             x.z[k + 1] = x.z[k] + jet.first.value;
             let mut point = Eliminated { next: SMatrix::zeros(), rhs: zero };
             if k > 0 || start.is_some() {
                 let p = &carried.p;
-                let (mut here, mut next) = (jet.d11 + carried.schur * sigma, jet.d12);
-                let mut value = jet.first.d1 + p * sigma;
+                let of_position = forces.pull_in_q0(jet);
+                let (mut here, mut next) = (of_position + carried.schur * sigma, forces.pull_in_q1(jet));
+                let mut value = forces.pull(jet) + p * sigma;
                 if let Some(load) = of.load.get(k) {
                     value += load;
                 }
                 let mut rhs = -value - carried.rhs * sigma;
                 if COUPLED {
-                    let by_action = jet.d1z + p * jet.dzz;
+                    let by_action = forces.pull_in_z(jet) + p * jet.dzz;
                     here += p * jet.d1z.transpose() + by_action * carried.slope.transpose();
                     next += p * jet.d2z.transpose();
                     rhs -= by_action * carried.change;
                 }
                 // The effect of the round-off of the three positions in the equation.
                 let rounding = magnitudes(&next, q1) * 4.0;
-                measured.take(&value, &(jet.first.d1.abs() + p.abs() * sigma.abs() + rounding));
-                let diagonal = (jet.d11.diagonal() + carried.diagonal * sigma).abs();
+                measured.take(&value, &(forces.pull_size(jet) + p.abs() * sigma.abs() + rounding));
+                let diagonal = (of_position.diagonal() + carried.diagonal * sigma).abs();
                 if k + 1 == of.steps && end.is_none() {
                     // The last position is given.
                     measured.regularity = self.finish(&here, &rhs, &diagonal);
@@ -118,17 +123,19 @@ impl<const N: usize> BlockElimination<N> {
                 }
                 point = Eliminated { next, rhs };
             }
-            let mut before = jet.d12.transpose();
+            let mut before = forces.momentum_in_q0(jet);
             if COUPLED {
-                before += jet.d2z * carried.slope.transpose();
+                let momentum_in_z = forces.momentum_in_z(jet);
+                before += momentum_in_z * carried.slope.transpose();
                 let by_before = carried.slope * sigma + jet.first.d1;
-                carried.rhs = jet.d2z * carried.change;
+                carried.rhs = momentum_in_z * carried.change;
                 carried.change = by_before.dot(&point.rhs) + sigma * carried.change;
                 carried.slope = jet.first.d2 - point.next.tr_mul(&by_before);
             } else {
                 carried.rhs = zero;
             }
-            (carried.p, carried.schur, carried.diagonal) = (jet.first.d2, jet.d22, jet.d22.diagonal());
+            (carried.p, carried.schur) = (forces.momentum(jet), forces.momentum_in_q1(jet));
+            carried.diagonal = carried.schur.diagonal();
             for m in 0..N {
                 let column = before.column(m);
                 carried.rhs += column * point.rhs[m];
@@ -144,7 +151,7 @@ impl<const N: usize> BlockElimination<N> {
                 && let Some(p) = &end
             {
                 let value = carried.p - p;
-                let rounding = magnitudes(&jet.d12.transpose(), q0) * 2.0;
+                let rounding = magnitudes(&forces.momentum_in_q0(jet), q0) * 2.0;
                 measured.take(&value, &(carried.p.abs() + p.abs() + rounding));
                 measured.regularity = self.finish(&carried.schur, &(-value - carried.rhs), &carried.diagonal.abs());
             }

@@ -5,7 +5,7 @@ use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{ChartVector, DiscreteJet, DiscretePoint, Dual, PhasePoint, SecondDiscreteJet, support::seed};
 
 /// The discrete forces F- and F+ of a step, with their derivatives in `(q0, q1, z0)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiscreteForces<const N: usize> {
     /// F-, the force on the start of the step.
     pub minus: SVector<f64, N>,

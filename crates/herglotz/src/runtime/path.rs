@@ -3,7 +3,8 @@
 use discrete_herglotz::{AnyIntegrator, UnresolvedStep, boundary::PathStatus};
 
 /// A discrete boundary value problem: find a path between two positions that is critical for the discrete action of
-/// Herglotz' principle.
+/// Herglotz' principle. With forces it satisfies the discrete Lagrange-d'Alembert-Herglotz equations; these are the
+/// forces of a quadrature rule, since a Gauss method has no discrete Lagrangian with forces.
 ///
 /// ```
 /// use herglotz::runtime::{AnyIntegrator, BoundaryProblem, System};
@@ -71,7 +72,7 @@ pub struct FoundPath {
 }
 
 impl FoundPath {
-    /// Whether the path is critical, to round-off.
+    /// Whether the path satisfies its equations, to round-off.
     pub fn is_found(&self) -> bool {
         self.status == PathStatus::Found
     }

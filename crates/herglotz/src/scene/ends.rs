@@ -3,6 +3,7 @@
 use super::SceneError;
 use super::checked::check_version;
 use super::file::{SystemTable, span_of_table};
+use super::forces::with_forces;
 use super::location::{Location, Named, Numbers, Span};
 use super::start::Ends;
 use super::step_control::integrator;
@@ -13,7 +14,8 @@ use crate::runtime::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A path between two positions over a time span that is critical for the discrete action of Herglotz' principle.
+/// A path between two positions over a time span that is critical for the discrete action of Herglotz' principle, or
+/// satisfies its equations with forces.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a scene of a path between ends")]
 #[schemars(title = "Scene of a path between ends")]
@@ -30,6 +32,12 @@ pub(crate) struct EndsFile {
     pub start: Option<Location<Named<Numbers>>>,
     /// The end of the path: a number for each coordinate `x`, and the time `t`.
     pub ends: Location<Named<Numbers>>,
+    /// Forces beside those of the Lagrangian: for a coordinate `x` the force f in `d/dt L_v - L_q - L_z L_v = f(t, q,
+    /// v, z)` as a formula, as in `x = "-c*x'*abs(x')"`; `"u[2]"` is an entry of an array, and `"u[i]"` are all of its
+    /// entries. `rayleigh` is Rayleigh's dissipation function R, whose force is `-dR/dv`. With a force the path is a
+    /// motion of a quadrature rule such as `midpoint`, and is critical for no action.
+    #[serde(default)]
+    pub force: Option<Location<Named<String>>>,
     /// The discretization of the path.
     pub run: Location<EndsRun>,
 }
@@ -41,7 +49,7 @@ pub(crate) struct EndsRun {
     /// The number of steps, all of the same length.
     pub steps: Location<usize>,
     /// The integrator whose discrete Lagrangian is used: a Gauss method, or a quadrature rule such as `midpoint`. The
-    /// default is `gauss_4`.
+    /// default is `gauss_4`; with forces a rule is required.
     pub integrator: Option<Location<String>>,
 }
 
@@ -94,15 +102,10 @@ impl EndsScene {
         let file: EndsFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let EndsFile { system: table, start, ends, run, .. } = &file;
         let entry = entry(text, table)?;
-        let formula = formula(text, table, entry, &[])?;
+        let formula = with_forces(text, formula(text, table, entry, &[])?, file.force.as_ref())?;
         check_used(text, &formula, table, &[])?;
         let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
         let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;
-        if formula.has_forces() {
-            let message = "a path between two positions takes no force, since it is critical for an action; remove the \
-                           force, or run a motion from a start";
-            return Err(SceneError::at(text, system_at, message));
-        }
         let start_at = start.as_ref().map_or(table.span(), Location::span);
         let given = Ends::read(text, &formula, (start.as_deref(), start_at), (ends, ends.span()), entry)?;
         let by = match &run.integrator {
@@ -152,7 +155,11 @@ impl EndsScene {
             RuntimeError::Argument { argument: "coordinates", .. } | RuntimeError::Formula(_) => self.system_at,
             RuntimeError::Input(E::Step { .. } | E::Count { .. } | E::TooMany { .. }) => self.steps_at,
             RuntimeError::Input(
-                E::Unclaimed { .. } | E::Hypothesis { .. } | E::NoTimeTransformation | E::Stages { .. },
+                E::Unclaimed { .. }
+                | E::Hypothesis { .. }
+                | E::NoTimeTransformation
+                | E::Forced { .. }
+                | E::Stages { .. },
             ) => self.integrator_at,
             _ => self.ends_at,
         };

@@ -1,11 +1,11 @@
 //! Forces, tables, breaks and resets in scenes.
 
 use crate::{SceneError, read};
-use herglotz::Scene;
 use herglotz::runtime::{
     Crossing, Ending, Ensemble, EnsembleMonitor, Event, MemberEnd, Motion, NotContact, RunMonitor, Start, Status,
     StepControl, Steps, Varied,
 };
+use herglotz::{EndsScene, Scene};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -395,17 +395,49 @@ fn conformal_impacts_and_the_conformal_factor() {
     assert!(error.to_string().contains("conformal impacts"), "{error}");
 }
 
-/// A path between two positions takes no force.
+/// A fall from rest with quadratic drag covers `(1/k) ln cosh(sqrt(gk) t)`, here 8.25 with g = 9.81 and k = 0.2 in two
+/// units of time: the path to this end, by a rule, with the force in its table or in the Lagrangian. Gauss methods, the
+/// default, are refused at the place of the integrator.
 #[test]
-fn paths_take_no_force() {
+fn paths_with_forces() {
     let text = r#"
-        system = { coordinates = ["x"], lagrangian = "force[x] = -x'; x'^2/2" }
+        system = { coordinates = ["x"], lagrangian = "x'^2/2 + g*x", parameters = { g = 9.81, k = 0.2 } }
+        force = { x = "-k*x'*abs(x')" }
         start = { x = 0.0 }
-        ends = { x = 1.0, t = 2.0 }
-        run = { steps = 40 }
+        ends = { x = END, t = 2.0 }
+        run = { steps = 200, integrator = "midpoint" }
     "#;
-    let error = herglotz::EndsScene::read(text).err().unwrap().to_string();
-    assert!(error.contains("takes no force"), "{error}");
+    let distance = |t: f64| (1.962f64.sqrt() * t).cosh().ln() / 0.2;
+    let text = text.replace("END", &distance(2.0).to_string());
+    let in_lagrangian = changed(
+        &text,
+        &[
+            ("force = { x = \"-k*x'*abs(x')\" }", ""),
+            ("\"x'^2/2 + g*x\"", "\"force[x] = -k*x'*abs(x'); x'^2/2 + g*x\""),
+        ],
+    );
+    let [found, same] = [&text, &in_lagrangian].map(|text| {
+        let scene = EndsScene::read(text).unwrap();
+        scene.system.path(&scene.problem).unwrap()
+    });
+    assert!(found.is_found() && found.unresolved.is_none() && found.iterations <= 8, "{found:?}");
+    // The same equations, up to the order of their sums.
+    assert!(found.q.iter().zip(&same.q).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {same:?}");
+    let error = found.t.iter().zip(&found.q).map(|(t, x)| (x - distance(*t)).abs()).fold(0.0, f64::max);
+    // Of order h^2 with h = 0.01; the estimate is in units of the range of x.
+    let estimate = found.error_estimate.unwrap() * distance(2.0);
+    assert!(error < 1e-3 && estimate > 0.5 * error && estimate < 2.0 * error, "{estimate:e} for {error:e}");
+    assert!(found.v[0].abs() < 1e-3 && found.v.iter().zip(&found.p).all(|(v, p)| (v - p).abs() < 1e-13), "{found:?}");
+    for (from, to, word) in [
+        ("midpoint", "gauss_2", "\"midpoint\" or \"trapezoidal\""),
+        (", integrator = \"midpoint\"", "", "no discrete Lagrangian with forces"),
+    ] {
+        let scene = EndsScene::read(&changed(&text, &[(from, to)])).unwrap();
+        let error = scene.explain(&scene.system.path(&scene.problem).unwrap_err());
+        assert!(error.to_string().contains(word) && error.to_string().contains("line 6"), "{error}");
+    }
+    let error = EndsScene::read(&changed(&text, &[("force = { x", "force = { y")])).err().unwrap().to_string();
+    assert!(error.contains('y') && error.contains("line 3"), "{error}");
 }
 
 /// A resumed run does not depend on where it was interrupted, with bounces before and after.

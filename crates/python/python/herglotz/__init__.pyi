@@ -415,6 +415,9 @@ def path(
     guess: ArrayLike | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
 ) -> Path: ...
 def is_contact(
     map: Callable[[Any, Any, Any], tuple[Any, Any, Any]],

@@ -17,7 +17,7 @@ class Path:
     q, p : arrays of shape (k + 1, n)
         The positions and the momenta.
     found : bool
-        Whether the path is critical for the discrete action; otherwise it is the last path of the search.
+        Whether the path satisfies its equations; otherwise it is the last path of the search.
     status : str
         How the search ended, with advice where no path was found.
     action : float
@@ -58,10 +58,25 @@ class Path:
         return f"<Path: {len(self.t) - 1} steps from t = {self.t[0]} to {self.t[-1]}, {self.status}{doubt}>"
 
 
-def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coordinates=None, parameters=None):
+def path(
+    L,
+    q0,
+    q1,
+    t,
+    *,
+    steps,
+    integrator="gauss_4",
+    z0=0.0,
+    guess=None,
+    coordinates=None,
+    parameters=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+):
     """The motion between two positions: the path that is critical for the discrete action of Herglotz' principle.
 
-    Newton's method searches for it, starting from the straight line or from a guess; there may be several paths, or
+    With a force the path satisfies the discrete equations with this force, and is critical for no action. Newton's method searches for it, starting from the straight line or from a guess; there may be several paths, or
     none.
 
     Parameters
@@ -76,11 +91,13 @@ def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coord
         The number of steps, all of the same length.
     integrator : str
         The integrator whose discrete action is used: a Gauss method, ``"gauss_1"`` to ``"gauss_16"``, or a quadrature
-        rule such as ``"midpoint"``.
+        rule such as ``"midpoint"``. With a force it is a rule.
     z0 : float
         The initial action.
     guess : array of shape (steps + 1, n), optional
         The points of the initial guess, for example those of a path over another time span.
+    force, rayleigh, tables
+        As in `system`.
 
     Returns
     -------
@@ -91,7 +108,8 @@ def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coord
     ValueError
         For an invalid argument; whether a path was found is an attribute of the path.
     """
-    L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters)
+    more = force, rayleigh, tables, None
+    L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters, more)
     if np.ndim(t) > 1 or np.size(t) != 2 and np.ndim(t) == 1:
         raise ValueError(f"`t` is {t!r}; it must be the final time, or (t0, t1)")
     t0, t1 = (0.0, t) if np.ndim(t) == 0 else t

@@ -14,11 +14,6 @@ use formula_lagrangian::{Formula, FormulaLagrangian};
 /// Searches for a path of a formula. It is compiled for fewer dimensions than motions are: compiling more would cost
 /// more than the unused coordinates cost a search.
 pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
-    if formula.has_forces() {
-        let why = "has a force, but a path between two ends is critical for an action; remove the force, or run a motion \
-                   from a start";
-        return Err(RuntimeError::argument("system", why));
-    }
     match formula.dimension() {
         1 => within::<1>(formula, problem),
         2 => within::<2>(formula, problem),
@@ -53,6 +48,14 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
     // The minimum is two steps; the error for fewer is raised below.
     let h = (t1 - t0) / problem.steps.max(1) as f64;
     match problem.by {
+        AnyIntegrator::Gauss { .. } if formula.has_forces() => Err(RuntimeError::argument(
+            "integrator",
+            format!(
+                "is \"{}\", which has no discrete Lagrangian with forces; choose a rule such as \"midpoint\" or \
+                 \"trapezoidal\"",
+                problem.by
+            ),
+        )),
         AnyIntegrator::Gauss { stages } => by(&lagrangian, Gauss::new::<N>(&lagrangian, stages, h)?, problem),
         AnyIntegrator::Discrete(method) => {
             // The discrete Lagrangian of a splitting is determined at a state.
@@ -63,8 +66,12 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
         other => Err(RuntimeError::argument(
             "integrator",
             format!(
-                "is \"{other}\", which has no discrete Lagrangian as a function of both ends of a step; choose a \
-                 Gauss method such as \"gauss_4\", or \"midpoint\""
+                "is \"{other}\", which has no discrete Lagrangian as a function of both ends of a step; choose {}",
+                if formula.has_forces() {
+                    "a rule such as \"midpoint\" or \"trapezoidal\""
+                } else {
+                    "a Gauss method such as \"gauss_4\", or \"midpoint\""
+                }
             ),
         )),
     }
