@@ -90,6 +90,9 @@ fn runs_that_end_early() {
     let found = run().gradient(&Constant(1.0), Until::Time(2.0)).unwrap();
     assert!(matches!(found.outcome.status, Status::Failed { .. }), "{}", found.outcome.status);
     assert!(found.loss.is_none());
-    let tangent = run().tangent(&[Variable::Position(0)], Until::Time(2.0)).unwrap();
-    assert!(tangent.outcome.status == found.outcome.status && tangent.columns[0].q[0].is_finite());
+    // The derivatives of the last steps may not be finite, which is an error.
+    match run().tangent(&[Variable::Position(0)], Until::Time(2.0)) {
+        Ok(tangent) => assert!(tangent.outcome.status == found.outcome.status && tangent.columns[0].q[0].is_finite()),
+        Err(cause) => assert!(matches!(cause, SensitivityError::Step { .. }), "{cause}"),
+    }
 }

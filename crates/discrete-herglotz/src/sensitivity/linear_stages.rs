@@ -301,9 +301,8 @@ impl<const N: usize> LinearStages<N> {
             fixed[d] = product(&x.r, &self.p_r[d]);
             add(&mut fixed[d], &given.p_source[d]);
         }
-        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        let (mut iteration, mut is_first) = (FixedPointIteration::until(1.0, 0.25), true);
         loop {
-            // x.q holds W^-1 P' until the iteration has converged.
             let mut a = [Stages::ZERO; N];
             let (mut change, mut size) = (zero, zero);
             for d in 0..N {
@@ -326,6 +325,10 @@ impl<const N: usize> LinearStages<N> {
                 for e in 0..N {
                     add_product(&mut x.p_rate[d], &x.q[e], &self.p_q[d][e]);
                 }
+            }
+            // The first rates are a guess that does not belong to the positions before it.
+            if std::mem::take(&mut is_first) {
+                continue;
             }
             let (change, size) = (change.reduce_max(), size.reduce_max());
             match iteration.assess(change, size) {
