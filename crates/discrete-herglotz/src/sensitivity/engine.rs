@@ -1,0 +1,442 @@
+//! The tangent of a step and its adjoint, for columns and covectors.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::registers::{StageMap, Stages};
+use crate::sensitivity::SolvedStages;
+use crate::sensitivity::linear_stages::{
+    Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
+};
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
+use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
+use crate::sensitivity::step_maps::{Direction, StepMaps};
+use crate::{Problem, StepError};
+use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
+use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
+use pulp::{Simd, WithSimd};
+
+/// The tangent `(dq, dp, dz)` of a motion along one variable.
+pub(crate) struct Column<const N: usize> {
+    pub q: SVector<f64, N>,
+    pub p: SVector<f64, N>,
+    pub z: f64,
+    /// The parameter that it is the derivative with respect to, if any.
+    pub parameter: Option<usize>,
+    /// The derivatives of the time at the start of the run and of the step size.
+    pub dt0: f64,
+    pub dh: f64,
+    rates: StageTangent<N>,
+    warm: bool,
+}
+
+impl<const N: usize> Column<N> {
+    pub fn new(q: SVector<f64, N>, p: SVector<f64, N>, z: f64) -> Self {
+        Column { q, p, z, parameter: None, dt0: 0.0, dh: 0.0, rates: StageTangent::ZERO, warm: false }
+    }
+
+    /// The column of a parameter.
+    pub fn of_parameter(self, index: usize) -> Self {
+        Column { parameter: Some(index), ..self }
+    }
+
+    /// The column of a variable on which the time at the start and the step size depend with these derivatives.
+    pub fn of_times(self, dt0: f64, dh: f64) -> Self {
+        Column { dt0, dh, ..self }
+    }
+
+    /// The derivative of the time after this number of steps.
+    pub fn time_after(&self, steps: usize) -> f64 {
+        self.dt0 + steps as f64 * self.dh
+    }
+
+    /// The column for a step from the end of this number of steps to a fixed time.
+    pub fn for_row(&self, steps: usize) -> Self {
+        let dt0 = self.time_after(steps);
+        Self::copied(self).of_times(dt0, -dt0)
+    }
+
+    /// The column at a fixed time, where the state after this number of steps has these rates.
+    pub fn at_fixed_time(&self, steps: usize, rates: &PhasePoint<N>) -> Self {
+        let (mut column, dt) = (Self::copied(self), self.time_after(steps));
+        column.q -= rates.q * dt;
+        column.p -= rates.p * dt;
+        column.z -= rates.z * dt;
+        column
+    }
+
+    /// The same tangent without an initial guess of its rates.
+    fn copied(&self) -> Self {
+        let Column { q, p, z, parameter, dt0, dh, .. } = *self;
+        Column { parameter, dt0, dh, ..Column::new(q, p, z) }
+    }
+
+    /// The largest component.
+    pub fn size(&self) -> f64 {
+        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
+    }
+}
+
+/// The derivatives `(g_q, g_p, g_z)` of a number in the state, with those in parameters, time and step size so far.
+pub(crate) struct Covector<const N: usize> {
+    pub q: SVector<f64, N>,
+    pub p: SVector<f64, N>,
+    pub z: f64,
+    pub parameters: Vec<f64>,
+    /// The derivatives in the time of the start of the run, for fixed steps, and in the step size.
+    pub time: f64,
+    pub step: f64,
+    /// The largest component so far.
+    pub largest: f64,
+    rates: StageTangent<N>,
+    warm: bool,
+}
+
+impl<const N: usize> Covector<N> {
+    pub fn new(of_state: &ChartVector<N>, parameters: Vec<f64>) -> Self {
+        let largest = max_or_nan(of_state.max_abs_or_nan(), 0.0);
+        Covector {
+            largest,
+            q: of_state.x,
+            p: of_state.y,
+            z: of_state.z,
+            parameters,
+            time: 0.0,
+            step: 0.0,
+            rates: StageTangent::ZERO,
+            warm: false,
+        }
+    }
+
+    /// Adds a covector at the start of a shortened step from the state after this number of steps to a fixed time.
+    pub fn add_row(&mut self, row: &Self, steps: usize) {
+        self.add_state(&ChartVector { x: row.q, y: row.p, z: row.z }, &row.parameters);
+        // The length of the step decreases as its start moves.
+        self.add_time(row.time - row.step, steps);
+    }
+
+    /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
+    pub fn add_at_fixed_time(&mut self, of_state: &ChartVector<N>, parameters: &[f64], rates: &PhasePoint<N>, steps: usize) {
+        self.add_state(of_state, parameters);
+        self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
+    }
+
+    fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
+        self.q += of_state.x;
+        self.p += of_state.y;
+        self.z += of_state.z;
+        self.parameters.iter_mut().zip(parameters).for_each(|(sum, of)| *sum += of);
+    }
+
+    /// Adds a derivative in the time after this number of steps.
+    fn add_time(&mut self, of_time: f64, steps: usize) {
+        self.time += of_time;
+        self.step += steps as f64 * of_time;
+    }
+
+    /// The largest component.
+    pub fn size(&self) -> f64 {
+        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
+    }
+}
+
+/// The tangent of steps of one length in one direction, with its workspace.
+pub(crate) struct Engine<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    forward: StepMaps,
+    maps: StepMaps,
+    at: StageDerivatives<N>,
+    linear: LinearStages<N>,
+    given: Inhomogeneity<N>,
+    of_parameters: ParameterDerivatives<N>,
+    /// Whether L or the force depend on the time.
+    timed: bool,
+    /// Whether the maps for constant mass and rate apply.
+    condenses: bool,
+    /// The map of the actions of the stages forward, for constant rate.
+    actions: Option<StageMap>,
+    arch: Instructions,
+}
+
+impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
+    pub fn new(problem: &Problem<'a, L, N>, s: usize, h: f64, direction: Direction) -> Self {
+        let lagrangian = problem.lagrangian;
+        let at = StageDerivatives::new(problem);
+        let velocity_terms = !at.form.separable || const { L::HINTS.forced };
+        let condenses = !velocity_terms && at.form.affine && problem.structure.has_constant_rate();
+        Engine {
+            lagrangian,
+            forward: StepMaps::new(s, h, Direction::Forward),
+            maps: StepMaps::new(s, h, direction),
+            linear: LinearStages::new(direction, !at.form.affine, velocity_terms),
+            condenses: condenses && at.form.inverse_mass.is_some(),
+            actions: None,
+            at,
+            given: Inhomogeneity::ZERO,
+            of_parameters: ParameterDerivatives::new(lagrangian),
+            timed: !problem.structure.autonomous,
+            arch: Instructions::new(),
+        }
+    }
+
+    /// An engine for a shortened step, which is kept in `engine`.
+    pub fn of_row<'e>(
+        engine: &'e mut Option<Self>,
+        problem: &Problem<'a, L, N>,
+        step: &SolvedStages<N>,
+        direction: Direction,
+    ) -> &'e mut Self {
+        let engine = engine.get_or_insert_with(|| Engine::new(problem, step.s, step.h, direction));
+        engine.forward = StepMaps::new(step.s, step.h, Direction::Forward);
+        engine.maps = StepMaps::new(step.s, step.h, direction);
+        engine.linear.forget();
+        engine.actions = None;
+        engine
+    }
+
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
+    pub fn push(&mut self, step: &SolvedStages<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+        self.arch.dispatch(Push { engine: self, step, k, columns })
+    }
+
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn pull(&mut self, step: &SolvedStages<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+        self.arch.dispatch(Pull { engine: self, step, k, covectors })
+    }
+
+    /// Evaluates the derivatives at the stages of a step.
+    #[inline(always)]
+    fn prepare<S: Simd>(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
+        if self.actions.is_none() && !step.knows_l {
+            let (t, x) = (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
+            self.actions = self.forward.resolvent(-self.lagrangian.rate(t, &x));
+        }
+        self.at.evaluate::<S, L>(self.lagrangian, &self.forward, step, self.actions.as_ref())?;
+        if self.condenses && !self.linear.is_condensed()
+            && let Some(inverse) = &self.at.form.inverse_mass
+        {
+            self.linear.condense(&self.maps, &self.at, inverse);
+        }
+        self.linear.set(&self.at);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn push_column<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, column: &mut Column<N>) -> Result<(), StepError> {
+        let s = step.s;
+        let fraction = column.dh / step.h;
+        self.set_sources(step, k, column);
+        let (given, at) = (&mut self.given, &self.at);
+        for d in 0..N {
+            given.q[d] = Stages([column.q[d]; MAX_STAGES]);
+            given.p[d] = Stages([column.p[d]; MAX_STAGES]);
+        }
+        given.z = Stages([column.z; MAX_STAGES]);
+        given.r = Stages::ZERO;
+        if fraction != 0.0 {
+            given.has_r = true;
+            for i in 0..s {
+                for d in 0..N {
+                    given.q[d].0[i] += fraction * (at.q[d].0[i] - step.start.q[d]);
+                    given.p[d].0[i] += fraction * (at.rho.0[i] * at.l_v[d].0[i] - step.start.p[d]);
+                }
+                given.z.0[i] += fraction * (at.z.0[i] - step.start.z);
+                given.r.0[i] = fraction * (at.rho.0[i] - 1.0);
+            }
+        }
+        if column.warm {
+            extrapolate::<S, N>(&self.maps, &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
+        }
+        self.linear.solve::<S>(&self.maps, &self.given, &mut column.rates)?;
+        let (rates, maps) = (&column.rates, &self.maps);
+        let (rho, scaled) = (self.at.end_rho, end_value::<S>(maps, &rates.r_rate) + fraction * (self.at.end_rho - 1.0));
+        for d in 0..N {
+            let moved = end_value::<S>(&self.forward, &step.v[d]);
+            let pushed = end_value::<S>(&self.forward, &step.force[d]);
+            column.q[d] += end_value::<S>(maps, &rates.v[d]) + fraction * moved;
+            let p = column.p[d] + end_value::<S>(maps, &rates.p_rate[d]) + fraction * pushed;
+            column.p[d] = (p - self.at.end_p[d] * scaled) / rho;
+        }
+        column.z += end_value::<S>(maps, &rates.z_rate) + fraction * end_value::<S>(&self.forward, &self.at.l);
+        column.warm = true;
+        Ok(())
+    }
+
+    /// Sets the sources of a column: the derivatives of the rates with respect to its parameter and to the time.
+    fn set_sources(&mut self, step: &SolvedStages<N>, k: usize, column: &Column<N>) {
+        let given = &mut self.given;
+        given.has_r = false;
+        let start = column.dt0 + k as f64 * column.dh;
+        let moves = self.timed && (start != 0.0 || column.dh != 0.0);
+        if column.parameter.is_none() && !moves {
+            given.v_source = [Stages::ZERO; N];
+            given.p_source = [Stages::ZERO; N];
+            given.z_source = Stages::ZERO;
+            given.r_source = Stages::ZERO;
+            return;
+        }
+        given.has_r = true;
+        let c = &Coefficients::of(step.s).c;
+        for i in 0..step.s {
+            let (t, x) = self.at.point(i);
+            let mut of = QuantityDerivatives::ZERO;
+            if let Some(k) = column.parameter {
+                of.add(1.0, &self.of_parameters.at(self.lagrangian, Quantity::Parameter(k), t, &x));
+            }
+            if moves {
+                let factor = start + c[i].0 * column.dh;
+                of.add(factor, &self.of_parameters.at(self.lagrangian, Quantity::Time, t, &x));
+            }
+            let rho = self.at.rho.0[i];
+            for d in 0..N {
+                given.v_source[d].0[i] = rho * of.gradient.y[d];
+                given.p_source[d].0[i] = rho * (of.gradient.x[d] + of.force[d]);
+            }
+            given.z_source.0[i] = of.l;
+            given.r_source.0[i] = rho * of.gradient.z;
+        }
+    }
+
+    #[inline(always)]
+    fn pull_covector<S: Simd>(
+        &mut self,
+        step: &SolvedStages<N>,
+        k: usize,
+        covector: &mut Covector<N>,
+    ) -> Result<(), StepError> {
+        let (given, rho) = (&mut self.given, self.at.end_rho);
+        let w_q = covector.p / rho;
+        let w_z = self.at.end_p.dot(&w_q);
+        for d in 0..N {
+            given.q[d] = Stages([w_q[d]; MAX_STAGES]);
+            given.p[d] = Stages([-covector.q[d]; MAX_STAGES]);
+        }
+        given.z = Stages([w_z; MAX_STAGES]);
+        given.r = Stages([covector.z; MAX_STAGES]);
+        given.has_r = covector.z != 0.0;
+        if covector.warm {
+            extrapolate::<S, N>(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
+        }
+        self.linear.solve::<S>(&self.maps, &self.given, &mut covector.rates)?;
+        self.add_derivatives::<S>(step, k, covector);
+        let (rates, maps) = (&covector.rates, &self.maps);
+        covector.p = SVector::from_fn(|d, _| w_q[d] + end_value::<S>(maps, &rates.v[d]));
+        covector.q = SVector::from_fn(|d, _| covector.q[d] - end_value::<S>(maps, &rates.p_rate[d]));
+        covector.z += end_value::<S>(maps, &rates.r_rate);
+        covector.warm = true;
+        Ok(())
+    }
+
+    /// Adds the derivatives with respect to parameters, time and step size over the step.
+    #[inline(always)]
+    fn add_derivatives<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, covector: &mut Covector<N>) {
+        let (w, at) = (&covector.rates, &self.at);
+        // The pairing of the covector with the rates of the motion.
+        let mut stretch = product(&w.z, &step.rate);
+        add_product(&mut stretch, &w.r, &at.l);
+        for d in 0..N {
+            add_product(&mut stretch, &w.q[d], &step.force[d]);
+            subtract_product(&mut stretch, &w.p[d], &at.v[d]);
+        }
+        covector.step += end_value::<S>(&self.forward, &stretch) / step.h;
+        for index in 0..covector.parameters.len() {
+            covector.parameters[index] +=
+                self.derivative_in::<S>(Quantity::Parameter(index), &covector.rates, &self.forward.weights.clone());
+        }
+        if self.timed {
+            let weights = self.forward.weights;
+            let time = self.derivative_in::<S>(Quantity::Time, &covector.rates, &weights);
+            let moved = Stages(std::array::from_fn(|i| weights.0[i] * self.forward.times.0[i] / step.h));
+            covector.time += time;
+            covector.step += k as f64 * time + self.derivative_in::<S>(Quantity::Time, &covector.rates, &moved);
+        }
+    }
+
+    /// The derivative in a quantity over the step: `d(rho L_theta)[w] + rho f_theta . w_q` at the stages, with weights.
+    #[inline(always)]
+    fn derivative_in<S: Simd>(&mut self, quantity: Quantity, w: &StageTangent<N>, weights: &Stages) -> f64 {
+        let at = &self.at;
+        if let Some(sum) = self.of_parameters.sum_along::<S, L>(self.lagrangian, quantity, at, w, weights) {
+            return sum;
+        }
+        let mut sum = 0.0;
+        for i in 0..at.s {
+            let (t, x) = at.point(i);
+            let stage = |x: &[Stages; N]| SVector::<f64, N>::from_fn(|d, _| x[d].0[i]);
+            let tangent = ChartVector { x: stage(&w.q), y: stage(&w.v), z: w.z.0[i] };
+            let along = self.of_parameters.along(self.lagrangian, quantity, (t, &x, at.rho.0[i]), (&tangent, w.r.0[i]));
+            sum += weights.0[i] * along;
+        }
+        sum
+    }
+}
+
+/// Columns over a step, compiled for one instruction set.
+struct Push<'e, 'a, L, const N: usize> {
+    engine: &'e mut Engine<'a, L, N>,
+    step: &'e SolvedStages<N>,
+    k: usize,
+    columns: &'e mut [Column<N>],
+}
+
+impl<L: Parametric<N>, const N: usize> WithSimd for Push<'_, '_, L, N> {
+    type Output = Result<f64, StepError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Push { engine, step, k, columns } = self;
+        engine.prepare::<S>(step)?;
+        let mut largest = 0.0;
+        for column in columns {
+            engine.push_column::<S>(step, k, column)?;
+            largest = max_or_nan(largest, column.size());
+        }
+        Ok(largest)
+    }
+}
+
+/// Covectors over a step, compiled for one instruction set.
+struct Pull<'e, 'a, L, const N: usize> {
+    engine: &'e mut Engine<'a, L, N>,
+    step: &'e SolvedStages<N>,
+    k: usize,
+    covectors: &'e mut [Covector<N>],
+}
+
+impl<L: Parametric<N>, const N: usize> WithSimd for Pull<'_, '_, L, N> {
+    type Output = Result<(), StepError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Pull { engine, step, k, covectors } = self;
+        engine.prepare::<S>(step)?;
+        for covector in covectors {
+            engine.pull_covector::<S>(step, k, covector)?;
+            covector.largest = max_or_nan(covector.largest, covector.size());
+        }
+        Ok(())
+    }
+}
+
+/// Takes the polynomials of the rates over one step as the initial guess of the next one, with the factors of (v, z')
+/// and of r'.
+#[inline(always)]
+fn extrapolate<S: Simd, const N: usize>(maps: &StepMaps, rates: &mut StageTangent<N>, [of_motion, of_r]: [f64; 2]) {
+    let apply = |rates: &mut Stages, factor: f64| {
+        let next = maps.extrapolated::<S>(rates);
+        *rates = next.map(|x| factor * x);
+    };
+    rates.v.iter_mut().for_each(|v| apply(v, of_motion));
+    apply(&mut rates.z_rate, of_motion);
+    apply(&mut rates.r_rate, of_r);
+    rates.p_rate.iter_mut().for_each(|rate| apply(rate, of_r));
+}
