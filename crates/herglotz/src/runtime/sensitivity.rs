@@ -94,7 +94,7 @@ pub type Loss<'l> = dyn FnMut(&[MotionState]) -> (f64, Vec<StateCovector>) + 'l;
 impl System {
     /// Runs a motion, and differentiates its states at some times, which are in the order of the motion, with respect to
     /// variables, by the tangents of its steps. The variables are given by name: coordinates `x`, velocities `x'` or,
-    /// where the start is given by its momentum, momenta `p_x`; the action `z`; parameters; the initial time `t0` for a
+    /// where the start is given by its momentum, momenta `p_x`, also `q[0]` and `v[0]`; the action `z`; parameters; the initial time `t0` for a
     /// fixed end; and the final time `t_end`. The number of steps is fixed, also where they are chosen for an accuracy.
     ///
     /// ```
@@ -201,6 +201,14 @@ impl System {
         }
         if let Some(i) = at(&momenta) {
             return Ok(Variable::Momentum(i));
+        }
+        // Any coordinates and velocities by their index, as in formulas.
+        let indexed = |array: &str| (0..coordinates.len()).find(|i| name == format!("{array}[{i}]"));
+        if let Some(i) = indexed("q") {
+            return Ok(Variable::Position(i));
+        }
+        if let Some(i) = indexed("v") {
+            return Ok(Variable::Velocity(i));
         }
         match name {
             "z" => Ok(Variable::Action),
