@@ -34,10 +34,11 @@ def test_gradients_are_those_of_differences():
 
 def test_compiled_and_mapped():
     value, slope = jax.jit(jax.value_and_grad(loss, argnums=3))(*AT)
-    assert value == loss(*AT) and slope == jax.grad(loss, argnums=3)(*AT)
+    near = lambda a, b: abs(a - b) <= 1e-13 * abs(b)  # The compiled sum of the rows is rounded differently.
+    assert near(value, loss(*AT)) and near(slope, jax.grad(loss, argnums=3)(*AT))
     gammas = np.array([-0.01, -0.02])
     mapped = jax.vmap(jax.grad(loss, argnums=3), in_axes=(None, None, None, 0))(*AT[:3], gammas)
-    assert np.array_equal(mapped, [jax.grad(loss, argnums=3)(*AT[:3], gamma) for gamma in gammas])
+    assert all(near(found, jax.grad(loss, argnums=3)(*AT[:3], gamma)) for found, gamma in zip(mapped, gammas))
 
 
 def test_functions_and_the_reference():
