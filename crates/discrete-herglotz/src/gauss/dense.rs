@@ -63,7 +63,7 @@ impl<const N: usize> Solved<N> {
     /// These stages for the tangent of the step.
     pub fn stages(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> SolvedStages<N> {
         let [v, force] = [&self.v, &self.force].map(|of| of.map(Stages));
-        SolvedStages { s, t, h, start, v, force, rate: Stages(self.rate), l: Stages(self.l) }
+        SolvedStages { s, t, h, start, v, force, rate: Stages(self.rate), l: Stages(self.l), knows_l: true }
     }
 
     /// The stages of a condensed step from its accelerations and positions.

@@ -4,7 +4,7 @@ mod checks;
 mod dense;
 mod initial_mass;
 pub(crate) mod integrator;
-mod limits;
+pub(crate) mod limits;
 pub(crate) mod resolution;
 pub(crate) mod routes;
 pub(crate) mod stages;

@@ -345,8 +345,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
 
     fn solved_stages(&self) -> Option<SolvedStages<N>> {
         let step = self.last_step()?;
-        let solved = with_route!(&*self.route, run => StageRoute::solved(run, &step));
-        Some(solved.stages(self.s, (step.t, self.h), self.phase(step.from)))
+        let without_action = with_route!(&*self.route, run => StageRoute::solved_without_action(run, &step));
+        let knows_l = without_action.is_none();
+        let solved = without_action.unwrap_or_else(|| with_route!(&*self.route, run => StageRoute::solved(run, &step)));
+        let stages = solved.stages(self.s, (step.t, self.h), self.phase(step.from));
+        Some(SolvedStages { knows_l, ..stages })
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {

@@ -3,18 +3,21 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::StepError;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
-use crate::integration::depends_on_action;
-use crate::numbers::registers::Stages;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SolvedStages;
-use crate::sensitivity::linear_stages::{Inhomogeneity, LinearStages, StageTangent};
+use crate::sensitivity::linear_stages::{
+    Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
+};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
-use crate::Problem;
+use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Parametric, PhasePoint};
+use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
+use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
+use pulp::{Simd, WithSimd};
 
 /// The tangent `(dq, dp, dz)` of a motion along one variable.
 pub(crate) struct Column<const N: usize> {
@@ -73,7 +76,7 @@ impl<const N: usize> Column<N> {
 
     /// The largest component.
     pub fn size(&self) -> f64 {
-        contact_geom::numbers::max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
+        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
     }
 }
 
@@ -86,13 +89,17 @@ pub(crate) struct Covector<const N: usize> {
     /// The derivatives in the time of the start of the run, for fixed steps, and in the step size.
     pub time: f64,
     pub step: f64,
+    /// The largest component so far.
+    pub largest: f64,
     rates: StageTangent<N>,
     warm: bool,
 }
 
 impl<const N: usize> Covector<N> {
     pub fn new(of_state: &ChartVector<N>, parameters: Vec<f64>) -> Self {
+        let largest = max_or_nan(of_state.max_abs_or_nan(), 0.0);
         Covector {
+            largest,
             q: of_state.x,
             p: of_state.y,
             z: of_state.z,
@@ -132,7 +139,7 @@ impl<const N: usize> Covector<N> {
 
     /// The largest component.
     pub fn size(&self) -> f64 {
-        contact_geom::numbers::max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
+        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
     }
 }
 
@@ -147,21 +154,31 @@ pub(crate) struct Engine<'a, L, const N: usize> {
     of_parameters: ParameterDerivatives<N>,
     /// Whether L or the force depend on the time.
     timed: bool,
+    /// Whether the maps for constant mass and rate apply.
+    condenses: bool,
+    /// The map of the actions of the stages forward, for constant rate.
+    actions: Option<StageMap>,
+    arch: Instructions,
 }
 
 impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     pub fn new(problem: &Problem<'a, L, N>, s: usize, h: f64, direction: Direction) -> Self {
         let lagrangian = problem.lagrangian;
-        let coupled = depends_on_action(lagrangian, &problem.structure);
+        let at = StageDerivatives::new(problem);
+        let velocity_terms = !at.form.separable || const { L::HINTS.forced };
+        let condenses = !velocity_terms && at.form.affine && problem.structure.has_constant_rate();
         Engine {
             lagrangian,
             forward: StepMaps::new(s, h, Direction::Forward),
             maps: StepMaps::new(s, h, direction),
-            at: StageDerivatives::new(const { L::HINTS.forced }),
-            linear: LinearStages::new(direction, coupled),
+            linear: LinearStages::new(direction, !at.form.affine, velocity_terms),
+            condenses: condenses && at.form.inverse_mass.is_some(),
+            actions: None,
+            at,
             given: Inhomogeneity::ZERO,
             of_parameters: ParameterDerivatives::new(lagrangian),
             timed: !problem.structure.autonomous,
+            arch: Instructions::new(),
         }
     }
 
@@ -175,24 +192,46 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
         let engine = engine.get_or_insert_with(|| Engine::new(problem, step.s, step.h, direction));
         engine.forward = StepMaps::new(step.s, step.h, Direction::Forward);
         engine.maps = StepMaps::new(step.s, step.h, direction);
+        engine.linear.forget();
+        engine.actions = None;
         engine
     }
 
-    /// Evaluates the derivatives at the stages of a step, for the columns or covectors that are carried over it next.
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
     ///
     /// # Errors
-    /// [`StepError::Singular`], [`StepError::NonFinite`].
-    pub fn prepare(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
-        self.at.evaluate(self.lagrangian, &self.forward, step)?;
+    /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
+    pub fn push(&mut self, step: &SolvedStages<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+        self.arch.dispatch(Push { engine: self, step, k, columns })
+    }
+
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn pull(&mut self, step: &SolvedStages<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+        self.arch.dispatch(Pull { engine: self, step, k, covectors })
+    }
+
+    /// Evaluates the derivatives at the stages of a step.
+    #[inline(always)]
+    fn prepare<S: Simd>(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
+        if self.actions.is_none() && !step.knows_l {
+            let (t, x) = (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
+            self.actions = self.forward.resolvent(-self.lagrangian.rate(t, &x));
+        }
+        self.at.evaluate::<S, L>(self.lagrangian, &self.forward, step, self.actions.as_ref())?;
+        if self.condenses && !self.linear.is_condensed()
+            && let Some(inverse) = &self.at.form.inverse_mass
+        {
+            self.linear.condense(&self.maps, &self.at, inverse);
+        }
         self.linear.set(&self.at);
         Ok(())
     }
 
-    /// Carries a column from the start of the prepared step, the k-th of the run, to its end.
-    ///
-    /// # Errors
-    /// Those of the linear stage equations.
-    pub fn push(&mut self, step: &SolvedStages<N>, k: usize, column: &mut Column<N>) -> Result<(), StepError> {
+    #[inline(always)]
+    fn push_column<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, column: &mut Column<N>) -> Result<(), StepError> {
         let s = step.s;
         let fraction = column.dh / step.h;
         self.set_sources(step, k, column);
@@ -215,19 +254,19 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
             }
         }
         if column.warm {
-            extrapolate(&self.maps, &mut column.rates, [1.0, 1.0]);
+            extrapolate::<S, N>(&self.maps, &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
         }
-        self.linear.solve(&self.maps, &self.given, &mut column.rates)?;
+        self.linear.solve::<S>(&self.maps, &self.given, &mut column.rates)?;
         let (rates, maps) = (&column.rates, &self.maps);
-        let (rho, scaled) = (self.at.end_rho, end_value(maps, &rates.r_rate) + fraction * (self.at.end_rho - 1.0));
+        let (rho, scaled) = (self.at.end_rho, end_value::<S>(maps, &rates.r_rate) + fraction * (self.at.end_rho - 1.0));
         for d in 0..N {
-            let moved = end_value(&self.forward, &step.v[d]);
-            let pushed = end_value(&self.forward, &step.force[d]);
-            column.q[d] += end_value(maps, &rates.v[d]) + fraction * moved;
-            let p = column.p[d] + end_value(maps, &rates.p_rate[d]) + fraction * pushed;
+            let moved = end_value::<S>(&self.forward, &step.v[d]);
+            let pushed = end_value::<S>(&self.forward, &step.force[d]);
+            column.q[d] += end_value::<S>(maps, &rates.v[d]) + fraction * moved;
+            let p = column.p[d] + end_value::<S>(maps, &rates.p_rate[d]) + fraction * pushed;
             column.p[d] = (p - self.at.end_p[d] * scaled) / rho;
         }
-        column.z += end_value(maps, &rates.z_rate) + fraction * end_value(&self.forward, &step.l);
+        column.z += end_value::<S>(maps, &rates.z_rate) + fraction * end_value::<S>(&self.forward, &self.at.l);
         column.warm = true;
         Ok(())
     }
@@ -267,11 +306,13 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
         }
     }
 
-    /// Carries a covector from the end of the prepared step, the k-th of the run, to its start.
-    ///
-    /// # Errors
-    /// Those of the linear stage equations.
-    pub fn pull(&mut self, step: &SolvedStages<N>, k: usize, covector: &mut Covector<N>) -> Result<(), StepError> {
+    #[inline(always)]
+    fn pull_covector<S: Simd>(
+        &mut self,
+        step: &SolvedStages<N>,
+        k: usize,
+        covector: &mut Covector<N>,
+    ) -> Result<(), StepError> {
         let (given, rho) = (&mut self.given, self.at.end_rho);
         let w_q = covector.p / rho;
         let w_z = self.at.end_p.dot(&w_q);
@@ -283,56 +324,119 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
         given.r = Stages([covector.z; MAX_STAGES]);
         given.has_r = covector.z != 0.0;
         if covector.warm {
-            extrapolate(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
+            extrapolate::<S, N>(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
         }
-        self.linear.solve(&self.maps, &self.given, &mut covector.rates)?;
-        self.add_derivatives(step, k, covector);
+        self.linear.solve::<S>(&self.maps, &self.given, &mut covector.rates)?;
+        self.add_derivatives::<S>(step, k, covector);
         let (rates, maps) = (&covector.rates, &self.maps);
-        covector.p = SVector::from_fn(|d, _| w_q[d] + end_value(maps, &rates.v[d]));
-        covector.q = SVector::from_fn(|d, _| covector.q[d] - end_value(maps, &rates.p_rate[d]));
-        covector.z += end_value(maps, &rates.r_rate);
+        covector.p = SVector::from_fn(|d, _| w_q[d] + end_value::<S>(maps, &rates.v[d]));
+        covector.q = SVector::from_fn(|d, _| covector.q[d] - end_value::<S>(maps, &rates.p_rate[d]));
+        covector.z += end_value::<S>(maps, &rates.r_rate);
         covector.warm = true;
         Ok(())
     }
 
     /// Adds the derivatives with respect to parameters, time and step size over the step.
-    fn add_derivatives(&mut self, step: &SolvedStages<N>, k: usize, covector: &mut Covector<N>) {
-        let g = Coefficients::of(step.s);
-        let w = &covector.rates;
-        let (mut time, mut stretch) = (0.0, 0.0);
-        for i in 0..step.s {
-            let (t, x) = self.at.point(i);
-            let at = |x: &[Stages; N]| SVector::<f64, N>::from_fn(|d, _| x[d].0[i]);
-            let (tangent, w_rho) = (ChartVector { x: at(&w.q), y: at(&w.v), z: w.z.0[i] }, w.r.0[i]);
-            let (rho, weight) = (self.at.rho.0[i], self.forward.weights.0[i]);
-            for (index, sum) in covector.parameters.iter_mut().enumerate() {
-                let quantity = Quantity::Parameter(index);
-                let along = self.of_parameters.along(self.lagrangian, quantity, (t, &x, rho), (&tangent, w_rho));
-                *sum += weight * along;
-            }
-            let w_p = at(&w.p);
-            let along_motion = tangent.x.dot(&at(&step.force)) - w_p.dot(&x.v) + tangent.z * step.rate.0[i] + w_rho * self.at.l.0[i];
-            stretch += g.b[i].0 * along_motion;
-            if self.timed {
-                let along = self.of_parameters.along(self.lagrangian, Quantity::Time, (t, &x, rho), (&tangent, w_rho));
-                time += weight * along;
-                stretch += weight * g.c[i].0 * along;
-            }
+    #[inline(always)]
+    fn add_derivatives<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, covector: &mut Covector<N>) {
+        let (w, at) = (&covector.rates, &self.at);
+        // The pairing of the covector with the rates of the motion.
+        let mut stretch = product(&w.z, &step.rate);
+        add_product(&mut stretch, &w.r, &at.l);
+        for d in 0..N {
+            add_product(&mut stretch, &w.q[d], &step.force[d]);
+            subtract_product(&mut stretch, &w.p[d], &at.v[d]);
         }
-        covector.time += time;
-        covector.step += stretch + k as f64 * time;
+        covector.step += end_value::<S>(&self.forward, &stretch) / step.h;
+        for index in 0..covector.parameters.len() {
+            covector.parameters[index] +=
+                self.derivative_in::<S>(Quantity::Parameter(index), &covector.rates, &self.forward.weights.clone());
+        }
+        if self.timed {
+            let weights = self.forward.weights;
+            let time = self.derivative_in::<S>(Quantity::Time, &covector.rates, &weights);
+            let moved = Stages(std::array::from_fn(|i| weights.0[i] * self.forward.times.0[i] / step.h));
+            covector.time += time;
+            covector.step += k as f64 * time + self.derivative_in::<S>(Quantity::Time, &covector.rates, &moved);
+        }
+    }
+
+    /// The derivative in a quantity over the step: `d(rho L_theta)[w] + rho f_theta . w_q` at the stages, with weights.
+    #[inline(always)]
+    fn derivative_in<S: Simd>(&mut self, quantity: Quantity, w: &StageTangent<N>, weights: &Stages) -> f64 {
+        let at = &self.at;
+        if let Some(sum) = self.of_parameters.sum_along::<S, L>(self.lagrangian, quantity, at, w, weights) {
+            return sum;
+        }
+        let mut sum = 0.0;
+        for i in 0..at.s {
+            let (t, x) = at.point(i);
+            let stage = |x: &[Stages; N]| SVector::<f64, N>::from_fn(|d, _| x[d].0[i]);
+            let tangent = ChartVector { x: stage(&w.q), y: stage(&w.v), z: w.z.0[i] };
+            let along = self.of_parameters.along(self.lagrangian, quantity, (t, &x, at.rho.0[i]), (&tangent, w.r.0[i]));
+            sum += weights.0[i] * along;
+        }
+        sum
+    }
+}
+
+/// Columns over a step, compiled for one instruction set.
+struct Push<'e, 'a, L, const N: usize> {
+    engine: &'e mut Engine<'a, L, N>,
+    step: &'e SolvedStages<N>,
+    k: usize,
+    columns: &'e mut [Column<N>],
+}
+
+impl<L: Parametric<N>, const N: usize> WithSimd for Push<'_, '_, L, N> {
+    type Output = Result<f64, StepError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Push { engine, step, k, columns } = self;
+        engine.prepare::<S>(step)?;
+        let mut largest = 0.0;
+        for column in columns {
+            engine.push_column::<S>(step, k, column)?;
+            largest = max_or_nan(largest, column.size());
+        }
+        Ok(largest)
+    }
+}
+
+/// Covectors over a step, compiled for one instruction set.
+struct Pull<'e, 'a, L, const N: usize> {
+    engine: &'e mut Engine<'a, L, N>,
+    step: &'e SolvedStages<N>,
+    k: usize,
+    covectors: &'e mut [Covector<N>],
+}
+
+impl<L: Parametric<N>, const N: usize> WithSimd for Pull<'_, '_, L, N> {
+    type Output = Result<(), StepError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Pull { engine, step, k, covectors } = self;
+        engine.prepare::<S>(step)?;
+        for covector in covectors {
+            engine.pull_covector::<S>(step, k, covector)?;
+            covector.largest = max_or_nan(covector.largest, covector.size());
+        }
+        Ok(())
     }
 }
 
 /// Takes the polynomials of the rates over one step as the initial guess of the next one, with the factors of (v, z')
 /// and of r'.
 #[inline(always)]
-fn extrapolate<const N: usize>(maps: &StepMaps, rates: &mut StageTangent<N>, [of_motion, of_r]: [f64; 2]) {
+fn extrapolate<S: Simd, const N: usize>(maps: &StepMaps, rates: &mut StageTangent<N>, [of_motion, of_r]: [f64; 2]) {
     let apply = |rates: &mut Stages, factor: f64| {
-        let next = maps.extrapolated(rates);
+        let next = maps.extrapolated::<S>(rates);
         *rates = next.map(|x| factor * x);
     };
     rates.v.iter_mut().for_each(|v| apply(v, of_motion));
     apply(&mut rates.z_rate, of_motion);
     apply(&mut rates.r_rate, of_r);
+    rates.p_rate.iter_mut().for_each(|rate| apply(rate, of_r));
 }

@@ -13,7 +13,6 @@ use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::tangent::{check_tangent, no_tangent};
 use crate::{InputError, Problem, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
-use contact_geom::numbers::max_or_nan;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
 use std::ops::Range;
 
@@ -232,7 +231,6 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             explicit_times.push(time);
             all.push(Covector::new(&of_state, parameters));
         }
-        let mut largest: Vec<f64> = all.iter().map(Covector::size).collect();
         let mut engine = Engine::new(problem, steps.stages(), steps.h, Direction::Backward);
         let mut rows = RowCovectors { steps, times, of_rows, engine: None };
         let mut stepper = self.plan.stepper()?;
@@ -244,11 +242,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
                 block.push(stepper.solved_stages().ok_or_else(|| no_tangent(&self.plan, ""))?);
             }
             for (k, step) in range.zip(&block).rev() {
-                engine.prepare(step).map_err(|cause| failed(k, cause))?;
-                for (covector, largest) in all.iter_mut().zip(&mut largest) {
-                    engine.pull(step, k, covector).map_err(|cause| failed(k, cause))?;
-                    *largest = max_or_nan(*largest, covector.size());
-                }
+                engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
                 if let Some(first) = all.first_mut() {
                     rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
                 }
@@ -259,8 +253,8 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
         }
         let taken = self.outcome.steps;
-        let gradients = all.iter().zip(largest).zip(explicit_times);
-        Ok(gradients.map(|((covector, largest), time)| gradient(problem, covector, largest, time, taken)).collect())
+        let gradients = all.iter().zip(explicit_times);
+        Ok(gradients.map(|(covector, time)| gradient(problem, covector, time, taken)).collect())
     }
 }
 
@@ -290,9 +284,8 @@ impl<L: Parametric<N>, const N: usize> RowCovectors<'_, '_, L, N> {
                 let x = VelocityPoint { q: state.q, v, z: state.z };
                 let (of_state, parameters, _) = VelocityDependence::at(problem, *t, &x)?.pull(covector);
                 let engine = Engine::of_row(&mut self.engine, problem, &short, Direction::Backward);
-                engine.prepare(&short)?;
                 let mut row = Covector::new(&of_state, parameters);
-                engine.pull(&short, 0, &mut row)?;
+                engine.pull(&short, 0, std::slice::from_mut(&mut row))?;
                 to.add_row(&row, k);
             } else {
                 break;
@@ -308,7 +301,6 @@ impl<L: Parametric<N>, const N: usize> RowCovectors<'_, '_, L, N> {
 fn gradient<L: Parametric<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     covector: &Covector<N>,
-    largest: f64,
     explicit: f64,
     steps: usize,
 ) -> Gradient<N> {
@@ -321,7 +313,7 @@ fn gradient<L: Parametric<N>, const N: usize>(
         parameters: covector.parameters.clone(),
         t0: covector.time - of_step,
         t_end: of_step + explicit,
-        growth: if largest > size { largest / size } else { 1.0 },
+        growth: if covector.largest > size { covector.largest / size } else { 1.0 },
     };
     if !problem.from_momentum {
         // p = L_v(t, q, v, z; theta).

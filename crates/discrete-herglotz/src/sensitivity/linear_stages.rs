@@ -6,11 +6,14 @@
 use crate::StepError;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::coefficients::MAX_STAGES;
-use crate::numbers::registers::Stages;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::registers::{StageMap, Stages, blocks};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, StageMatrix, StageVector, stage_values};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::solve::DenseLu;
+use contact_geom::nalgebra::SMatrix;
 use contact_geom::numbers::max_or_nan;
+use pulp::Simd;
 
 /// The coefficients of the linearised motion on the symplectification at the stages of a step. For the tangent
 /// `(q, P, z, r)` of `(q, P, z, rho)`, with the rates `(v, P', z', r')`:
@@ -39,6 +42,9 @@ pub(crate) struct LinearStages<const N: usize> {
     r_q: StageVector<N>,
     r_v: StageVector<N>,
     r_z: Stages,
+    /// Whether the equations have the terms `v_q`, `p_v`.
+    has_velocity_terms: bool,
+    condensed: Option<Box<CondensedMaps<N>>>,
     /// The equations are solved by LU factorisation where their iteration does not converge.
     fallback: Option<Box<Fallback<N>>>,
 }
@@ -98,6 +104,15 @@ impl<const N: usize> Inhomogeneity<N> {
     };
 }
 
+/// The maps of a step for constant mass and constant rate, where L is separable and there is no force: with
+/// `a = W^-1 P'`, the positions are `q = q_without_a + A (1/rho) A a`; z and r are images of their terms without rates.
+struct CondensedMaps<const N: usize> {
+    inverse_mass: SMatrix<f64, N, N>,
+    positions: StageMap,
+    z: StageMap,
+    r: StageMap,
+}
+
 /// The rates that an iteration determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Kinds {
@@ -116,7 +131,7 @@ struct Fallback<const N: usize> {
 
 impl<const N: usize> LinearStages<N> {
     /// The workspace; `coupled` states that z acts on the motion by more than a rate that depends on time alone.
-    pub fn new(direction: Direction, coupled: bool) -> Self {
+    pub fn new(direction: Direction, coupled: bool, has_velocity_terms: bool) -> Self {
         let (vector, matrix) = ([Stages::ZERO; N], [[Stages::ZERO; N]; N]);
         LinearStages {
             direction,
@@ -134,8 +149,30 @@ impl<const N: usize> LinearStages<N> {
             r_q: vector,
             r_v: vector,
             r_z: Stages::ZERO,
+            has_velocity_terms,
+            condensed: None,
             fallback: None,
         }
+    }
+
+    /// Prepares the maps for constant mass and rate, where the derivatives at the stages are set and L is separable.
+    #[cold]
+    pub fn condense(&mut self, maps: &StepMaps, at: &StageDerivatives<N>, inverse_mass: &SMatrix<f64, N, N>) {
+        let gamma = at.l_z.0[0];
+        let (z, r) = (maps.resolvent(-gamma), maps.resolvent(gamma));
+        self.condensed = z.zip(r).map(|(z, r)| {
+            Box::new(CondensedMaps { inverse_mass: *inverse_mass, positions: maps.twice(&at.rho), z, r })
+        });
+    }
+
+    /// Forgets the maps, for steps of another length.
+    pub fn forget(&mut self) {
+        self.condensed = None;
+    }
+
+    /// Whether the maps were prepared.
+    pub fn is_condensed(&self) -> bool {
+        self.condensed.is_some()
     }
 
     /// Sets the coefficients from the derivatives at the stages.
@@ -148,15 +185,21 @@ impl<const N: usize> LinearStages<N> {
         self.l_z = at.l_z;
         self.p_r = at.l_q;
         self.z_q = at.l_q;
-        self.r_z = times(&at.zz);
         for d in 0..N {
-            self.v_z[d] = times(&at.vz[d]);
-            self.p_z[d] = times(&at.qz[d]);
-            (self.r_q[d], self.r_v[d]) = (self.p_z[d], self.v_z[d]);
             for e in 0..N {
-                self.v_q[d][e] = times(&at.qv[e][d]);
                 self.p_q[d][e] = times(&at.qq[d][e]);
-                self.p_v[d][e] = times(&at.qv[d][e]);
+                if self.has_velocity_terms {
+                    self.v_q[d][e] = times(&at.qv[e][d]);
+                    self.p_v[d][e] = times(&at.qv[d][e]);
+                }
+            }
+        }
+        if self.coupled {
+            self.r_z = times(&at.zz);
+            for d in 0..N {
+                self.v_z[d] = times(&at.vz[d]);
+                self.p_z[d] = times(&at.qz[d]);
+                (self.r_q[d], self.r_v[d]) = (self.p_z[d], self.v_z[d]);
             }
         }
         let Some(force) = &at.force else { return };
@@ -186,39 +229,163 @@ impl<const N: usize> LinearStages<N> {
     ///
     /// # Errors
     /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
-    pub fn solve(&mut self, maps: &StepMaps, given: &Inhomogeneity<N>, x: &mut StageTangent<N>) -> Result<(), StepError> {
+    #[inline(always)]
+    pub fn solve<S: Simd>(
+        &mut self,
+        maps: &StepMaps,
+        given: &Inhomogeneity<N>,
+        x: &mut StageTangent<N>,
+    ) -> Result<(), StepError> {
         if self.coupled {
-            return self.solve_for(Kinds { motion: true, z: true, r: true }, maps, given, x);
+            return self.solve_for::<S>(Kinds { motion: true, z: true, r: true }, maps, given, x);
+        }
+        if let Some(condensed) = self.condensed.take() {
+            let solved = self.solve_condensed::<S>(&condensed, maps, given, x);
+            self.condensed = Some(condensed);
+            if solved {
+                return Ok(());
+            }
         }
         // The tangents of rho, of the motion, and of z, each of which depends on those before it.
         if given.has_r {
-            self.solve_for(Kinds { motion: false, z: false, r: true }, maps, given, x)?;
+            self.solve_for::<S>(Kinds { motion: false, z: false, r: true }, maps, given, x)?;
         } else {
             (x.r, x.r_rate) = (Stages::ZERO, Stages::ZERO);
         }
-        (x.z, x.z_rate) = (Stages::ZERO, x.z_rate);
-        self.solve_for(Kinds { motion: true, z: false, r: false }, maps, given, x)?;
-        self.solve_for(Kinds { motion: false, z: true, r: false }, maps, given, x)
+        x.z = Stages::ZERO;
+        self.solve_for::<S>(Kinds { motion: true, z: false, r: false }, maps, given, x)?;
+        self.solve_for::<S>(Kinds { motion: false, z: true, r: false }, maps, given, x)
     }
 
-    fn solve_for(
+    /// Solves the equations for constant mass and rate by fixed-point iteration for the positions; `false` if it does
+    /// not converge.
+    #[inline(always)]
+    fn solve_condensed<S: Simd>(
+        &self,
+        condensed: &CondensedMaps<N>,
+        maps: &StepMaps,
+        given: &Inhomogeneity<N>,
+        x: &mut StageTangent<N>,
+    ) -> bool {
+        let s = maps.s;
+        let zero = Lanes::<S>::splat(0.0);
+        let gamma = self.l_z.0[0];
+        (x.r, x.r_rate) = (Stages::ZERO, Stages::ZERO);
+        if given.has_r {
+            let mut without = Stages::ZERO;
+            maps.to_stages.apply::<S>(&given.r_source, s, &mut without, |_| zero);
+            for i in 0..MAX_STAGES {
+                without.0[i] = given.r.0[i] - without.0[i];
+            }
+            condensed.r.apply::<S>(&without, s, &mut x.r, |_| zero);
+            for i in 0..MAX_STAGES {
+                x.r_rate.0[i] = -gamma * x.r.0[i] - given.r_source.0[i];
+            }
+        }
+        // The velocities without the rates of P, and the positions that they give.
+        let (mut u, mut q0) = ([Stages::ZERO; N], [Stages::ZERO; N]);
+        for d in 0..N {
+            let mut momentum = given.p[d];
+            for i in 0..MAX_STAGES {
+                momentum.0[i] -= given.v_source[d].0[i] + x.r.0[i] * self.l_v[d].0[i];
+            }
+            for e in 0..N {
+                add_product(&mut u[e], &momentum, &self.inverse_mass[e][d]);
+            }
+        }
+        for d in 0..N {
+            maps.to_stages.apply::<S>(&u[d], s, &mut q0[d], |r| given.q[d].block(r));
+        }
+        let mut fixed = [Stages::ZERO; N];
+        for d in 0..N {
+            fixed[d] = product(&x.r, &self.p_r[d]);
+            add(&mut fixed[d], &given.p_source[d]);
+        }
+        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        loop {
+            // x.q holds W^-1 P' until the iteration has converged.
+            let mut a = [Stages::ZERO; N];
+            let (mut change, mut size) = (zero, zero);
+            for d in 0..N {
+                for e in 0..N {
+                    for i in 0..MAX_STAGES {
+                        a[d].0[i] += condensed.inverse_mass[(d, e)] * x.p_rate[e].0[i];
+                    }
+                }
+                let mut q = Stages::ZERO;
+                condensed.positions.apply::<S>(&a[d], s, &mut q, |r| q0[d].block(r));
+                for r in 0..blocks::<S>(s) {
+                    let new = q.block::<S>(r);
+                    change = change.max((new - x.q[d].block::<S>(r)).abs());
+                    size = size.max(new.abs());
+                }
+                x.q[d] = q;
+            }
+            for d in 0..N {
+                x.p_rate[d] = fixed[d];
+                for e in 0..N {
+                    add_product(&mut x.p_rate[d], &x.q[e], &self.p_q[d][e]);
+                }
+            }
+            let (change, size) = (change.reduce_max(), size.reduce_max());
+            match iteration.assess(change, size) {
+                IterationOutcome::Continue => {}
+                IterationOutcome::Done => break,
+                _ => return false,
+            }
+        }
+        for d in 0..N {
+            maps.to_stages.apply::<S>(&x.p_rate[d], s, &mut x.p[d], |r| given.p[d].block(r));
+        }
+        let mut z_rate = given.z_source;
+        let mut finite = 0.0;
+        for d in 0..N {
+            let mut v = Stages::ZERO;
+            for e in 0..N {
+                let mut momentum = x.p[e];
+                for i in 0..MAX_STAGES {
+                    momentum.0[i] -= given.v_source[e].0[i] + x.r.0[i] * self.l_v[e].0[i];
+                }
+                add_product(&mut v, &momentum, &self.inverse_mass[d][e]);
+            }
+            x.v[d] = v;
+            add_product(&mut z_rate, &x.q[d], &self.z_q[d]);
+            add_product(&mut z_rate, &x.v[d], &self.l_v[d]);
+            for i in 0..s {
+                finite += v.0[i] + x.q[d].0[i];
+            }
+        }
+        let mut without = Stages::ZERO;
+        maps.to_stages.apply::<S>(&z_rate, s, &mut without, |r| given.z.block(r));
+        condensed.z.apply::<S>(&without, s, &mut x.z, |_| zero);
+        for i in 0..MAX_STAGES {
+            z_rate.0[i] += gamma * x.z.0[i];
+        }
+        x.z_rate = z_rate;
+        // The maxima over lanes may hide a NaN.
+        finite.is_finite()
+    }
+
+    #[inline(always)]
+    fn solve_for<S: Simd>(
         &mut self,
         kinds: Kinds,
         maps: &StepMaps,
         given: &Inhomogeneity<N>,
         x: &mut StageTangent<N>,
     ) -> Result<(), StepError> {
-        if !self.iterate(kinds, maps, given, x) {
-            self.solve_directly(kinds, maps, given, x)?;
+        if !self.iterate::<S>(kinds, maps, given, x) {
+            self.solve_directly::<S>(kinds, maps, given, x)?;
         }
         Ok(())
     }
 
     /// Fixed-point iteration to round-off; `false` if it does not converge.
-    fn iterate(&self, kinds: Kinds, maps: &StepMaps, given: &Inhomogeneity<N>, x: &mut StageTangent<N>) -> bool {
+    #[inline(always)]
+    fn iterate<S: Simd>(&self, kinds: Kinds, maps: &StepMaps, given: &Inhomogeneity<N>, x: &mut StageTangent<N>) -> bool {
         let mut iteration = FixedPointIteration::until(1.0, 0.25);
         loop {
-            match iteration.assess(self.update(kinds, maps, Some(given), x), 1.0) {
+            match iteration.assess(self.update::<S>(kinds, maps, Some(given), x), 1.0) {
                 IterationOutcome::Continue => {}
                 IterationOutcome::Done => return true,
                 _ => return false,
@@ -229,11 +396,11 @@ impl<const N: usize> LinearStages<N> {
     /// Computes the values at the stages from the rates, and the rates from these values; without the inhomogeneous
     /// terms, if none are given. Returns the largest change of a rate, relative to the size of the terms.
     #[inline(always)]
-    fn update(&self, kinds: Kinds, maps: &StepMaps, given: Option<&Inhomogeneity<N>>, x: &mut StageTangent<N>) -> f64 {
+    fn update<S: Simd>(&self, kinds: Kinds, maps: &StepMaps, given: Option<&Inhomogeneity<N>>, x: &mut StageTangent<N>) -> f64 {
         let Kinds { motion, z, r } = kinds;
         let s = maps.s;
         let sum = |rates: &Stages, start: Option<&Stages>| {
-            let mut values = stage_values(maps, rates, 0.0);
+            let mut values = stage_values::<S>(maps, rates, 0.0);
             if let Some(start) = start {
                 add(&mut values, start);
             }
@@ -252,10 +419,14 @@ impl<const N: usize> LinearStages<N> {
             }
             for d in 0..N {
                 let mut rate = product(&x.r, &self.p_r[d]);
-                add_product(&mut rate, &x.z, &self.p_z[d]);
+                if self.coupled {
+                    add_product(&mut rate, &x.z, &self.p_z[d]);
+                }
                 for e in 0..N {
                     add_product(&mut rate, &x.q[e], &self.p_q[d][e]);
-                    add_product(&mut rate, &x.v[e], &self.p_v[d][e]);
+                    if self.has_velocity_terms {
+                        add_product(&mut rate, &x.v[e], &self.p_v[d][e]);
+                    }
                 }
                 if let Some(given) = given {
                     add(&mut rate, &given.p_source[d]);
@@ -267,9 +438,13 @@ impl<const N: usize> LinearStages<N> {
             for d in 0..N {
                 momentum[d] = x.p[d];
                 subtract_product(&mut momentum[d], &x.r, &self.l_v[d]);
-                subtract_product(&mut momentum[d], &x.z, &self.v_z[d]);
-                for e in 0..N {
-                    subtract_product(&mut momentum[d], &x.q[e], &self.v_q[d][e]);
+                if self.coupled {
+                    subtract_product(&mut momentum[d], &x.z, &self.v_z[d]);
+                }
+                if self.has_velocity_terms {
+                    for e in 0..N {
+                        subtract_product(&mut momentum[d], &x.q[e], &self.v_q[d][e]);
+                    }
                 }
                 if let Some(given) = given {
                     for i in 0..MAX_STAGES {
@@ -330,7 +505,7 @@ impl<const N: usize> LinearStages<N> {
     /// Solves the stage equations by LU factorisation of their matrix, whose columns are the images of unit vectors.
     #[cold]
     #[inline(never)]
-    fn solve_directly(
+    fn solve_directly<S: Simd>(
         &mut self,
         kinds: Kinds,
         maps: &StepMaps,
@@ -350,7 +525,7 @@ impl<const N: usize> LinearStages<N> {
         }
         for j in 0..n {
             set_unknowns(kinds, s, &mut unit, |k| f64::from(u8::from(k == j)));
-            self.update(kinds, maps, None, &mut unit);
+            self.update::<S>(kinds, maps, None, &mut unit);
             let column = &mut matrix[j * n..][..n];
             unknowns(kinds, s, &unit, |k, value| column[k] = f64::from(u8::from(k == j)) - value);
         }
@@ -358,7 +533,7 @@ impl<const N: usize> LinearStages<N> {
         // Two refinements: the second shows that the first has reached round-off.
         for _ in 0..3 {
             unknowns(kinds, s, x, |k, value| rhs[k] = -value);
-            self.update(kinds, maps, Some(given), x);
+            self.update::<S>(kinds, maps, Some(given), x);
             unknowns(kinds, s, x, |k, value| rhs[k] += value);
             let mut before = std::mem::take(rhs);
             // x is now F(x0) = x0 + rhs; the solution is x0 + (1 - T)^-1 rhs.
@@ -367,7 +542,7 @@ impl<const N: usize> LinearStages<N> {
             add_to_unknowns(kinds, s, x, |k| before[k] - shifted[k]);
             *rhs = before;
         }
-        self.update(kinds, maps, Some(given), x);
+        self.update::<S>(kinds, maps, Some(given), x);
         self.fallback = Some(fallback);
         Ok(())
     }
@@ -411,21 +586,21 @@ fn add(to: &mut Stages, x: &Stages) {
 }
 
 #[inline(always)]
-fn product(a: &Stages, b: &Stages) -> Stages {
+pub(crate) fn product(a: &Stages, b: &Stages) -> Stages {
     let mut out = Stages::ZERO;
     add_product(&mut out, a, b);
     out
 }
 
 #[inline(always)]
-fn add_product(to: &mut Stages, a: &Stages, b: &Stages) {
+pub(crate) fn add_product(to: &mut Stages, a: &Stages, b: &Stages) {
     for i in 0..MAX_STAGES {
         to.0[i] += a.0[i] * b.0[i];
     }
 }
 
 #[inline(always)]
-fn subtract_product(to: &mut Stages, a: &Stages, b: &Stages) {
+pub(crate) fn subtract_product(to: &mut Stages, a: &Stages, b: &Stages) {
     for i in 0..MAX_STAGES {
         to.0[i] -= a.0[i] * b.0[i];
     }

@@ -1,7 +1,14 @@
 //! Derivatives of L and of the force with respect to parameters and time, at a point.
 
 use contact_geom::nalgebra::{ArrayStorage, SVector};
-use contact_geom::{ChartVector, Dual, Parametric, VelocityPoint, support::seed};
+use crate::numbers::lanes::{Lanes, branched, forget_branches, vector};
+use crate::numbers::registers::{Stages, blocks};
+use crate::sensitivity::linear_stages::StageTangent;
+use crate::sensitivity::stage_derivatives::StageDerivatives;
+use contact_geom::support::{KernelDual, seed};
+use contact_geom::{ChartVector, Dual, Parametric, VelocityPoint};
+use num_traits::{One, Zero};
+use pulp::Simd;
 
 /// What is differentiated with respect to: a parameter, or the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,4 +141,50 @@ impl<const N: usize> ParameterDerivatives<N> {
         let force = self.force(lagrangian, quantity, t, x);
         w_rho * l.re + rho * (l.d[0] + force.dot(&w.x))
     }
+
+    /// The same at all stages in SIMD lanes, multiplied by the weights and summed; `None` with a force, and for many
+    /// parameters.
+    #[inline(always)]
+    pub fn sum_along<S: Simd, L: Parametric<N>>(
+        &self,
+        lagrangian: &L,
+        quantity: Quantity,
+        at: &StageDerivatives<N>,
+        w: &StageTangent<N>,
+        weights: &Stages,
+    ) -> Option<f64> {
+        if const { L::HINTS.forced } || self.theta.len() > MAX_PARAMETERS_IN_LANES {
+            return None;
+        }
+        forget_branches();
+        let mut theta = [Nested::<S>::zero(); MAX_PARAMETERS_IN_LANES];
+        for (nested, theta) in theta.iter_mut().zip(&self.theta) {
+            *nested = Nested::<S>::from(*theta);
+        }
+        if let Quantity::Parameter(k) = quantity {
+            theta[k].d[0] = KernelDual::one();
+        }
+        let mut sum = Lanes::<S>::splat(0.0);
+        for r in 0..blocks::<S>(at.s) {
+            let moving = |re: &Stages, d: &Stages| {
+                Nested::<S>::constant(KernelDual { re: re.block::<S>(r), d: vector(|_| d.block::<S>(r)) })
+            };
+            let q = vector::<Nested<S>, N>(|d| moving(&at.q[d], &w.q[d]));
+            let v = vector::<Nested<S>, N>(|d| moving(&at.v[d], &w.v[d]));
+            let mut time = Nested::<S>::constant(KernelDual::constant(at.times.block::<S>(r)));
+            if quantity == Quantity::Time {
+                time.d[0] = KernelDual::one();
+            }
+            let l = lagrangian.value_at(&theta[..self.theta.len()], time, &q, &v, moving(&at.z, &w.z)).d[0];
+            let along = w.r.block::<S>(r) * l.re + at.rho.block::<S>(r) * l.d[0];
+            sum = weights.block::<S>(r).mul_add(along, sum);
+        }
+        (!branched()).then(|| sum.sum())
+    }
 }
+
+/// The largest number of parameters whose numbers with derivatives, in SIMD lanes, are on the stack.
+const MAX_PARAMETERS_IN_LANES: usize = 8;
+
+/// SIMD lanes of numbers with their derivatives along two directions, and the mixed one.
+type Nested<S> = KernelDual<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, SVector<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, 1>>;

@@ -17,6 +17,8 @@ pub struct SolvedStages<const N: usize> {
     pub(crate) force: [Stages; N],
     pub(crate) rate: Stages,
     pub(crate) l: Stages,
+    /// Whether L is known; otherwise its values are 0.
+    pub(crate) knows_l: bool,
 }
 
 impl<const N: usize> SolvedStages<N> {

@@ -1,7 +1,11 @@
 //! The maps between the stages of a step, for its tangent and for the tangent of the step backward.
 
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{StageMap, Stages};
+use crate::solve::inverse::inverse;
+use contact_geom::nalgebra::DMatrix;
+use pulp::Simd;
 use std::array::from_fn;
 
 /// The direction in which a linear system is integrated over a step.
@@ -21,6 +25,8 @@ pub(crate) struct StepMaps {
     pub h: f64,
     pub to_stages: StageMap,
     pub weights: Stages,
+    /// The times of the stages from the start of the step, forward.
+    pub times: Stages,
     /// The extrapolation from the stages of one step to those of the next one in this direction.
     pub extrapolation: StageMap,
 }
@@ -29,6 +35,7 @@ impl StepMaps {
     pub fn new(s: usize, h: f64, direction: Direction) -> Self {
         let g = Coefficients::of(s);
         let inside = |i: usize, j: usize, entry: &dyn Fn(usize, usize) -> f64| if i.max(j) < s { entry(i, j) } else { 0.0 };
+        let times = Stages(from_fn(|i| h * g.c[i.min(s - 1)].0));
         let map = |entry: &dyn Fn(usize, usize) -> f64| {
             StageMap::new(&from_fn(|i| from_fn(|j| inside(i, j, entry))), s)
         };
@@ -36,6 +43,7 @@ impl StepMaps {
             Direction::Forward => StepMaps {
                 s,
                 h,
+                times,
                 to_stages: map(&|i, j| h * g.a[i][j].0),
                 weights: Stages(from_fn(|j| if j < s { h * g.b[j].0 } else { 0.0 })),
                 extrapolation: map(&|i, j| g.extrapolation[i][j]),
@@ -43,6 +51,7 @@ impl StepMaps {
             Direction::Backward => StepMaps {
                 s,
                 h: -h,
+                times,
                 // By symmetry of the nodes `b_j - a_ij` is an entry of A, which has no cancellation.
                 to_stages: map(&|i, j| -h * g.a[s - 1 - i][s - 1 - j].0),
                 weights: Stages(from_fn(|j| if j < s { -h * g.b[j].0 } else { 0.0 })),
@@ -53,13 +62,24 @@ impl StepMaps {
 
     /// The values at the stages of the next step of the polynomial through those of this one.
     #[inline(always)]
-    pub fn extrapolated(&self, x: &Stages) -> Stages {
+    pub fn extrapolated<S: Simd>(&self, x: &Stages) -> Stages {
         let mut next = Stages::ZERO;
-        for (column, x) in self.extrapolation.0.iter().zip(&x.0).take(self.s) {
-            for (next, entry) in next.0.iter_mut().zip(&column.0) {
-                *next += entry * x;
-            }
-        }
+        self.extrapolation.apply::<S>(x, self.s, &mut next, |_| Lanes::splat(0.0));
         next
+    }
+
+    /// The map from `x` to the solution y of `y + factor A y = x`, for the matrix A of the maps to the stages.
+    pub fn resolvent(&self, factor: f64) -> Option<StageMap> {
+        let s = self.s;
+        let entry = |i: usize, j: usize| f64::from(u8::from(i == j)) + factor * self.to_stages.0[j].0[i];
+        let inverse = inverse(&DMatrix::from_fn(s, s, entry))?;
+        Some(StageMap::new(&from_fn(|i| from_fn(|j| if i.max(j) < s { inverse[(i, j)] } else { 0.0 })), s))
+    }
+
+    /// The matrix `A D A`, for the diagonal matrix D of the inverses of these numbers.
+    pub fn twice(&self, divided_by: &Stages) -> StageMap {
+        let (s, a) = (self.s, |i: usize, j: usize| self.to_stages.0[j].0[i]);
+        let entry = |i: usize, j: usize| (0..s).map(|k| a(i, k) / divided_by.0[k] * a(k, j)).sum();
+        StageMap::new(&from_fn(|i| from_fn(|j| if i.max(j) < s { entry(i, j) } else { 0.0 })), s)
     }
 }

@@ -71,11 +71,8 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let step = at.stepper.solved_stages().ok_or_else(|| no_tangent(self.plan, ""))?;
         self.rows_within(&step, at)?;
         let failed = |cause| SensitivityError::Step { step: k, cause };
-        self.engine.prepare(&step).map_err(failed)?;
-        for column in &mut self.columns {
-            self.engine.push(&step, k, column).map_err(failed)?;
-            self.largest = max_or_nan(self.largest, column.size());
-        }
+        let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
+        self.largest = max_or_nan(self.largest, largest);
         self.taken = at.k;
         self.row_at_end(at)
     }
@@ -88,13 +85,8 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         while let Some(t) = self.times.next_within((step.t, at.t)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
             let engine = Engine::of_row(&mut self.row_engine, steps.problem, &short, Direction::Forward);
-            engine.prepare(&short).map_err(failed)?;
-            let mut columns = Vec::with_capacity(self.columns.len());
-            for column in &self.columns {
-                let mut column = column.for_row(k);
-                engine.push(&short, 0, &mut column).map_err(failed)?;
-                columns.push(column);
-            }
+            let mut columns: Vec<_> = self.columns.iter().map(|column| column.for_row(k)).collect();
+            engine.push(&short, 0, &mut columns).map_err(failed)?;
             let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
             self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);
         }

@@ -310,6 +310,12 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for Box<Linear<'_, L, N>> {
         Solved::from_accelerations(self.lagrangian, step, &self.table, [&a, &x], self.action.is_some())
     }
 
+    fn solved_without_action(&self, step: &SolvedStep<'_, N>) -> Option<Solved<N>> {
+        let a = self.accelerations(&step.from.q, &step.from.y);
+        let x = self.table.positions(&step.from.q, &step.from.y, &a);
+        Some(Solved::from_accelerations(self.lagrangian, step, &self.table, [&a, &x], false))
+    }
+
     #[inline(always)]
     fn collect<S: Simd>(&self, step: &SolvedStep<'_, N>, curve: &mut Curve<N>) {
         let a = self.accelerations(&step.from.q, &step.from.y);

@@ -90,6 +90,11 @@ pub(crate) trait StageRoute<const N: usize>: Saved {
     /// The stages of the last step, for dense output.
     fn solved(&self, step: &SolvedStep<'_, N>) -> Solved<N>;
 
+    /// The stages of the last step without the values of L, if these are computed separately.
+    fn solved_without_action(&self, _step: &SolvedStep<'_, N>) -> Option<Solved<N>> {
+        None
+    }
+
     /// Collects the stages of the last step in a curve, for defect samples.
     fn collect<S: Simd>(&self, step: &SolvedStep<'_, N>, curve: &mut Curve<N>);
 }

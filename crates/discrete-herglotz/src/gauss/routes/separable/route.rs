@@ -86,6 +86,11 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, 
         )
     }
 
+    fn solved_without_action(&self, step: &SolvedStep<'_, N>) -> Option<Solved<N>> {
+        let stages = [&self.a.map(|a| a.0), &self.x.map(|x| x.0)];
+        Some(Solved::from_accelerations(self.lagrangian, step, &self.table, stages, false))
+    }
+
     #[inline(always)]
     fn collect<S: Simd>(&self, step: &SolvedStep<'_, N>, curve: &mut Curve<N>) {
         curve.of_accelerations::<S, L>(self.lagrangian, step, &self.table, [&self.a, &self.x]);
