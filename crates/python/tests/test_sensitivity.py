@@ -1,5 +1,10 @@
 """Derivatives of motions: forward and by the adjoint."""
 
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import herglotz as hz
 import numpy as np
 import pytest
@@ -146,6 +151,26 @@ def test_scipy_takes_the_jacobians(integrator):
 
     found = optimize.minimize(of, truth, jac=True)
     assert found.fun < 1e-6
+
+
+def test_the_section_of_the_documentation():
+    pytest.importorskip("scipy.optimize")
+    text = Path(__file__).parents[3].joinpath("docs", "python.md").read_text()
+    section = text.split("## Derivatives of motions")[1].split("\n## ")[0]
+    names = {"np": np, "hz": hz}
+    for code in re.findall(r"```python\n(.*?)```", section, re.S):
+        if "herglotz.jax" in code:
+            pytest.importorskip("jax")
+        exec(code, names)
+    close(names["sol"].sensitivity("gamma").q[-1], [225.1450713918], 1e-11)
+    close(names["fit"].x, (-0.2, 1.7), 1e-7)
+
+
+@pytest.mark.parametrize("package", ["jax", "torch"])
+def test_a_package_that_is_missing(package):
+    code = f"import sys; sys.modules[{package!r}] = None; import herglotz.{package}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert f"herglotz.{package} needs the package `{package}`; install it with `pip install {package}`" in done.stderr
 
 
 SAID = {
