@@ -6,7 +6,9 @@ mod random;
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::table::{Interpolation, Table};
-use contact_geom::{Dual, Lagrangian, Parametric, VelocityPoint};
+use contact_geom::{Dual, Forced, Lagrangian, Parametric, VelocityDrag, VelocityPoint, systems::Pendulum};
+use discrete_herglotz::sensitivity::{EndCovector, Gradient, LossGradient};
+use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 use random::Random;
 
@@ -104,6 +106,30 @@ fn values_are_those_of_set_parameters() {
         assert!(close(&[l.value_at(&theta, t, &x.q, &x.v, x.z)], &[set.value(t, &x.q, &x.v, x.z)]));
         assert!(close(l.force_at(&theta, t, &x).as_slice(), set.applied_force(t, &x).as_slice()));
     }
+}
+
+/// The gradient of the position at the end of a motion.
+fn gradient(l: &impl Parametric<1>) -> Gradient<1> {
+    let problem = Problem::new(l, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
+    let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.25));
+    let position = EndCovector { q: [1.0].into(), ..EndCovector::zero() };
+    let LossGradient { loss, .. } = run.gradient_of(|end| (end.q[0], position), Until::Time(20.0)).unwrap();
+    loss.unwrap().1
+}
+
+/// Gradients of runs are those of the same Lagrangian as a type, to the rounding of some hundred stages.
+#[test]
+fn gradients_of_runs_are_those_of_a_type() {
+    let pendulum = Pendulum { gamma: -0.01 };
+    let drag = VelocityDrag { linear: [0.05].into(), quadratic: 0.0 };
+    let of_type = gradient(&Forced { lagrangian: pendulum, force: drag });
+    let text = "force[x] = -c*x'; L = x'^2/2 - versine(x) + gamma*z";
+    let parameters = [("unused", 2.0), ("gamma", -0.01), ("c", 0.05)];
+    let found = gradient(&Formula::parse(text, &["x"], &parameters).unwrap().lagrangian::<1>().unwrap());
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
+    assert!(near(found.q[0], of_type.q[0]) && near(found.rate[0], of_type.rate[0]) && near(found.z, of_type.z));
+    let [unused, gamma, c] = found.parameters[..] else { panic!("three parameters") };
+    assert!(unused == 0.0 && near(gamma, of_type.parameters[0]) && near(c, of_type.parameters[1]));
 }
 
 #[test]
