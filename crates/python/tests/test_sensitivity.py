@@ -205,7 +205,7 @@ SAID = {
     ),
     "a loss with an unknown name": (
         lambda: hz.value_and_grad("x - y")(L, [1.0], [1.0], 1.0, **GIVEN),
-        "unknown name `y`",
+        "the loss \"x - y\": .*unknown name `y`",
     ),
 }
 

@@ -38,5 +38,23 @@ class DifferentiableMotion:
         return found.q0, found.v0, found.z0, np.array([found.parameters[name] for name in self.names])
 
 
+# Motions by their arguments: for a motion that is made anew in each iteration, JAX would compile its callback again.
+_KNOWN = {}
+_MOST = 128
+
+
+def differentiable(L, t, n, names, options):
+    """The differentiable motion of these arguments; the same object for the same ones."""
+    of = DifferentiableMotion(L, t, n, names, options)
+    try:
+        key = of.system, of.t.shape, of.t.tobytes(), of.names, frozenset(of.options.items())
+        if len(_KNOWN) >= _MOST and key not in _KNOWN:
+            _KNOWN.clear()
+        return _KNOWN.setdefault(key, of)
+    except TypeError:
+        # An option that cannot be hashed, such as an array of scales.
+        return of
+
+
 def numbers(x):
     return np.array(x, dtype=float)

@@ -52,6 +52,7 @@ def sensitivity(sol, variables):
     (q, v, p), z, growth = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, sol.t.tolist())
     shape = len(sol.t), len(names), sol.system.dimension
     q, v, p = (x.reshape(shape).transpose(0, 2, 1) for x in (q, v, p))
+    z = z.reshape(shape[:2])
     if is_one:
         q, v, p, z = q[:, :, 0], v[:, :, 0], p[:, :, 0], z[:, 0]
     return Sensitivity(q, v, p, z, growth)
@@ -122,7 +123,8 @@ def value_and_grad(loss):
         given.apply_defaults()
         # As a column it is traced, and its parameters and tables are found.
         of, request, *_ = request_of(**given.arguments | {"observe": {"loss": loss}, "events": ()})
-        value, slopes = _core.value_and_gradient(_core.Motion(of, *request), request[5][0])
+        (text,) = request[5]
+        value, slopes = _core.value_and_gradient(_core.Motion(of, *request[:5], [], *request[6:]), text)
         return value, _gradient(of, request, slopes)
 
     return run

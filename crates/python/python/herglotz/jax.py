@@ -1,10 +1,11 @@
 """Motions that JAX differentiates: `solve`. It needs the package `jax`."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ._differentiable import DifferentiableMotion
+from ._differentiable import differentiable
 
 try:
     import jax
@@ -53,14 +54,19 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     """
     parameters = dict(parameters or {})
     q0, v0, z0 = jnp.asarray(q0, dtype=float), jnp.asarray(v0, dtype=float), jnp.asarray(z0, dtype=float)
-    of = DifferentiableMotion(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)
+    of = differentiable(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)
     if q0.shape != (of.n,) or v0.shape != (of.n,):
         raise ValueError(f"`q0` and `v0` have the shapes {q0.shape} and {v0.shape}; they must be ({of.n},)")
     values = jnp.stack([jnp.asarray(x, dtype=float) for x in parameters.values()]) if parameters else jnp.zeros(0)
-    kind = q0.dtype
+    return Rows(*_motion(of, q0.dtype)(q0, v0, z0, values))
+
+
+@lru_cache(maxsize=128)
+def _motion(of, kind):
+    """The rows as a function of q0, v0, z0 and the values of the parameters."""
     shaped = lambda *shape: jax.ShapeDtypeStruct(shape, kind)
     rows = shaped(of.rows, of.n), shaped(of.rows, of.n), shaped(of.rows)
-    slopes = shaped(of.n), shaped(of.n), shaped(), shaped(len(parameters))
+    slopes = shaped(of.n), shaped(of.n), shaped(), shaped(len(of.names))
     of_kind = lambda arrays: tuple(np.asarray(x, dtype=kind) for x in arrays)
 
     def run(*start):
@@ -81,4 +87,4 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
         return jax.pure_callback(pull, slopes, start, of_rows, vmap_method="sequential")
 
     motion.defvjp(forward, backward)
-    return Rows(*motion(q0, v0, z0, values))
+    return motion

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ._differentiable import DifferentiableMotion
+from ._differentiable import differentiable
 
 try:
     import torch
@@ -64,6 +64,6 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     parameters = dict(parameters or {})
     of_double = lambda x: torch.as_tensor(x, dtype=torch.float64, device="cpu")
     q0, v0, z0 = of_double(q0), of_double(v0), of_double(z0)
-    of = DifferentiableMotion(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)
+    of = differentiable(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)
     values = torch.stack([of_double(x) for x in parameters.values()]) if parameters else torch.zeros(0, dtype=torch.float64)
     return Rows(*_Motion.apply(of, q0, v0, z0, values))
