@@ -17,12 +17,13 @@ mod gauss_steppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
-use counting_allocator::allocations;
+use counting_allocator::{allocations, peak};
 use discrete_herglotz::{
-    DiscreteLagrangian, Ensemble, GaussCollocation, SplittingScheme, Stepper, Steps, Until,
+    DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, Steps, Until,
     boundary::{BoundaryPath, End},
     gauss::{Gauss, GaussRoute},
     rules::{Flow, LeftMidpoint, Method},
+    sensitivity::{EndState, Loss},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
 use gauss_steppers::GaussSteppers;
@@ -172,4 +173,30 @@ fn steps_of_ensembles() {
         of(collocation(), 10);
         assert_eq!(of(collocation(), steps), of(collocation(), 100));
     }
+}
+
+/// The memory of a gradient does not grow with the number of steps: states are kept at intervals, which are doubled when
+/// there are too many. The steps themselves allocate nothing, so that the number of allocations grows with the kept states
+/// alone.
+#[test]
+fn gradients_have_bounded_memory() {
+    struct End;
+    impl Loss<1> for End {
+        fn value<T: Scalar>(&self, end: &EndState<1, T>) -> T {
+            end.q[0] * end.v[0]
+        }
+    }
+    let pendulum = Pendulum::default();
+    let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
+    let gradient = |steps: usize| {
+        let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(1e-3));
+        let found = run.gradient(&End, Until::Time(1e-3 * steps as f64)).unwrap();
+        assert!(found.loss.is_some() && found.outcome.steps == steps);
+    };
+    let count = |steps: usize| allocations(|| gradient(steps));
+    // Two kept states at an interval of 64 steps need no more than a few allocations each.
+    let (few, more) = (count(64 * 16), count(64 * 32));
+    assert!(more <= few + 16 * 16, "{few} and {more} allocations");
+    let (few, many) = (peak(|| gradient(40_000)), peak(|| gradient(160_000)));
+    assert!(many <= few + few / 4, "{few} and {many} bytes");
 }
