@@ -5,6 +5,7 @@ use crate::breaks::Kinks;
 use crate::drag::ProvedForce;
 use crate::formula::index;
 use crate::node::Inputs;
+use crate::parametric_nodes::ParametricNodes;
 use crate::parser::MOST_NODES;
 use crate::resets::DerivedReset;
 use crate::structure::{Partials, kinks, proved};
@@ -51,6 +52,9 @@ pub(crate) struct Derived {
     pub breaks: Vec<f64>,
     /// The force on each coordinate of the formula; `None` if there is none.
     pub applied: Option<Tape>,
+    /// The value and the force for any values of the parameters.
+    pub parametric_value: ParametricNodes,
+    pub parametric_force: ParametricNodes,
     /// The nodes of these forces.
     pub applied_nodes: Vec<Id>,
     pub proved_force: ProvedForce,
@@ -121,6 +125,8 @@ impl Derived {
             [] => None,
             forces => Some(Tape::new(&graph, forces, n).ok_or(too_large.clone())?),
         };
+        let parametric_value = ParametricNodes::new(&graph, &[root]);
+        let parametric_force = ParametricNodes::new(&graph, &applied_nodes);
         let proved_force = ProvedForce::of(&mut graph, &applied_nodes, n, MOST_NODES_WITH_HESSIAN);
         let formula = Formula { graph, ..formula.clone() };
         let mut derived = Derived {
@@ -142,6 +148,8 @@ impl Derived {
             resets,
             breaks: Vec::new(),
             applied,
+            parametric_value,
+            parametric_force,
             applied_nodes,
             proved_force,
             unforced: structure,
@@ -158,6 +166,12 @@ impl Derived {
         }
         self.set_constants();
         Ok(())
+    }
+
+    /// Sets the values of all parameters, of which as many are given as there are.
+    pub fn set_all(&mut self, values: &[f64]) {
+        self.formula.values.copy_from_slice(values);
+        self.set_constants();
     }
 
     fn set_constants(&mut self) {

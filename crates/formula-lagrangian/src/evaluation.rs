@@ -272,6 +272,6 @@ fn apart<T: Scalar>(mut x: T, work: impl FnOnce(T) -> T) -> T {
 
 /// `x^a`; the exponent may be a parameter with an integer value, for which powers of negative numbers are defined.
 #[inline(always)]
-fn power<T: Scalar>(x: T, a: f64) -> T {
+pub(crate) fn power<T: Scalar>(x: T, a: f64) -> T {
     if a.fract() == 0.0 && a.abs() <= 1e9 { x.powi(a as i32) } else { x.powf(a) }
 }

@@ -6,7 +6,7 @@ use crate::names::Names;
 use crate::node::Inputs;
 use crate::parser::{MOST_NODES, Parser, ValueName};
 use crate::tape::Tape;
-use crate::{Formula, FormulaError, Graph, MOST_COORDINATES};
+use crate::{Formula, FormulaError, Graph, Id, MOST_COORDINATES};
 use contact_geom::Scalar;
 
 /// An expression over the names of a formula, evaluated along a motion; made by [`Formula::expression`].
@@ -26,10 +26,11 @@ use contact_geom::Scalar;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Expression {
-    names: Names,
-    graph: Graph,
+    pub(crate) names: Names,
+    pub(crate) graph: Graph,
+    pub(crate) root: Id,
     tape: Tape,
-    values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     inputs: Inputs,
     log_factor: bool,
 }
@@ -43,7 +44,7 @@ impl Expression {
         let width = names.dimension + usize::from(log_factor);
         let tape = Tape::new(&graph, &[root], width).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
         let inputs = graph.inputs(root);
-        let mut expression = Expression { names, graph, tape, values, inputs, log_factor };
+        let mut expression = Expression { names, graph, root, tape, values, inputs, log_factor };
         expression.tape.set_constants(&expression.graph.constants(&expression.values));
         Ok(expression)
     }

@@ -13,6 +13,7 @@ mod motion;
 mod operators;
 mod path;
 mod run;
+mod sensitivity;
 mod signals;
 mod sparse;
 mod symbol;
@@ -46,6 +47,8 @@ mod _core {
     use crate::path::{PathRecord, search_path};
     #[pymodule_export]
     use crate::run::{Record, resume, run};
+    #[pymodule_export]
+    use crate::sensitivity::{pullback, sensitivity, value_and_gradient};
     #[pymodule_export]
     use crate::sparse::{run_bodies, run_lattice};
     #[pymodule_export]

@@ -1,7 +1,9 @@
 //! Errors of a request.
 
 use contact_geom::GeometryError;
-use discrete_herglotz::{CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError};
+use discrete_herglotz::{
+    CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError, sensitivity::SensitivityError,
+};
 use formula_lagrangian::FormulaError;
 use sparse_herglotz::SparseError;
 use thiserror::Error;
@@ -87,6 +89,22 @@ pub enum RuntimeError {
     /// A system of many coordinates, or its integrator.
     #[error(transparent)]
     Assembly(#[from] SparseError),
+    /// A motion that cannot be differentiated.
+    #[error("{}", crate::runtime::sensitivity::in_words(.0))]
+    Sensitivity(SensitivityError),
+    /// A name that is not that of a variable with respect to which a motion can be differentiated.
+    #[error("there is no variable `{name}`{}", match nearest {
+        Some(nearest) => format!("; did you mean `{nearest}`?"),
+        None => format!("; the variables are {known}"),
+    })]
+    UnknownVariable {
+        /// The name.
+        name: String,
+        /// The nearest name of a variable, if it is close enough to be intended.
+        nearest: Option<String>,
+        /// The names of all variables.
+        known: String,
+    },
     /// The formula of a part of a system.
     #[error("`{part}`: {error}")]
     Part {
@@ -113,6 +131,16 @@ pub enum RuntimeError {
         /// All known names.
         known: String,
     },
+}
+
+/// Invalid input is the same error as for a run.
+impl From<SensitivityError> for RuntimeError {
+    fn from(error: SensitivityError) -> Self {
+        match error {
+            SensitivityError::Input(error) => RuntimeError::Input(error),
+            error => RuntimeError::Sensitivity(error),
+        }
+    }
 }
 
 impl RuntimeError {

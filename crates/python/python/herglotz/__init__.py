@@ -35,6 +35,7 @@ _LATER = {
     "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_path": "Path path",
+    "_sensitivity": "Gradient Sensitivity value_and_grad",
     "_checks": "Check Comparison Contact Geometry check compare geometry is_contact",
 }
 _LATER = {name: module for module, names in _LATER.items() for name in names.split()}
@@ -73,6 +74,7 @@ __all__ = [
     "Event",
     "Exponential",
     "Geometry",
+    "Gradient",
     "Interrupted",
     "MemberCrossings",
     "MemberResets",
@@ -80,6 +82,7 @@ __all__ = [
     "Plan",
     "Resets",
     "Retraction",
+    "Sensitivity",
     "Solution",
     "States",
     "System",
@@ -101,5 +104,6 @@ __all__ = [
     "solve",
     "system",
     "table",
+    "value_and_grad",
     "where",
 ]

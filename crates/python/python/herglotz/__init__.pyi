@@ -166,9 +166,34 @@ class Solution:
     def __getitem__(self, name: str) -> Vector: ...
     def __call__(self, t: ArrayLike) -> States: ...
     def resume(self, t: ArrayLike | None = None) -> Solution: ...
+    def sensitivity(self, variables: str | Sequence[str]) -> Sensitivity: ...
+    def pullback(
+        self,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        p: ArrayLike | None = None,
+        z: ArrayLike | None = None,
+    ) -> Gradient: ...
     def to_xarray(self) -> Any: ...
     def to_pandas(self) -> Any: ...
     def plot(self, *names: str, ax: Any = None) -> Any: ...
+
+class Sensitivity(NamedTuple):
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    growth: float
+
+class Gradient(NamedTuple):
+    q0: Vector
+    v0: Vector | None
+    p0: Vector | None
+    z0: float
+    parameters: dict[str, float]
+    t0: float
+    t_end: float
+    growth: float
 
 class Path:
     system: System
@@ -403,6 +428,7 @@ def geometry(
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Geometry: ...
+def value_and_grad(loss: Expression) -> Callable[..., tuple[float, Gradient]]: ...
 def path(
     L: Lagrangian,
     q0: ArrayLike,

@@ -210,6 +210,48 @@ class Solution:
         request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales
         return run(self.system, request, self._event_names, self._observed)
 
+    def sensitivity(self, variables):
+        """The derivatives of the rows with respect to variables, forward, by the tangents of the steps.
+
+        They are those of the discrete motion, to round-off: of the steps that were given, or chosen for the accuracy,
+        whose number is fixed. The motion is run once more. It must be one by a Gauss method, without kinks, jumps and
+        resets along it.
+
+        Parameters
+        ----------
+        variables : str or list of str
+            The names of m variables: parameters, coordinates ``"x"``, velocities ``"x'"`` or, where the start was given
+            by `p0`, momenta ``"p_x"``, the action ``"z"``, the initial time ``"t0"`` for a fixed final time, and the
+            final time ``"t_end"``. The coordinates and velocities of a function are ``"q[0]"`` and ``"v[0]"``.
+
+        Returns
+        -------
+        Sensitivity
+            q, v, p, z: of shapes (k, n) and (k,) for one name, (k, n, m) and (k, m) for a list.
+        """
+        from ._sensitivity import sensitivity
+
+        return sensitivity(self, variables)
+
+    def pullback(self, q=None, v=None, p=None, z=None):
+        """The gradient of a number with these partial derivatives in the rows, by the adjoint of the steps.
+
+        The cost is a few runs for any number of variables; otherwise as `sensitivity`.
+
+        Parameters
+        ----------
+        q, v, p : arrays of shape (k, n), or (n,) for the last row only
+            The partial derivatives in position, velocity and momentum; those in v and p are added.
+        z : array of shape (k,), or a number for the last row only
+
+        Returns
+        -------
+        Gradient
+        """
+        from ._sensitivity import pullback
+
+        return pullback(self, q, v, p, z)
+
     @property
     def momenta(self):
         """The momenta of the recognised symmetries, by name: arrays of shape (k,).

@@ -89,6 +89,34 @@ def solve(
     Interrupted
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
+    return run(*request_of(**locals()))
+
+
+def request_of(
+    L,
+    q0,
+    v0,
+    t,
+    p0,
+    z0,
+    accuracy,
+    integrator,
+    step,
+    steps,
+    every,
+    events,
+    observe,
+    conformal_factor,
+    estimate,
+    scales,
+    coordinates,
+    parameters,
+    force,
+    rayleigh,
+    tables,
+    breaks,
+):
+    """The system and the request for the arguments of `solve`, with the names of the events and of the columns."""
     given = (L, *functions_of(force, rayleigh))
     more = force, rayleigh, tables, breaks
     if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in more):
@@ -117,7 +145,7 @@ def solve(
     if parameters:
         check_parameters(L, parameters, given, [*texts_of_events(given_events), *columns])
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
-    return run(L, request, event_names, tuple(observe) if observe else ())
+    return L, request, event_names, tuple(observe) if observe else ()
 
 
 def run(L, request, event_names, observed, halted=None):

@@ -7,15 +7,17 @@ mod observed;
 pub(crate) mod path;
 mod recorder;
 mod run;
+mod sensitivity;
 mod sized;
 mod theorems;
 mod work_thread;
 
 use crate::runtime::{
-    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start,
+    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Loss, LossGradient, Motion, Outcome, Plan, RunMonitor,
+    RuntimeError, Sensitivity, Start,
 };
 use contact_geom::{Lagrangian, Structure, Symmetry};
-use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
 use formula_lagrangian::{Formula, FormulaError};
 use sized::Sized;
 use std::sync::Arc;
@@ -42,6 +44,20 @@ pub(crate) trait Kernel: Send + Sync {
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]);
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError>;
+    fn sensitivity(
+        &self,
+        motion: &Motion,
+        variables: &[Variable],
+        times: &[f64],
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError>;
+    fn gradient(
+        &self,
+        motion: &Motion,
+        times: &[f64],
+        loss: &mut Loss<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError>;
 }
 
 /// The kernel of a formula.
@@ -128,5 +144,24 @@ impl<const N: usize> Kernel for Sized<N> {
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
         on_large_stack(|| check::check(self, motion, samples))
+    }
+    fn sensitivity(
+        &self,
+        motion: &Motion,
+        variables: &[Variable],
+        times: &[f64],
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        sensitivity::tangent(self, motion, variables, times, monitor)
+    }
+
+    fn gradient(
+        &self,
+        motion: &Motion,
+        times: &[f64],
+        loss: &mut Loss<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        sensitivity::gradient(self, motion, times, loss, monitor)
     }
 }

@@ -12,7 +12,7 @@ use formula_lagrangian::FormulaLagrangian;
 ///
 /// # Errors
 /// [`RuntimeError::Length`] where the number of scales is not the number of coordinates.
-fn of<'p, 'o, const N: usize>(
+pub(super) fn of<'p, 'o, const N: usize>(
     system: &Sized<N>,
     problem: &'p Problem<'p, FormulaLagrangian<N>, N>,
     motion: &Motion,

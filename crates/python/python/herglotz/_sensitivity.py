@@ -1,0 +1,145 @@
+"""Derivatives of motions: forward, and by the adjoint."""
+
+import inspect
+from typing import NamedTuple
+
+import numpy as np
+
+from . import _core
+from ._solve import request_of, solve
+
+
+class Sensitivity(NamedTuple):
+    """The derivatives of the k rows of a motion with respect to a variable, or to m of them; see `Solution.sensitivity`.
+
+    The times of the rows are fixed, except that of the final time where it is the variable. Round-off of the derivatives
+    is amplified by `growth`, the largest derivative along the motion divided by the largest one at its end, at least one.
+    """
+
+    q: np.ndarray  # (k, n) or (k, n, m)
+    v: np.ndarray  # (k, n) or (k, n, m)
+    p: np.ndarray  # (k, n) or (k, n, m)
+    z: np.ndarray  # (k,) or (k, m)
+    growth: float
+
+
+class Gradient(NamedTuple):
+    """The gradient of a number that depends on a motion; see `Solution.pullback` and `value_and_grad`.
+
+    It is the derivative with respect to `v0` where the start was given by its velocity, then `p0` is None, and with
+    respect to `p0` where it was given by its momentum. In `t0` the final time is fixed, and in both times the number of
+    steps. Round-off is amplified by `growth`, the largest derivative along the motion divided by that at its start, at
+    least one.
+    """
+
+    q0: np.ndarray  # (n,)
+    v0: np.ndarray | None  # (n,)
+    p0: np.ndarray | None  # (n,)
+    z0: float
+    parameters: dict
+    t0: float
+    t_end: float
+    growth: float
+
+
+def sensitivity(sol, variables):
+    """See `Solution.sensitivity`."""
+    is_one = isinstance(variables, str)
+    names = [variables] if is_one else list(variables)
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError(f"`variables` is {variables!r}; it must be a name, such as \"gamma\", or a list of names")
+    _check(sol)
+    (q, v, p), z, growth = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, sol.t.tolist())
+    shape = len(sol.t), len(names), sol.system.dimension
+    q, v, p = (x.reshape(shape).transpose(0, 2, 1) for x in (q, v, p))
+    z = z.reshape(shape[:2])
+    if is_one:
+        q, v, p, z = q[:, :, 0], v[:, :, 0], p[:, :, 0], z[:, 0]
+    return Sensitivity(q, v, p, z, growth)
+
+
+def pullback(sol, q=None, v=None, p=None, z=None):
+    """See `Solution.pullback`."""
+    k, n = len(sol.t), sol.system.dimension
+
+    def rows(name, x, whole):
+        found = np.zeros(whole)
+        if x is None:
+            return found.ravel().tolist()
+        given = np.asarray(x, dtype=float)
+        if given.shape == whole[1:]:
+            found[-1] = given
+        elif given.shape == whole:
+            found[:] = given
+        else:
+            raise ValueError(
+                f"`{name}` has the shape {given.shape}; it must be {whole}, that of the rows, or {whole[1:]} for the last row"
+            )
+        if not np.isfinite(found).all():
+            raise ValueError(f"`{name}` is not finite; give finite partial derivatives")
+        return found.ravel().tolist()
+
+    _check(sol)
+    parts = [rows(name, x, (k, n)) for name, x in (("q", q), ("v", v), ("p", p))]
+    motion = _core.Motion(sol.system, *sol._request)
+    return _gradient(sol.system, sol._request, _core.pullback(motion, sol.t.tolist(), parts, rows("z", z, (k,))))
+
+
+def value_and_grad(loss):
+    """A function that runs a motion, and returns the value of a loss of its final state with the gradient.
+
+    The gradient is computed by the adjoint of the steps that were taken: it is that of the discrete motion, to round-off,
+    at the cost of a few runs for any number of variables. A loss of several rows, or one that is not written as an
+    expression, is differentiated with `Solution.pullback`.
+
+    Parameters
+    ----------
+    loss : str or function
+        An expression of the final state, as in the argument `observe` of `solve`: a formula, or a function ``(t, q, v, z,
+        **parameters)`` that is called once with tracers. It may depend on the parameters explicitly.
+
+    Returns
+    -------
+    function
+        It takes the arguments of `solve` and returns the value, a float, and a `Gradient`.
+
+    Raises
+    ------
+    ValueError
+        By the function: for an invalid argument, an integrator whose tangent is not implemented, and a motion that is
+        not completed, with its status.
+
+    Examples
+    --------
+    >>> import herglotz as hz
+    >>> miss = hz.value_and_grad(lambda t, q, v, z, target: (q[0] - target) ** 2)
+    >>> value, gradient = miss("pendulum", [1.0], [0.0], 10.0, parameters={"gamma": -0.1, "target": 0.5})
+    >>> sorted(gradient.parameters)
+    ['gamma', 'target']
+    """
+
+    def run(*arguments, **named):
+        given = _SIGNATURE.bind(*arguments, **named)
+        given.apply_defaults()
+        # As a column it is traced, and its parameters and tables are found.
+        of, request, *_ = request_of(**given.arguments | {"observe": {"loss": loss}, "events": ()})
+        (text,) = request[5]
+        value, slopes = _core.value_and_gradient(_core.Motion(of, *request[:5], [], *request[6:]), text)
+        return value, _gradient(of, request, slopes)
+
+    return run
+
+
+_SIGNATURE = inspect.signature(solve)
+
+
+def _gradient(system, request, slopes):
+    q0, velocity, z0, parameters, t0, t_end, growth = slopes
+    is_momentum = request[0][2]
+    v0, p0 = (None, velocity) if is_momentum else (velocity, None)
+    return Gradient(q0, v0, p0, z0, dict(zip(system.parameters, parameters)), t0, t_end, growth)
+
+
+def _check(sol):
+    if not sol.success:
+        raise ValueError(f"the motion has no derivatives, since it was not completed: {sol.status}")

@@ -1,0 +1,105 @@
+//! Derivatives of motions: forward, and by the adjoint.
+
+use crate::arrays::{matrix, value_error, vector};
+use crate::motion::{Motion, named};
+use crate::signals::Signals;
+use herglotz::runtime::{LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use std::ops::ControlFlow;
+
+/// Ends a run at a signal.
+struct SignalMonitor(Signals);
+
+impl RunMonitor for SignalMonitor {
+    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
+        self.0.check()
+    }
+}
+
+/// Performs a computation with the interpreter lock released. An exception of a signal handler is raised.
+fn detached<T: Send>(
+    py: Python<'_>,
+    motion: &Motion,
+    work: impl FnOnce(&mut SignalMonitor) -> Result<T, RuntimeError> + Send,
+) -> PyResult<T> {
+    let mut monitor = SignalMonitor(motion.signals.clone());
+    let found = py.detach(|| work(&mut monitor));
+    match motion.signals.take() {
+        Some(raised) => Err(raised),
+        None => found.map_err(value_error),
+    }
+}
+
+fn not_completed(status: &Status) -> PyErr {
+    value_error(format!("the motion has no derivatives, since it was not completed: {status}"))
+}
+
+/// The derivatives of q, v and p, each with a row for each time and one variable after the other; those of z; and the
+/// growth.
+type Rows = ([Py<PyArray2<f64>>; 3], Py<PyArray2<f64>>, f64);
+
+/// The derivatives of a motion at some times with respect to variables.
+#[pyfunction]
+pub fn sensitivity(py: Python<'_>, motion: &Motion, variables: Vec<String>, times: Vec<f64>) -> PyResult<Rows> {
+    let names: Vec<&str> = variables.iter().map(String::as_str).collect();
+    let found = detached(py, motion, |monitor| motion.system.sensitivity(&motion.motion, &names, &times, monitor))?;
+    if found.status != Status::Completed {
+        return Err(not_completed(&found.status));
+    }
+    let width = motion.system.dimension() * names.len();
+    let all = |of: fn(&MotionState) -> &[f64]| {
+        let numbers = found.rows.iter().flatten().flat_map(|state| of(state).iter().copied()).collect();
+        matrix(py, numbers, width)
+    };
+    let parts = [all(|state| &state.q)?, all(|state| &state.v)?, all(|state| &state.p)?];
+    let z = found.rows.iter().flatten().map(|state| state.z).collect();
+    Ok((parts, matrix(py, z, names.len())?, found.growth))
+}
+
+/// A gradient: in q0, in v0 or p0, in z0, in the parameters, in t0 and in the final time; and the growth.
+type Slopes = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, f64, Vec<f64>, f64, f64, f64);
+
+/// The value and the gradient of a completed motion.
+fn slopes(py: Python<'_>, found: LossGradient) -> PyResult<(f64, Slopes)> {
+    let Some((value, gradient)) = found.loss else { return Err(not_completed(&found.status)) };
+    let (q, velocity) = (vector(py, gradient.q), vector(py, gradient.velocity));
+    Ok((value, (q, velocity, gradient.z, gradient.parameters, gradient.t0, gradient.t_end, gradient.growth)))
+}
+
+/// The gradient of a number with given partial derivatives in q, v, p and z at some times, row by row.
+#[pyfunction]
+pub fn pullback(
+    py: Python<'_>,
+    motion: &Motion,
+    times: Vec<f64>,
+    parts: [Vec<f64>; 3],
+    z: Vec<f64>,
+) -> PyResult<Slopes> {
+    let [q, v, p] = parts;
+    let n = motion.system.dimension();
+    let covector = |(i, z): (usize, &f64)| {
+        let row = |x: &[f64]| x.get(i * n..(i + 1) * n).map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
+        StateCovector { t: 0.0, q: row(&q), v: row(&v), p: row(&p), z: *z }
+    };
+    let covectors: Vec<StateCovector> = z.iter().enumerate().map(covector).collect();
+    let found = detached(py, motion, |monitor| {
+        motion.system.gradient(&motion.motion, &times, &mut |_| (0.0, covectors.clone()), monitor)
+    })?;
+    Ok(slopes(py, found)?.1)
+}
+
+/// The value and the gradient of an expression of the final state.
+#[pyfunction]
+pub fn value_and_gradient(py: Python<'_>, motion: &Motion, loss: &str) -> PyResult<(f64, Slopes)> {
+    let expression = motion.system.formula().named_expression(loss).map_err(Into::into);
+    let expression = named("the loss", loss, expression)?;
+    if expression.has_conformal_factor() {
+        return Err(value_error(format!(
+            "the loss {loss:?} contains `sigma` or `log_factor`, which are not functions of the final state; write it in \
+             terms of the state"
+        )));
+    }
+    let found = detached(py, motion, |monitor| motion.system.end_gradient(&motion.motion, &expression, monitor))?;
+    slopes(py, found)
+}

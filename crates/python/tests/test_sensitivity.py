@@ -1,0 +1,217 @@
+"""Derivatives of motions: forward and by the adjoint."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import herglotz as hz
+import numpy as np
+import pytest
+
+L = "x'^2/2 - 1 + cos(x) + gamma*z"
+GIVEN = dict(coordinates=["x"], parameters={"gamma": -0.01}, integrator="gauss_8", steps=400)
+
+# The final state at T = 100 from (1, 1, 0), and its derivatives in q0, v0 and gamma, by a Taylor method with 40 digits.
+END = (-0.591939247134, -0.633067337150, -1.747387946531)
+IN_START = (5.65210486970, -5.53295490161, -3.94604242032)
+IN_VELOCITY = (7.38154595869, -7.16085111397, -4.67301564412)
+IN_GAMMA = (225.145071391822, -255.642934500038, -265.676953215921)
+
+
+def pendulum(t=100.0, **change):
+    return hz.solve(L, [1.0], [1.0], t, **GIVEN | change)
+
+
+def close(found, expected, tolerance=1e-11):
+    assert np.abs(np.asarray(found) - expected).max() <= tolerance * np.abs(expected).max(), (found, expected)
+
+
+def end(s):
+    return np.array([s.q[-1].ravel(), s.v[-1].ravel(), np.ravel(s.z[-1])])
+
+
+def test_the_pendulum_of_reference():
+    sol = pendulum()
+    close(end(sol)[:, 0], END)
+    found = sol.sensitivity(["x", "x'", "gamma"])
+    assert found.q.shape == (2, 1, 3) and found.z.shape == (2, 3) and found.growth >= 1
+    for k, expected in enumerate((IN_START, IN_VELOCITY, IN_GAMMA)):
+        close(end(found)[:, k], expected)
+    one = sol.sensitivity("gamma")
+    assert one.q.shape == (2, 1) and one.z.shape == (2,)
+    close(end(one)[:, 0], IN_GAMMA)
+
+
+def test_the_adjoint_is_the_transpose():
+    sol = pendulum()
+    for row, (q, v, z) in enumerate([([1.0], None, None), (None, [1.0], None), (None, None, 1.0)]):
+        slopes = sol.pullback(q=q, v=v, z=z)
+        found = [slopes.q0[0], slopes.v0[0], slopes.parameters["gamma"]]
+        close(found, [of[row] for of in (IN_START, IN_VELOCITY, IN_GAMMA)])
+        assert slopes.p0 is None and slopes.growth >= 1
+
+
+def test_an_accuracy_chooses_the_steps():
+    sol = pendulum(accuracy=1e-12, integrator=None, steps=None)
+    close(end(sol.sensitivity("gamma"))[:, 0], IN_GAMMA, 1e-9)
+
+
+def test_rows_have_derivatives():
+    times = np.linspace(0, 10, 7)
+    sol = pendulum(times, steps=40)
+    found = sol.sensitivity(["x", "z", "gamma"])
+    close(found.q[0], [[1.0, 0.0, 0.0]])
+    h = 1e-5
+    near = [pendulum(times, steps=40, parameters={"gamma": -0.01 + s * h}) for s in (1, -1)]
+    for name in "qvpz":
+        difference = (getattr(near[0], name) - getattr(near[1], name)) / (2 * h)
+        close(getattr(found, name)[..., 2], difference, 1e-7)
+    # The adjoint of all rows.
+    weights = np.cos(np.arange(7.0))
+    slopes = sol.pullback(q=weights[:, None], p=np.ones((7, 1)), z=weights**2)
+    for k, slope in enumerate((slopes.q0[0], slopes.z0, slopes.parameters["gamma"])):
+        expected = weights @ found.q[:, 0, k] + found.p[:, 0, k].sum() + weights**2 @ found.z[:, k]
+        assert abs(slope - expected) <= 1e-11 * np.abs(expected)
+
+
+def test_derivatives_in_the_times():
+    sol = pendulum(10.0, steps=40)
+    found = sol.sensitivity(["t0", "t_end"])
+    # L does not depend on t.
+    close(found.q[-1, 0], sol.v[-1, 0] * np.array([-1.0, 1.0]), 1e-9)
+    slopes = sol.pullback(q=[1.0])
+    close([slopes.t0, slopes.t_end], found.q[-1, 0], 1e-11)
+
+
+def test_a_start_with_a_momentum():
+    given = GIVEN | dict(steps=40, parameters={"gamma": -0.01})
+    sol = hz.solve("x'^2 - 1 + cos(x) + gamma*z", [1.0], t=10.0, p0=[2.0], **given)
+    found = sol.sensitivity("p_x")
+    slopes = sol.pullback(p=[1.0])
+    assert slopes.v0 is None
+    close(slopes.p0, found.p[-1])
+    with pytest.raises(ValueError, match="given by its momentum"):
+        sol.sensitivity("x'")
+
+
+def test_losses():
+    loss = hz.value_and_grad(lambda t, q, v, z, target: (q[0] - target) ** 2 + z * v[0])
+    given = GIVEN | dict(parameters={"gamma": -0.01, "target": 0.5}, steps=40)
+    value, slopes = loss(L, [1.0], [1.0], 10.0, **given)
+    sol = pendulum(10.0, steps=40)
+    q, v, z = sol.q[-1, 0], sol.v[-1, 0], sol.z[-1]
+    close([value], [(q - 0.5) ** 2 + z * v])
+    expected = sol.pullback(q=[2 * (q - 0.5)], v=[z], z=v)
+    close([slopes.q0[0], slopes.v0[0], slopes.z0], [expected.q0[0], expected.v0[0], expected.z0])
+    close([slopes.parameters["gamma"]], [expected.parameters["gamma"]])
+    close([slopes.parameters["target"]], [-2 * (q - 0.5)])
+    # The energy depends on gamma explicitly too.
+    value, slopes = hz.value_and_grad("energy")(L, [1.0], [1.0], 10.0, **GIVEN | dict(steps=40))
+    near = [pendulum(10.0, steps=40, parameters={"gamma": -0.01 + s * 1e-5}).energy[-1] for s in (1, -1)]
+    close([slopes.parameters["gamma"]], [(near[0] - near[1]) / 2e-5], 1e-7)
+
+
+def test_forces_and_tables_have_parameters():
+    table = hz.table([0.0, 4.0, 10.0], [0.0, 1.0, 0.5])
+    given = dict(parameters={"c": 0.2, "a": 0.7}, force={"x": "-c*x' + a*cos(2*t)"}, rayleigh="c*a*x'^2/2", coordinates=["x"])
+    given |= dict(integrator="gauss_6", steps=40)
+    sol = hz.solve("x'^2/2 - x^2/2", [1.0], [0.0], 5.0, **given)
+    found = sol.sensitivity(["c", "a"])
+    for k, name in enumerate(("c", "a")):
+        change = [given["parameters"] | {name: given["parameters"][name] + s * 1e-5} for s in (1, -1)]
+        near = [hz.solve("x'^2/2 - x^2/2", [1.0], [0.0], 5.0, **given | dict(parameters=p)).q[-1, 0] for p in change]
+        close([found.q[-1, 0, k]], [(near[0] - near[1]) / 2e-5], 1e-7)
+    assert table.name  # Tables have kinks, and motions through kinks have no derivatives.
+
+
+@pytest.mark.parametrize("integrator", ["gauss_4", "gauss_12"])
+def test_scipy_takes_the_jacobians(integrator):
+    optimize = pytest.importorskip("scipy.optimize")
+    times, truth = np.linspace(0, 8, 25), (-0.2, 1.3)
+
+    def run(x):
+        parameters = {"gamma": x[0], "k": x[1]}
+        return hz.solve(
+            "x'^2/2 - k*x^2/2 + gamma*z", [1.0], [0.0], times, coordinates=["x"], parameters=parameters,
+            integrator=integrator, step=0.25,
+        )
+
+    data = run(truth).q[:, 0]
+    fit = optimize.least_squares(
+        lambda x: run(x).q[:, 0] - data, [-0.1, 1.0], jac=lambda x: run(x).sensitivity(["gamma", "k"]).q[:, 0, :], xtol=1e-14
+    )
+    close(fit.x, truth, 1e-9)
+    loss = hz.value_and_grad("(x - 0.25)^2 + x'^2")
+
+    def of(x):
+        parameters = {"gamma": x[0], "k": x[1]}
+        value, slopes = loss("x'^2/2 - k*x^2/2 + gamma*z", [1.0], [0.0], 8.0, coordinates=["x"], parameters=parameters)
+        return value, np.array([*slopes.parameters.values()])
+
+    found = optimize.minimize(of, truth, jac=True)
+    assert found.fun < 1e-6
+
+
+def test_the_section_of_the_documentation():
+    pytest.importorskip("scipy.optimize")
+    text = Path(__file__).parents[3].joinpath("docs", "python.md").read_text()
+    section = text.split("## Derivatives of motions")[1].split("\n## ")[0]
+    names = {"np": np, "hz": hz}
+    for code in re.findall(r"```python\n(.*?)```", section, re.S):
+        if "herglotz.jax" in code:
+            pytest.importorskip("jax")
+        exec(code, names)
+    close(names["sol"].sensitivity("gamma").q[-1], [225.1450713918], 1e-11)
+    close(names["fit"].x, (-0.2, 1.7), 1e-7)
+
+
+@pytest.mark.parametrize("package", ["jax", "torch"])
+def test_a_package_that_is_missing(package):
+    code = f"import sys; sys.modules[{package!r}] = None; import herglotz.{package}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert f"herglotz.{package} needs the package `{package}`; install it with `pip install {package}`" in done.stderr
+
+
+SAID = {
+    "an unknown parameter": (lambda: pendulum(1.0).sensitivity("gama"), "no variable `gama`; did you mean `gamma`"),
+    "an unknown name": (lambda: pendulum(1.0).sensitivity("omega"), "no variable `omega`; .*x, x', gamma, z, t0, t_end"),
+    "a number as name": (lambda: pendulum(1.0).sensitivity([1]), "`variables` is .*must be a name"),
+    "an integrator without tangent": (
+        lambda: pendulum(1.0, integrator="strang").sensitivity("gamma"),
+        "not implemented; choose a Gauss method such as \"gauss_8\"",
+    ),
+    "a kink": (
+        lambda: hz.solve("x'^2/2 - abs(x)", [1.0], [0.0], 5.0, coordinates=["x"]).sensitivity("x"),
+        "not implemented; choose",
+    ),
+    "a terminal event": (
+        lambda: pendulum(10.0, events=hz.Event("x", terminal=True)).sensitivity("gamma"),
+        "terminal event.*fixed time",
+    ),
+    "a motion that fails": (
+        lambda: hz.solve("x'^2/2 + 1/x", [1.0], [0.0], 5.0, coordinates=["x"], integrator="gauss_4", steps=50).pullback(q=[1.0]),
+        "no derivatives, since it was not completed: ",
+    ),
+    "another shape": (lambda: pendulum(1.0).pullback(q=[1.0, 2.0]), r"`q` has the shape \(2,\); it must be \(2, 1\)"),
+    "something infinite": (lambda: pendulum(1.0).pullback(q=[np.inf]), "`q` is not finite"),
+    "a loss that is not a number": (
+        lambda: hz.value_and_grad("sqrt(x - 100)")(L, [1.0], [1.0], 1.0, **GIVEN),
+        "the loss is NaN",
+    ),
+    "a loss of the conformal factor": (
+        lambda: hz.value_and_grad("x*sigma")(L, [1.0], [1.0], 1.0, **GIVEN),
+        "not functions of the final state",
+    ),
+    "a loss with an unknown name": (
+        lambda: hz.value_and_grad("x - y")(L, [1.0], [1.0], 1.0, **GIVEN),
+        "the loss \"x - y\": .*unknown name `y`",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SAID)
+def test_invalid_input(what):
+    call, message = SAID[what]
+    with pytest.raises(ValueError, match=f"(?s){message}"):
+        call()
