@@ -44,11 +44,12 @@ pub mod hamiltonian {
 
 /// Vector spaces of dual parts, and maxima that propagate NaN.
 pub mod numbers {
-    pub use crate::number::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan};
+    pub use crate::number::{AugmentedVector, Coefficient, MaxAbsOrNan, ScalarOver, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan};
 }
 
 /// Tools for the other crates of this project: derivatives by dual numbers, seeds, small linear systems, rounding.
 pub mod support {
+    pub use crate::dynamics::nearest_name::nearest_name;
     pub use crate::dynamics::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates};
     pub use crate::forms::{conformality_with_jacobian, generic, seed};
     pub use crate::number::{KernelDual, legendre_polynomials, linear};
@@ -67,7 +68,7 @@ pub mod switching {
 pub use dynamics::{
     Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints, Lagrangian,
     Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
-    TimeTransformation, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
+    Parametric, ParametricForce, TimeTransformation, UnknownParameter, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
     legendre_jacobian, regularity,
 };
 pub use error::GeometryError;

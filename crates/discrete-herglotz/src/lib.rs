@@ -36,6 +36,7 @@ mod numbers;
 mod resolution;
 pub mod rules;
 mod run;
+pub mod sensitivity;
 pub mod solve;
 pub mod splitting;
 mod status;

@@ -2,7 +2,7 @@
 
 use crate::functions::{FUNCTIONS, OPERATIONS};
 use crate::tables::NamedTable;
-use crate::{FormulaError, MOST_COORDINATES};
+use crate::{FormulaError, MOST_COORDINATES, nearest_name};
 
 /// The names with a fixed meaning.
 const RESERVED: [&str; 6] = ["t", "z", "sum", "if", "asin", "acos"];
@@ -97,19 +97,6 @@ impl Names {
     }
 }
 
-/// The name that is nearest to a given one, if it is close enough to be intended: at most three characters differ, and
-/// at most a third of them.
-///
-/// ```
-/// assert_eq!(formula_lagrangian::nearest_name("keplr", ["pendulum", "kepler"]), Some("kepler"));
-/// assert_eq!(formula_lagrangian::nearest_name("lattice", ["pendulum", "kepler"]), None);
-/// ```
-pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let near = known.into_iter().map(|other| (distance(name, other), other)).min_by_key(|(distance, _)| *distance);
-    let limit = name.chars().count().div_ceil(3).min(3);
-    near.filter(|(distance, _)| *distance <= limit).map(|(_, other)| other)
-}
-
 /// Whether a name has a fixed meaning everywhere.
 pub(crate) fn is_reserved(name: &str) -> bool {
     RESERVED.contains(&name) || FUNCTIONS.iter().any(|f| f.0 == name) || OPERATIONS.iter().any(|o| o.0 == name)
@@ -117,28 +104,4 @@ pub(crate) fn is_reserved(name: &str) -> bool {
 
 fn bad(name: &str, why: &'static str) -> FormulaError {
     FormulaError::Name { name: name.to_owned(), why }
-}
-
-/// The number of characters to change, insert or delete, or of neighbouring characters to exchange (Damerau-Levenshtein
-/// distance), for the first characters of long names. Case is ignored.
-fn distance(a: &str, b: &str) -> usize {
-    // The time grows with the product of the lengths.
-    const MAX_COMPARED_CHARACTERS: usize = 40;
-    let letters = |s: &str| s.chars().take(MAX_COMPARED_CHARACTERS).flat_map(char::to_lowercase).collect::<Vec<_>>();
-    let (x, y) = (letters(a), letters(b));
-    let mut rows: Vec<Vec<usize>> = vec![(0..=y.len()).collect()];
-    for i in 1..=x.len() {
-        let mut row = vec![i];
-        for j in 1..=y.len() {
-            let above = &rows[i - 1];
-            let mut least = (above[j] + 1).min(row[j - 1] + 1).min(above[j - 1] + usize::from(x[i - 1] != y[j - 1]));
-            if i > 1 && j > 1 && x[i - 1] == y[j - 2] && x[i - 2] == y[j - 1] {
-                least = least.min(rows[i - 2][j - 2] + 1);
-            }
-            row.push(least);
-        }
-        rows.push(row);
-    }
-    // Names that differ only in case have distance 0.
-    rows.last().and_then(|row| row.last().copied()).unwrap_or(usize::MAX)
 }

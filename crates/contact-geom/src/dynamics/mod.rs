@@ -11,6 +11,8 @@ mod hamiltonian;
 mod herglotz;
 mod impact;
 mod lagrangian;
+pub(crate) mod nearest_name;
+mod parameters;
 pub(crate) mod probe;
 mod rounding;
 mod structure;
@@ -33,6 +35,8 @@ pub use herglotz::{
 };
 pub use impact::{Impact, Impacts, Surface};
 pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
+pub use parameters::{Parametric, ParametricForce, UnknownParameter};
+pub(crate) use parameters::{indexed_names, parametric_fields};
 pub use probe::check_closed_derivatives;
 pub use rounding::gradient_rounding;
 pub use structure::{Defect, Defects, Structure};

@@ -1,5 +1,6 @@
 //! Numbers: scalars, dual numbers, small linear systems, and maxima that keep a NaN.
 
+mod coefficient;
 mod dual;
 mod legendre_polynomials;
 pub mod linear;
@@ -11,6 +12,7 @@ mod operators;
 pub(crate) mod rounded;
 mod scalar;
 
+pub use coefficient::{Coefficient, ScalarOver};
 pub use dual::{Dual, KernelDual};
 pub use legendre_polynomials::legendre_polynomials;
 pub use max_or_nan::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan, max_or_nan};

@@ -34,6 +34,25 @@ macro_rules! systems {
             }
         }
 
+        impl $crate::Parametric<$n> for $name {
+            fn parameter_names(&self) -> Vec<String> {
+                match self { $($name::$system(system) => system.parameter_names(),)* }
+            }
+            fn parameters(&self) -> Vec<f64> {
+                match self { $($name::$system(system) => system.parameters(),)* }
+            }
+            fn parameter_count(&self) -> usize {
+                match self { $($name::$system(system) => $crate::Parametric::<$n>::parameter_count(system),)* }
+            }
+            fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+                match self { $($name::$system(system) => system.with_parameters(theta).map(Self::from),)* }
+            }
+            #[inline]
+            fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, $n>, v: &SVector<T, $n>, z: T) -> T {
+                match self { $($name::$system(system) => system.value_at(theta, t, q, v, z),)* }
+            }
+        }
+
         impl System<$n> for $name {
             fn name(&self) -> &'static str {
                 match self { $($name::$system(system) => system.name(),)* }

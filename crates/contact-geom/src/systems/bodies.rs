@@ -1,6 +1,8 @@
 //! The gravitational N-body problem in space, with drag.
 
-use crate::{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint};
+use crate::dynamics::indexed_names;
+use crate::numbers::{Coefficient, ScalarOver};
+use crate::{ChartVector, Lagrangian, Parametric, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// Bodies in space with Newtonian gravitation between all pairs, and linear drag,
@@ -44,11 +46,33 @@ impl<const N: usize> Bodies<N> {
         &self.masses
     }
 
-    /// The vector from body i to body j, with the square of its length and `G m_i m_j`.
+    /// The vector from body i to body j, with the square of its length.
     #[inline(always)]
-    fn pair<T: Scalar>(&self, q: &SVector<T, N>, i: usize, j: usize) -> ([T; 3], T, f64) {
+    fn pair<T: Scalar>(q: &SVector<T, N>, i: usize, j: usize) -> ([T; 3], T) {
         let r = [q[3 * j] - q[3 * i], q[3 * j + 1] - q[3 * i + 1], q[3 * j + 2] - q[3 * i + 2]];
-        (r, r[0] * r[0] + r[1] * r[1] + r[2] * r[2], self.g * self.masses[3 * i] * self.masses[3 * j])
+        (r, r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
+    }
+
+    /// The Lagrangian, over the type of its parameters; `mass` is that of a body.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        mass: impl Fn(usize) -> C,
+        [g, gamma]: [C; 2],
+        q: &SVector<T, N>,
+        v: &SVector<T, N>,
+        z: T,
+    ) -> T {
+        let mut l = z * gamma;
+        for d in 0..N {
+            l += v[d] * v[d] * (mass(d / 3) * 0.5);
+        }
+        for j in 0..N / 3 {
+            for i in 0..j {
+                let (_, square) = Self::pair(q, i, j);
+                l += square.sqrt().recip() * (g * mass(i) * mass(j));
+            }
+        }
+        l
     }
 
     #[inline(always)]
@@ -56,7 +80,8 @@ impl<const N: usize> Bodies<N> {
         let mut force = SVector::from_fn(|_, _| T::zero());
         for j in 0..N / 3 {
             for i in 0..j {
-                let (r, square, strength) = self.pair(q, i, j);
+                let (r, square) = Self::pair(q, i, j);
+                let strength = self.g * self.masses[3 * i] * self.masses[3 * j];
                 let pull = (square * square.sqrt()).recip() * strength;
                 for d in 0..3 {
                     let along = r[d] * pull;
@@ -72,17 +97,7 @@ impl<const N: usize> Bodies<N> {
 impl<const N: usize> Lagrangian<N> for Bodies<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        let mut l = z * self.gamma;
-        for d in 0..N {
-            l += v[d] * v[d] * (0.5 * self.masses[d]);
-        }
-        for j in 0..N / 3 {
-            for i in 0..j {
-                let (_, square, strength) = self.pair(q, i, j);
-                l += square.sqrt().recip() * strength;
-            }
-        }
-        l
+        Self::formula(|body| self.masses[3 * body], [self.g, self.gamma], q, v, z)
     }
 
     #[inline(always)]
@@ -105,5 +120,26 @@ impl<const N: usize> Lagrangian<N> for Bodies<N> {
             constant_mass: true,
             ..Structure::default()
         }
+    }
+}
+
+/// `masses[i]` of the bodies, `g` and `gamma`.
+impl<const N: usize> Parametric<N> for Bodies<N> {
+    fn parameter_names(&self) -> Vec<String> {
+        indexed_names("masses", N / 3).chain(["g", "gamma"].map(String::from)).collect()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        self.masses.iter().step_by(3).copied().chain([self.g, self.gamma]).collect()
+    }
+    #[inline(always)]
+    fn parameter_count(&self) -> usize {
+        N / 3 + 2
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        (theta.len() == N / 3 + 2).then(|| Bodies::new(|body| theta[body], theta[N / 3], theta[N / 3 + 1]))
+    }
+    #[inline(always)]
+    fn value_at<T: Scalar>(&self, theta: &[T], _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        Self::formula(|body| theta[body], [theta[N / 3], theta[N / 3 + 1]], q, v, z)
     }
 }

@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// The boundary conditions of a [`Chain`].
@@ -45,10 +47,10 @@ impl<const N: usize> Chain<N> {
 
     /// The potential energy of the bonds.
     #[inline(always)]
-    fn potential<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+    fn potential<C: Coefficient, T: ScalarOver<C>>(&self, beta: C, q: &SVector<T, N>) -> T {
         let bond = |r: T| {
             let square = r * r;
-            square * (square * (self.beta * 0.25) + 0.5)
+            square * (square * (beta * 0.25) + 0.5)
         };
         let inner = (1..N).fold(T::zero(), |sum, i| sum + bond(q[i] - q[i - 1]));
         match self.ends {
@@ -56,12 +58,25 @@ impl<const N: usize> Chain<N> {
             _ => inner,
         }
     }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [beta, gamma]: [C; 2],
+        _t: T,
+        q: &SVector<T, N>,
+        v: &SVector<T, N>,
+        z: T,
+    ) -> T {
+        v.dot(v) * 0.5 - self.potential(beta, q) + z * gamma
+    }
 }
 
 impl<const N: usize> Lagrangian<N> for Chain<N> {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        v.dot(v) * 0.5 - self.potential(q) + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.formula([self.beta, self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -76,6 +91,8 @@ impl<const N: usize> Lagrangian<N> for Chain<N> {
         }
     }
 }
+
+parametric_fields!([const N: usize] Chain<N>, N, beta, gamma);
 
 impl<const N: usize> System<N> for Chain<N> {
     fn name(&self) -> &'static str {
@@ -103,7 +120,7 @@ impl<const N: usize> System<N> for Chain<N> {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<N, T>) -> Option<T> {
-        Some(x.p.dot(&x.p) * 0.5 + self.potential(&x.q) - x.z * self.gamma)
+        Some(x.p.dot(&x.p) * 0.5 + self.potential(self.beta, &x.q) - x.z * self.gamma)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<N>> {

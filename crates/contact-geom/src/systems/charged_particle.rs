@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// A charged particle in the plane, in a uniform magnetic field and a harmonic trap, with drag:
@@ -27,11 +29,26 @@ impl Default for ChargedParticle {
     }
 }
 
+impl ChargedParticle {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [b, k, gamma]: [C; 3],
+        _t: T,
+        q: &SVector<T, 2>,
+        v: &SVector<T, 2>,
+        z: T,
+    ) -> T {
+        let swept = q[0] * v[1] - q[1] * v[0];
+        v.dot(v) * 0.5 + swept * (b * 0.5) - q.dot(q) * (k * 0.5) + z * gamma
+    }
+}
+
 impl Lagrangian<2> for ChargedParticle {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let swept = q[0] * v[1] - q[1] * v[0];
-        v.dot(v) * 0.5 + swept * (self.b * 0.5) - q.dot(q) * (self.k * 0.5) + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        self.formula([self.b, self.k, self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -46,6 +63,8 @@ impl Lagrangian<2> for ChargedParticle {
         }
     }
 }
+
+parametric_fields!([] ChargedParticle, 2, b, k, gamma);
 
 impl System<2> for ChargedParticle {
     fn name(&self) -> &'static str {

@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// A pendulum whose inertia depends on its position and its action, and grows with its speed:
@@ -29,12 +31,27 @@ impl Default for CoupledInZ {
     }
 }
 
+impl CoupledInZ {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [a, b, gamma]: [C; 3],
+        _t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        let square = v[0] * v[0];
+        let inertia = q[0].cos() * z.cos() * a + 1.0;
+        square * (inertia * 0.5 + square * (b * 0.25)) - q[0].versine() + z * gamma
+    }
+}
+
 impl Lagrangian<1> for CoupledInZ {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        let square = v[0] * v[0];
-        let inertia = q[0].cos() * z.cos() * self.a + 1.0;
-        square * (inertia * 0.5 + square * (self.b * 0.25)) - q[0].versine() + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.a, self.b, self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -51,6 +68,8 @@ impl Lagrangian<1> for CoupledInZ {
         }
     }
 }
+
+parametric_fields!([] CoupledInZ, 1, a, b, gamma);
 
 impl System<1> for CoupledInZ {
     fn name(&self) -> &'static str {

@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// An anisotropic oscillator in the plane whose inertia depends on position and action, with a magnetic term that grows
@@ -30,19 +32,36 @@ impl Default for CoupledPlane {
     }
 }
 
+impl CoupledPlane {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [a, b, c]: [C; 3],
+        _t: T,
+        q: &SVector<T, 2>,
+        v: &SVector<T, 2>,
+        z: T,
+    ) -> T {
+        let (x, y) = (q[0], q[1]);
+        let kinetic = v[0] * v[0] * (x.cos() * a + 1.0) + v[1] * v[1] * (y.sin() * z.cos() * a + 1.0);
+        let magnetic = z * (x * v[1] - y * v[0]) * b;
+        kinetic * 0.5 + magnetic - (x * x * 0.5 + y * y) - x * x * y / 3.0 - z * z * (c * 0.5)
+    }
+}
+
 impl Lagrangian<2> for CoupledPlane {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let (x, y) = (q[0], q[1]);
-        let kinetic = v[0] * v[0] * (x.cos() * self.a + 1.0) + v[1] * v[1] * (y.sin() * z.cos() * self.a + 1.0);
-        let magnetic = z * (x * v[1] - y * v[0]) * self.b;
-        kinetic * 0.5 + magnetic - (x * x * 0.5 + y * y) - x * x * y / 3.0 - z * z * (0.5 * self.c)
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        self.formula([self.a, self.b, self.c], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
         Structure { autonomous: true, ..Structure::default() }
     }
 }
+
+parametric_fields!([] CoupledPlane, 2, a, b, c);
 
 impl System<2> for CoupledPlane {
     fn name(&self) -> &'static str {

@@ -1,7 +1,9 @@
 //! The damped double pendulum.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::indexed_names;
+use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, Parametric, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The planar double pendulum with linear drag,
@@ -29,30 +31,63 @@ impl Default for DoublePendulum {
 
 impl DoublePendulum {
     /// The constants of W: its two diagonal entries, and the factor of `cos(q1 - q2)` off the diagonal.
-    #[inline]
-    fn inertia(&self) -> (f64, f64, f64) {
-        let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
+    #[inline(always)]
+    fn inertia<C: Coefficient>([m1, m2]: [C; 2], [l1, l2]: [C; 2]) -> (C, C, C) {
         ((m1 + m2) * l1 * l1, m2 * l2 * l2, m2 * l1 * l2)
     }
 
     /// The potential energy, zero where both rods hang down.
     #[inline(always)]
-    fn potential<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
-        let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
+    fn potential<C: Coefficient, T: ScalarOver<C>>([m1, m2]: [C; 2], [l1, l2]: [C; 2], q: &SVector<T, 2>) -> T {
         q[0].versine() * ((m1 + m2) * l1) + q[1].versine() * (m2 * l2)
+    }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        masses: [C; 2],
+        lengths: [C; 2],
+        gamma: C,
+        q: &SVector<T, 2>,
+        v: &SVector<T, 2>,
+        z: T,
+    ) -> T {
+        let (upper, lower, mixed) = Self::inertia(masses, lengths);
+        let turning = v[0] * v[0] * (upper * 0.5) + v[1] * v[1] * (lower * 0.5);
+        turning + (q[0] - q[1]).cos() * v[0] * v[1] * mixed - Self::potential(masses, lengths, q) + z * gamma
     }
 }
 
 impl Lagrangian<2> for DoublePendulum {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let (upper, lower, mixed) = self.inertia();
-        let turning = v[0] * v[0] * (upper * 0.5) + v[1] * v[1] * (lower * 0.5);
-        turning + (q[0] - q[1]).cos() * v[0] * v[1] * mixed - self.potential(q) + z * self.gamma
+        Self::formula(self.masses, self.lengths, self.gamma, q, v, z)
     }
 
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_free: self.gamma == 0.0, z_affine: true, ..Structure::default() }
+    }
+}
+
+impl Parametric<2> for DoublePendulum {
+    fn parameter_names(&self) -> Vec<String> {
+        indexed_names("masses", 2).chain(indexed_names("lengths", 2)).chain(["gamma".to_owned()]).collect()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        self.masses.into_iter().chain(self.lengths).chain([self.gamma]).collect()
+    }
+    #[inline(always)]
+    fn parameter_count(&self) -> usize {
+        5
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        let [m1, m2, l1, l2, gamma] = *theta else { return None };
+        Some(DoublePendulum { masses: [m1, m2], lengths: [l1, l2], gamma })
+    }
+    #[inline(always)]
+    fn value_at<T: Scalar>(&self, theta: &[T], _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        let [m1, m2, l1, l2, gamma] = *theta else { return T::from(f64::NAN) };
+        Self::formula([m1, m2], [l1, l2], gamma, q, v, z)
     }
 }
 
@@ -72,11 +107,11 @@ impl System<2> for DoublePendulum {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<2, T>) -> Option<T> {
-        let ([m1, m2], (upper, lower, mixed)) = (self.masses, self.inertia());
+        let ([m1, m2], (upper, lower, mixed)) = (self.masses, Self::inertia(self.masses, self.lengths));
         let (sin, cos) = (x.q[0] - x.q[1]).sin_cos();
         let determinant = (sin * sin * m2 + m1) * (self.lengths[0] * self.lengths[0] * lower);
         let (p1, p2) = (x.p[0], x.p[1]);
         let kinetic = (p1 * p1 * lower - cos * p1 * p2 * (2.0 * mixed) + p2 * p2 * upper) / determinant * 0.5;
-        Some(kinetic + self.potential(&x.q) - x.z * self.gamma)
+        Some(kinetic + Self::potential(self.masses, self.lengths, &x.q) - x.z * self.gamma)
     }
 }

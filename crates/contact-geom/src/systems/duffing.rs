@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless:
@@ -38,16 +40,29 @@ impl Duffing {
 
     /// The potential with the forcing: `V(t, q)`.
     #[inline(always)]
-    fn potential<T: Scalar>(&self, t: T, q: T) -> T {
+    fn potential<C: Coefficient, T: ScalarOver<C>>([alpha, beta, force, omega]: [C; 4], t: T, q: T) -> T {
         let square = q * q;
-        square * (square * (self.beta * 0.25) + self.alpha * 0.5) - (t * self.omega).cos() * q * self.force
+        square * (square * (beta * 0.25) + alpha * 0.5) - (t * omega).cos() * q * force
+    }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [alpha, beta, force, omega, gamma]: [C; 5],
+        t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        v[0] * v[0] * 0.5 - Self::potential([alpha, beta, force, omega], t, q[0]) + z * gamma
     }
 }
 
 impl Lagrangian<1> for Duffing {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 - self.potential(t, q[0]) + z * self.gamma
+        self.formula([self.alpha, self.beta, self.force, self.omega, self.gamma], t, q, v, z)
     }
 
     #[inline(always)]
@@ -70,6 +85,8 @@ impl Lagrangian<1> for Duffing {
     }
 }
 
+parametric_fields!([] Duffing, 1, alpha, beta, force, omega, gamma);
+
 impl System<1> for Duffing {
     fn name(&self) -> &'static str {
         if self.force == 0.0 { "duffing" } else { "duffing_forced" }
@@ -85,6 +102,7 @@ impl System<1> for Duffing {
     }
 
     fn hamiltonian<T: Scalar>(&self, t: T, x: &PhasePoint<1, T>) -> Option<T> {
-        Some(x.p[0] * x.p[0] * 0.5 + self.potential(t, x.q[0]) - x.z * self.gamma)
+        let potential = Self::potential([self.alpha, self.beta, self.force, self.omega], t, x.q[0]);
+        Some(x.p[0] * x.p[0] * 0.5 + potential - x.z * self.gamma)
     }
 }

@@ -3,6 +3,8 @@
 use super::closed_form::relative_exp_m1;
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the
@@ -38,12 +40,25 @@ impl FreeParticle {
     pub fn velocity_through(&self, q0: f64, q1: f64, h: f64) -> Option<f64> {
         Some((q1 - q0) / (h * relative_exp_m1(self.gamma * h))).filter(|v| v.is_finite())
     }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [gamma]: [C; 1],
+        _t: T,
+        _q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        v[0] * v[0] * 0.5 + z * gamma
+    }
 }
 
 impl Lagrangian<1> for FreeParticle {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -58,6 +73,8 @@ impl Lagrangian<1> for FreeParticle {
         }
     }
 }
+
+parametric_fields!([] FreeParticle, 1, gamma);
 
 impl System<1> for FreeParticle {
     fn name(&self) -> &'static str {

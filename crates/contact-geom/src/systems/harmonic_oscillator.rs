@@ -3,6 +3,8 @@
 use super::closed_form::{relative_exp_m1, relative_sin};
 use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// The harmonic oscillator with linear drag, `L = v^2/2 - q^2/2 + gamma z`. Dimensionless: time in units of the inverse
@@ -68,12 +70,25 @@ impl HarmonicOscillator {
         let spread = s / (h * (self.gamma * h * 0.5).exp());
         (spread.abs() > 4.0 * f64::EPSILON).then(|| (q1 - a * q0) / s).filter(|v| v.is_finite())
     }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [gamma]: [C; 1],
+        _t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        (v[0] * v[0] - q[0] * q[0]) * 0.5 + z * gamma
+    }
 }
 
 impl Lagrangian<1> for HarmonicOscillator {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        (v[0] * v[0] - q[0] * q[0]) * 0.5 + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.gamma], t, q, v, z)
     }
 
     #[inline(always)]
@@ -93,6 +108,8 @@ impl Lagrangian<1> for HarmonicOscillator {
         }
     }
 }
+
+parametric_fields!([] HarmonicOscillator, 1, gamma);
 
 impl System<1> for HarmonicOscillator {
     fn name(&self) -> &'static str {

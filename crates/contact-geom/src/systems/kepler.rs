@@ -4,6 +4,8 @@ use super::{System, between};
 use crate::{
     ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint,
 };
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: for `mu = 1`, lengths are
@@ -29,8 +31,8 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
     const HINTS: Hints = Hints { time_transformation: true, ..Hints::NONE };
 
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
-        v.dot(v) * 0.5 + attraction(self.mu, q) + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
+        self.formula([self.mu, self.gamma], t, q, v, z)
     }
 
     #[inline(always)]
@@ -56,6 +58,8 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
         self.time_transformation().rate(q)
     }
 }
+
+parametric_fields!([const D: usize] Kepler<D>, D, mu, gamma);
 
 impl<const D: usize> System<D> for Kepler<D> {
     fn name(&self) -> &'static str {
@@ -89,6 +93,19 @@ impl<const D: usize> Kepler<D> {
     pub fn time_transformation(&self) -> Radial {
         Radial { exponent: 1.5 }
     }
+
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [mu, gamma]: [C; 2],
+        _t: T,
+        q: &SVector<T, D>,
+        v: &SVector<T, D>,
+        z: T,
+    ) -> T {
+        v.dot(v) * 0.5 + attraction(mu, q) + z * gamma
+    }
 }
 
 /// The time transformation `g = |q|^a`. For Kepler's problem without drag, tau is up to a constant factor the eccentric
@@ -114,7 +131,7 @@ impl<const D: usize> TimeTransformation<D> for Radial {
 
 /// The negative potential `mu / |q|`.
 #[inline(always)]
-pub(super) fn attraction<T: Scalar, const D: usize>(mu: f64, q: &SVector<T, D>) -> T {
+pub(super) fn attraction<C, T: ScalarOver<C>, const D: usize>(mu: C, q: &SVector<T, D>) -> T {
     q.dot(q).sqrt().recip() * mu
 }
 

@@ -1,7 +1,7 @@
 //! The Lane-Emden equation.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::{Lagrangian, Parametric, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The Lane-Emden equation of index n as a Herglotz equation, `L = v^2/2 - q^(n+1)/(n+1) - (2/t) z`, `t > 0`.
@@ -102,6 +102,9 @@ impl Lagrangian<1> for LaneEmden {
         }
     }
 }
+
+/// Without parameters: the index is an integer.
+impl Parametric<1> for LaneEmden {}
 
 impl System<1> for LaneEmden {
     fn name(&self) -> &'static str {

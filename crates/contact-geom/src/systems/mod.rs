@@ -45,12 +45,12 @@ pub use spherical_pendulum::SphericalPendulum;
 pub use uniform_field::UniformField;
 pub use van_der_pol::VanDerPol;
 
-use crate::{ChartVector, Hessian, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::{ChartVector, Hessian, Lagrangian, Parametric, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use as_one::systems;
 use nalgebra::SVector;
 
 /// A system of the catalogue: a regular Lagrangian with initial data, sample points, and its known properties.
-pub trait System<const N: usize>: Lagrangian<N> {
+pub trait System<const N: usize>: Parametric<N> {
     /// The name in tables, in lower case with underscores.
     fn name(&self) -> &'static str;
 

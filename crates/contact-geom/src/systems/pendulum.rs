@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q`
@@ -20,10 +22,25 @@ impl Default for Pendulum {
     }
 }
 
+impl Pendulum {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [gamma]: [C; 1],
+        _t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        v[0] * v[0] * 0.5 - q[0].versine() + z * gamma
+    }
+}
+
 impl Lagrangian<1> for Pendulum {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 - q[0].versine() + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.gamma], t, q, v, z)
     }
 
     #[inline(always)]
@@ -42,6 +59,8 @@ impl Lagrangian<1> for Pendulum {
         }
     }
 }
+
+parametric_fields!([] Pendulum, 1, gamma);
 
 impl System<1> for Pendulum {
     fn name(&self) -> &'static str {

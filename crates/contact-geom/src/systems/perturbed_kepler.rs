@@ -3,6 +3,8 @@
 use super::System;
 use super::kepler::{attraction, pericentre, sample_annulus};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// Kepler's problem in the plane with a drag that changes sign periodically,
@@ -29,10 +31,25 @@ impl Default for PerturbedKepler {
     }
 }
 
+impl PerturbedKepler {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [mu, alpha, theta]: [C; 3],
+        t: T,
+        q: &SVector<T, 2>,
+        v: &SVector<T, 2>,
+        z: T,
+    ) -> T {
+        v.dot(v) * 0.5 + attraction(mu, q) + (t * theta).sin() * z * alpha
+    }
+}
+
 impl Lagrangian<2> for PerturbedKepler {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        v.dot(v) * 0.5 + attraction(self.mu, q) + (t * self.theta).sin() * z * self.alpha
+        self.formula([self.mu, self.alpha, self.theta], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -47,6 +64,8 @@ impl Lagrangian<2> for PerturbedKepler {
         }
     }
 }
+
+parametric_fields!([] PerturbedKepler, 2, mu, alpha, theta);
 
 impl System<2> for PerturbedKepler {
     fn name(&self) -> &'static str {

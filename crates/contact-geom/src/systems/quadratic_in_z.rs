@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// The oscillator with a drag proportional to the action, `L = v^2/2 - q^2/2 - c z^2/2`. Dimensionless: time in units
@@ -22,10 +24,25 @@ impl Default for QuadraticInZ {
     }
 }
 
+impl QuadraticInZ {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [c]: [C; 1],
+        _t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
+        (v[0] * v[0] - q[0] * q[0] - z * z * c) * 0.5
+    }
+}
+
 impl Lagrangian<1> for QuadraticInZ {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        (v[0] * v[0] - q[0] * q[0] - z * z * self.c) * 0.5
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.c], t, q, v, z)
     }
 
     #[inline(always)]
@@ -46,6 +63,8 @@ impl Lagrangian<1> for QuadraticInZ {
         }
     }
 }
+
+parametric_fields!([] QuadraticInZ, 1, c);
 
 impl System<1> for QuadraticInZ {
     fn name(&self) -> &'static str {

@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// A relativistic particle on a spring, with drag: `L = -sqrt(1 - v^2) - q^2/2 + gamma z`, `|v| < 1`. Dimensionless:
@@ -21,18 +23,35 @@ impl Default for Relativistic {
     }
 }
 
-impl Lagrangian<1> for Relativistic {
+impl Relativistic {
+    /// The Lagrangian, over the type of its parameters.
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [gamma]: [C; 1],
+        _t: T,
+        q: &SVector<T, 1>,
+        v: &SVector<T, 1>,
+        z: T,
+    ) -> T {
         // As a product, 1 - v^2 is accurate near the speed of light.
         let proper = ((-v[0] + 1.0) * (v[0] + 1.0)).sqrt();
-        z * self.gamma - q[0] * q[0] * 0.5 - proper
+        z * gamma - q[0] * q[0] * 0.5 - proper
+    }
+}
+
+impl Lagrangian<1> for Relativistic {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.formula([self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_free: self.gamma == 0.0, z_affine: true, ..Structure::default() }
     }
 }
+
+parametric_fields!([] Relativistic, 1, gamma);
 
 impl System<1> for Relativistic {
     fn name(&self) -> &'static str {

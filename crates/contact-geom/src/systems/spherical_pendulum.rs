@@ -2,6 +2,8 @@
 
 use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// The spherical pendulum with linear drag, `L = (v_theta^2 + sin^2 theta v_phi^2)/2 - (1 - cos theta) + gamma z`, with
@@ -23,17 +25,34 @@ impl Default for SphericalPendulum {
     }
 }
 
+impl SphericalPendulum {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        &self,
+        [gamma]: [C; 1],
+        _t: T,
+        q: &SVector<T, 2>,
+        v: &SVector<T, 2>,
+        z: T,
+    ) -> T {
+        let around = q[0].sin() * v[1];
+        (v[0] * v[0] + around * around) * 0.5 - q[0].versine() + z * gamma
+    }
+}
+
 impl Lagrangian<2> for SphericalPendulum {
     #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let around = q[0].sin() * v[1];
-        (v[0] * v[0] + around * around) * 0.5 - q[0].versine() + z * self.gamma
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        self.formula([self.gamma], t, q, v, z)
     }
 
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_free: self.gamma == 0.0, z_affine: true, ..Structure::default() }
     }
 }
+
+parametric_fields!([] SphericalPendulum, 2, gamma);
 
 impl System<2> for SphericalPendulum {
     fn name(&self) -> &'static str {

@@ -2,7 +2,9 @@
 
 use super::closed_form::{relative_exp_m1, second_relative_exp, third_relative_exp};
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::dynamics::indexed_names;
+use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, Parametric, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any
@@ -30,7 +32,12 @@ impl<const D: usize> UniformField<D> {
     /// `a . q`, the negative potential.
     #[inline(always)]
     fn work<T: Scalar>(&self, q: &SVector<T, D>) -> T {
-        self.field.iter().zip(q).fold(T::zero(), |sum, (a, q)| sum + *q * *a)
+        Self::work_of(&self.field, q)
+    }
+
+    #[inline(always)]
+    fn work_of<C: Coefficient, T: ScalarOver<C>>(field: &[C], q: &SVector<T, D>) -> T {
+        field.iter().zip(q).fold(T::zero(), |sum, (a, q)| sum + *q * *a)
     }
 
     /// The motion after time `t` from any start, for every `gamma` and either sign of `t`, to a few units of round-off
@@ -62,10 +69,18 @@ impl<const D: usize> UniformField<D> {
     }
 }
 
+impl<const D: usize> UniformField<D> {
+    /// The Lagrangian, over the type of its parameters.
+    #[inline(always)]
+    fn formula<C: Coefficient, T: ScalarOver<C>>(field: &[C], gamma: C, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
+        v.dot(v) * 0.5 + Self::work_of(field, q) + z * gamma
+    }
+}
+
 impl<const D: usize> Lagrangian<D> for UniformField<D> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
-        v.dot(v) * 0.5 + self.work(q) + z * self.gamma
+        Self::formula(&self.field, self.gamma, q, v, z)
     }
 
     fn structure(&self) -> Structure {
@@ -78,6 +93,29 @@ impl<const D: usize> Lagrangian<D> for UniformField<D> {
             constant_mass: true,
             ..Structure::default()
         }
+    }
+}
+
+/// `field[i]` and `gamma`.
+impl<const D: usize> Parametric<D> for UniformField<D> {
+    fn parameter_names(&self) -> Vec<String> {
+        indexed_names("field", D).chain(["gamma".to_owned()]).collect()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        self.field.into_iter().chain([self.gamma]).collect()
+    }
+    #[inline(always)]
+    fn parameter_count(&self) -> usize {
+        D + 1
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        let (gamma, field) = theta.split_last()?;
+        Some(UniformField { field: field.try_into().ok()?, gamma: *gamma })
+    }
+    #[inline(always)]
+    fn value_at<T: Scalar>(&self, theta: &[T], _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
+        let Some((gamma, field)) = theta.split_last() else { return T::from(f64::NAN) };
+        Self::formula(field, *gamma, q, v, z)
     }
 }
 

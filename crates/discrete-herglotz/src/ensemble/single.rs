@@ -30,9 +30,9 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        let Problem { t0, start, state, structure, .. } = *problem;
+        let Problem { t0, start, state, from_momentum, structure, .. } = *problem;
         self.integrator.stepper(
-            &Problem { lagrangian: self.lagrangian, t0, start, state, structure, interrupt: None },
+            &Problem { lagrangian: self.lagrangian, t0, start, state, from_momentum, structure, interrupt: None },
             h,
             options,
         )

@@ -7,7 +7,9 @@ use crate::DenseStep;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::dense_step::Series;
+use crate::numbers::registers::Stages;
 use crate::numbers::state_words::saved;
+use crate::sensitivity::SolvedStages;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -56,6 +58,12 @@ impl<const N: usize> Solved<N> {
         let series = |values: &[f64; MAX_STAGES]| through(values, s);
         let [v, force] = [&self.v, &self.force].map(|of| of.each_ref().map(series));
         DenseStep::new(s, (t, h), start, [v, force], [series(&self.rate), series(&self.l)])
+    }
+
+    /// These stages for the tangent of the step.
+    pub fn stages(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> SolvedStages<N> {
+        let [v, force] = [&self.v, &self.force].map(|of| of.map(Stages));
+        SolvedStages { s, t, h, start, v, force, rate: Stages(self.rate), l: Stages(self.l) }
     }
 
     /// The stages of a condensed step from its accelerations and positions.

@@ -7,7 +7,7 @@ pub(crate) mod integrator;
 mod limits;
 pub(crate) mod resolution;
 pub(crate) mod routes;
-mod stages;
+pub(crate) mod stages;
 mod stepper;
 pub(crate) mod tables;
 mod virtual_work;

@@ -26,6 +26,7 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
 use crate::resolution::thresholds::FEW_STAGES;
+use crate::sensitivity::SolvedStages;
 use crate::solve::mass_matrix::is_identity;
 use crate::{
     DenseStep, InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions, UnresolvedStep,
@@ -340,6 +341,12 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         let step = self.last_step()?;
         let solved = with_route!(&*self.route, run => StageRoute::solved(run, &step));
         Some(solved.curve(self.s, step.t, self.h, self.phase(step.from)))
+    }
+
+    fn solved_stages(&self) -> Option<SolvedStages<N>> {
+        let step = self.last_step()?;
+        let solved = with_route!(&*self.route, run => StageRoute::solved(run, &step));
+        Some(solved.stages(self.s, (step.t, self.h), self.phase(step.from)))
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {

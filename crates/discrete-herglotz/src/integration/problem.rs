@@ -54,6 +54,9 @@ pub struct Problem<'a, L, const N: usize> {
     /// The initial state with its velocity, and (`state`) with its momentum.
     pub(crate) start: VelocityPoint<N>,
     pub(crate) state: PhasePoint<N>,
+    /// Whether the momentum was given, not the velocity: derivatives with respect to the start are with respect to what
+    /// was given.
+    pub(crate) from_momentum: bool,
     /// The structure that the Lagrangian claims, verified at the initial state.
     pub(crate) structure: Structure,
     /// The interrupt of its trial runs.
@@ -91,8 +94,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         };
         check_regular(lagrangian, t0, &start)?;
         let structure = check_claims(lagrangian, t0, &start)?;
+        let from_momentum = state.is_some();
         let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
-        Ok(Problem { lagrangian, t0, start, state, structure, interrupt: None })
+        Ok(Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt: None })
     }
 
     /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.

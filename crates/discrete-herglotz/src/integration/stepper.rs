@@ -1,7 +1,7 @@
 //! Steppers: a method applied to one motion.
 
 use crate::integration::{Piece, Reset};
-use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
+use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep, sensitivity::SolvedStages};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use thiserror::Error;
@@ -44,6 +44,12 @@ pub trait Stepper<const N: usize> {
     /// The dense output of the last step, for a method that provides it; `None` before the first step and after a
     /// failed one.
     fn dense(&self) -> Option<DenseStep<N>> {
+        None
+    }
+
+    /// The solved stages of the last step, from which its tangent is computed; `None` before the first step, after a
+    /// failed one, and for a method whose tangent is not implemented.
+    fn solved_stages(&self) -> Option<SolvedStages<N>> {
         None
     }
 

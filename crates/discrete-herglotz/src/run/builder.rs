@@ -167,6 +167,30 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     }
 }
 
+impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, L, N> {
+    /// The same run with the action, on which its derivatives depend.
+    ///
+    /// # Errors
+    /// [`InputError::Hypothesis`] for a resumed run.
+    pub(crate) fn differentiable(self) -> Result<Self, InputError> {
+        if self.from.is_some() {
+            return Err(InputError::Hypothesis { hypothesis: "a run from its start, since a resumed run has no derivatives" });
+        }
+        Ok(Run { needs: OutputRequest { action: true, ..self.needs }, ..self })
+    }
+
+    /// Performs the run of a plan with one more observer, called after the others.
+    pub(crate) fn observed(
+        mut self,
+        plan: &Plan<'p, L, N>,
+        observer: &mut impl Observer<N>,
+    ) -> Result<Outcome<N>, InputError> {
+        let mut observers = std::mem::take(&mut self.observers);
+        observers.push(Box::new(Borrowed(observer)));
+        integrate(plan, &mut observers, self.from.as_ref())
+    }
+}
+
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// A run of the problem with an integrator.
     pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, L, N> {

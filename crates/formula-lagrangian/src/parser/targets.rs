@@ -2,7 +2,8 @@
 
 use super::{Parsed, Parser};
 use crate::ParseError;
-use crate::names::{Block, is_reserved, nearest_name};
+use crate::names::{Block, is_reserved};
+use crate::nearest_name;
 use crate::token::{Token, Word};
 
 /// The kind of a variable that is assigned.

@@ -3,7 +3,8 @@
 use super::{Parsed, Parser};
 use crate::Id;
 use crate::hints::CHOICE;
-use crate::names::{Block, is_reserved, nearest_name};
+use crate::names::{Block, is_reserved};
+use crate::nearest_name;
 use crate::quantities::Quantity;
 use crate::token::{Token, Word};
 

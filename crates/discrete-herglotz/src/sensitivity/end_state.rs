@@ -1,0 +1,132 @@
+//! The state at the end of a run, losses of it, and their derivatives.
+
+use crate::Problem;
+use crate::StepError;
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, Scalar, VelocityPoint};
+
+/// The state at the end of a run over a [`Scalar`]: the argument of a [`Loss`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndState<const N: usize, T = f64> {
+    /// The time.
+    pub t: T,
+    /// The position.
+    pub q: SVector<T, N>,
+    /// The velocity.
+    pub v: SVector<T, N>,
+    /// The momentum.
+    pub p: SVector<T, N>,
+    /// The action.
+    pub z: T,
+}
+
+/// A function of the end of a run, written once as a generic function, as a [`Lagrangian`](contact_geom::Lagrangian) is:
+/// its derivatives are found by automatic differentiation.
+///
+/// ```
+/// use contact_geom::Scalar;
+/// use discrete_herglotz::sensitivity::{EndState, Loss};
+/// struct Miss { target: f64 }
+/// impl Loss<1> for Miss {
+///     fn value<T: Scalar>(&self, end: &EndState<1, T>) -> T {
+///         (end.q[0] - self.target).powi(2) + end.v[0] * end.v[0] * 0.1
+///     }
+/// }
+/// ```
+pub trait Loss<const N: usize> {
+    /// The value.
+    fn value<T: Scalar>(&self, end: &EndState<N, T>) -> T;
+}
+
+/// The partial derivatives of a number in the end state, each component for fixed others; those of v and p are added, as
+/// p depends on v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndCovector<const N: usize> {
+    /// In the time.
+    pub t: f64,
+    /// In the position.
+    pub q: SVector<f64, N>,
+    /// In the velocity.
+    pub v: SVector<f64, N>,
+    /// In the momentum.
+    pub p: SVector<f64, N>,
+    /// In the action.
+    pub z: f64,
+}
+
+impl<const N: usize> EndCovector<N> {
+    /// No dependence.
+    pub fn zero() -> Self {
+        let zero = SVector::zeros();
+        EndCovector { t: 0.0, q: zero, v: zero, p: zero, z: 0.0 }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.q.iter().chain(&self.v).chain(&self.p).chain([&self.t, &self.z]).all(|x| x.is_finite())
+    }
+}
+
+impl<const N: usize> EndState<N> {
+    /// A loss of this state, with its partial derivatives.
+    pub fn differentiate(&self, loss: &impl Loss<N>) -> (f64, EndCovector<N>) {
+        let along = |seeds: &dyn Fn(&mut EndState<N, Dual<f64, ChartVector<N>>>)| {
+            let EndState { t, q, v, p, z } = self;
+            let constant = |x: &SVector<f64, N>| x.map(Dual::from);
+            let (t, z) = (Dual::from(*t), Dual::from(*z));
+            let mut state = EndState { t, q: constant(q), v: constant(v), p: constant(p), z };
+            seeds(&mut state);
+            loss.value(&state)
+        };
+        let value = along(&|state| {
+            for i in 0..N {
+                state.q[i].d.x[i] = 1.0;
+                state.p[i].d.y[i] = 1.0;
+            }
+            state.z.d.z = 1.0;
+        });
+        let rest = along(&|state| {
+            for i in 0..N {
+                state.v[i].d.x[i] = 1.0;
+            }
+            state.t.d.z = 1.0;
+        });
+        (value.re, EndCovector { t: rest.d.z, q: value.d.x, v: rest.d.x, p: value.d.y, z: value.d.z })
+    }
+}
+
+/// The dependence of the velocity on the state `(q, p, z)` at a point:
+/// `W dv = dp - L_vq dq - L_vz dz - L_vtheta dtheta - L_vt dt`.
+pub(crate) struct VelocityDependence<const N: usize> {
+    inverse: SMatrix<f64, N, N>,
+    qv: SMatrix<f64, N, N>,
+    vz: SVector<f64, N>,
+    /// `L_vtheta` for each parameter, and `L_vt`.
+    parameters: Vec<SVector<f64, N>>,
+    time: SVector<f64, N>,
+}
+
+impl<const N: usize> VelocityDependence<N> {
+    pub fn at<L: Parametric<N>>(problem: &Problem<'_, L, N>, t: f64, x: &VelocityPoint<N>) -> Result<Self, StepError> {
+        let lagrangian = problem.lagrangian;
+        let Hessian { qv, vv, vz, .. } = lagrangian.hessian(t, x);
+        let inverse = vv.try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
+        let mut of = ParameterDerivatives::new(lagrangian);
+        let parameters = (0..of.count()).map(|k| of.at(lagrangian, Quantity::Parameter(k), t, x).gradient.y).collect();
+        let time = of.at(lagrangian, Quantity::Time, t, x).gradient.y;
+        Ok(VelocityDependence { inverse, qv, vz, parameters, time })
+    }
+
+    /// The derivative of the velocity along a tangent of the state.
+    pub fn along(&self, q: &SVector<f64, N>, p: &SVector<f64, N>, z: f64, parameter: Option<usize>, dt: f64) -> SVector<f64, N> {
+        let explicit = parameter.and_then(|k| self.parameters.get(k).copied()).unwrap_or_else(SVector::zeros);
+        self.inverse * (p - self.qv.transpose() * q - self.vz * z - explicit - self.time * dt)
+    }
+
+    /// The derivatives in `(q, p, z)`, in the parameters and in the time, of a number with these partial derivatives.
+    pub fn pull(&self, of: &EndCovector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+        let of_p = self.inverse.transpose() * of.v;
+        let state = ChartVector { x: of.q - self.qv * of_p, y: of.p + of_p, z: of.z - self.vz.dot(&of_p) };
+        (state, self.parameters.iter().map(|l| -l.dot(&of_p)).collect(), of.t - self.time.dot(&of_p))
+    }
+}

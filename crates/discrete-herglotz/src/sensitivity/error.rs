@@ -1,0 +1,59 @@
+//! Errors of derivatives of runs.
+
+use crate::{InputError, StepError};
+use contact_geom::UnknownParameter;
+use std::borrow::Cow;
+use thiserror::Error;
+
+/// The reason why a run cannot be differentiated.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SensitivityError {
+    /// The input of the run is invalid.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// There is no parameter of this name.
+    #[error(transparent)]
+    Parameter(#[from] UnknownParameter),
+    /// The integrator has no tangent.
+    #[error(
+        "derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`, and a Lagrangian \
+         without switching functions"
+    )]
+    NoTangent {
+        /// The name of the method.
+        method: Cow<'static, str>,
+        /// In which case, if not always.
+        case: &'static str,
+    },
+    /// A variable that the start of the problem does not have.
+    #[error("the start of the problem was given by its {given}, not by its {other}; differentiate with respect to the {given}")]
+    Start {
+        /// What was given.
+        given: &'static str,
+        /// What was requested.
+        other: &'static str,
+    },
+    /// A coordinate that does not exist.
+    #[error("there is no coordinate {index}; the coordinates are counted from 0 to {}", .count - 1)]
+    Coordinate {
+        /// The index.
+        index: usize,
+        /// The number of coordinates.
+        count: usize,
+    },
+    /// The loss or its derivative is not finite.
+    #[error("the loss is {value}, or its derivative is not finite; use a loss that is defined at the end of the run")]
+    Loss {
+        /// The value of the loss.
+        value: f64,
+    },
+    /// The tangent of a step cannot be computed.
+    #[error("the derivative of step {step} cannot be computed: {cause}")]
+    Step {
+        /// The step, counted from 0.
+        step: usize,
+        /// The cause.
+        cause: StepError,
+    },
+}

@@ -1,0 +1,234 @@
+//! Gradients of functions of the end of a run, by the adjoint.
+
+use crate::run::{Outcome, Plan, Run, Until};
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
+use crate::sensitivity::engine::{Covector, Engine};
+use crate::sensitivity::kept_states::{KeptStates, for_each_block};
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::solved_stages::SolvedStages;
+use crate::sensitivity::step_maps::Direction;
+use crate::sensitivity::tangent::{check_tangent, no_tangent};
+use crate::{Problem, Status, StepError, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
+
+/// The gradient of a number that depends on the end of a run, with respect to all variables of the run; see
+/// [`Variable`](crate::sensitivity::Variable) for what is fixed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gradient<const N: usize> {
+    /// In the initial position.
+    pub q: SVector<f64, N>,
+    /// In the initial velocity, or in the initial momentum if the start was given by it.
+    pub rate: SVector<f64, N>,
+    /// In the initial action.
+    pub z: f64,
+    /// In the parameters, in the order of [`Parametric::parameter_names`].
+    pub parameters: Vec<f64>,
+    /// In the time of the start, for a fixed end time and a fixed number of steps.
+    pub t0: f64,
+    /// In the time of the end, for a fixed number of steps.
+    pub t_end: f64,
+    /// The largest component of the derivative in the state along the run divided by that at the start, at least one:
+    /// round-off of the gradient is amplified by it.
+    pub growth: f64,
+}
+
+/// A run with the gradient of a loss of its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LossGradient<const N: usize> {
+    /// The outcome of the run.
+    pub outcome: Outcome<N>,
+    /// The value of the loss and its gradient; `None` if the run was not completed, for the reason that the status of
+    /// the outcome gives.
+    pub loss: Option<(f64, Gradient<N>)>,
+}
+
+/// A run that was performed and of which gradients can be computed, any number of them.
+///
+/// The memory does not grow with the number of steps: states are kept at intervals, and the steps between them are taken
+/// again, so that the stages are bitwise those of the run.
+pub struct RecordedRun<'p, L, const N: usize> {
+    plan: Plan<'p, L, N>,
+    outcome: Outcome<N>,
+    kept: KeptStates,
+}
+
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
+    /// Performs the run and keeps what its gradients need.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run), and [`SensitivityError::NoTangent`].
+    pub fn record(self, until: Until) -> Result<RecordedRun<'p, L, N>, SensitivityError> {
+        let run = self.differentiable()?;
+        let plan = run.plan(until)?;
+        check_tangent(&plan)?;
+        let mut kept = KeptStates::new();
+        let outcome = run.observed(&plan, &mut kept)?;
+        Ok(RecordedRun { plan, outcome, kept })
+    }
+
+    /// Performs the run, and computes the value and the gradient of a loss of its end by the adjoint. The gradient is
+    /// that of the discrete run, to round-off: of the steps that were given, or that were chosen for an accuracy, which
+    /// are not differentiated themselves.
+    ///
+    /// ```
+    /// use contact_geom::{Scalar, VelocityPoint, systems::Pendulum};
+    /// use discrete_herglotz::{Problem, Steps, Until, sensitivity::{EndState, Loss}};
+    /// struct Miss;
+    /// impl Loss<1> for Miss {
+    ///     fn value<T: Scalar>(&self, end: &EndState<1, T>) -> T {
+    ///         (end.q[0] - 0.5).powi(2)
+    ///     }
+    /// }
+    /// let pendulum = Pendulum { gamma: -0.01 };
+    /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;
+    /// let run = problem.steps(Steps::Size(0.5)).gradient(&Miss, Until::Time(10.0))?;
+    /// if let Some((value, gradient)) = run.loss {
+    ///     println!("{value}, in v0 {}, in gamma {}", gradient.rate[0], gradient.parameters[0]);
+    /// }
+    /// # Ok::<(), discrete_herglotz::sensitivity::SensitivityError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`record`](Self::record) and of [`RecordedRun::pullback`]; [`SensitivityError::Loss`] where the loss or
+    /// its derivative is not finite.
+    pub fn gradient(self, loss: &impl Loss<N>, until: Until) -> Result<LossGradient<N>, SensitivityError> {
+        self.gradient_of(|end| end.differentiate(loss), until)
+    }
+
+    /// The same for a loss that is given as a function with its partial derivatives in the end state.
+    ///
+    /// # Errors
+    /// Those of [`gradient`](Self::gradient).
+    pub fn gradient_of(
+        self,
+        loss: impl FnOnce(&EndState<N>) -> (f64, EndCovector<N>),
+        until: Until,
+    ) -> Result<LossGradient<N>, SensitivityError> {
+        let recorded = self.record(until)?;
+        let outcome = recorded.outcome;
+        let Some(end) = recorded.end() else { return Ok(LossGradient { outcome, loss: None }) };
+        let (value, covector) = loss(&end);
+        if !(value.is_finite() && covector.is_finite()) {
+            return Err(SensitivityError::Loss { value });
+        }
+        let gradient = recorded.pullback(&covector)?;
+        Ok(LossGradient { outcome, loss: Some((value, gradient)) })
+    }
+}
+
+impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
+    /// The outcome of the run.
+    pub fn outcome(&self) -> &Outcome<N> {
+        &self.outcome
+    }
+
+    /// The end of a completed run; `None` if it was not completed.
+    pub fn end(&self) -> Option<EndState<N>> {
+        let Outcome { status, t, q, p, v, z_or_start: z, .. } = self.outcome;
+        let v = v.filter(|_| status == Status::Completed)?;
+        Some(EndState { t, q, v, p, z })
+    }
+
+    /// The gradient of a number with these partial derivatives in the end state.
+    ///
+    /// # Errors
+    /// [`SensitivityError::Step`] where the adjoint of a step cannot be computed, as for a run that was not completed.
+    pub fn pullback(&self, covector: &EndCovector<N>) -> Result<Gradient<N>, SensitivityError> {
+        let mut all = self.pullbacks(std::slice::from_ref(covector))?;
+        all.pop().ok_or(SensitivityError::Step { step: 0, cause: StepError::NonFinite })
+    }
+
+    /// The gradients of several numbers; the steps are taken again only once.
+    ///
+    /// # Errors
+    /// Those of [`pullback`](Self::pullback).
+    pub fn pullbacks(&self, covectors: &[EndCovector<N>]) -> Result<Vec<Gradient<N>>, SensitivityError> {
+        let steps = &self.plan.steps;
+        let problem = steps.problem;
+        let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
+        let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
+        let x = VelocityPoint { q: end.q, v: end.v, z: end.z };
+        let of_velocity = VelocityDependence::at(problem, end.t, &x).map_err(|e| failed(self.outcome.steps, e))?;
+        let count = problem.lagrangian.parameter_count();
+        // The derivatives in parameters and time that the velocity at the end has for a fixed state (q, p, z).
+        let mut explicit_times = Vec::with_capacity(covectors.len());
+        let mut all: Vec<Covector<N>> = covectors
+            .iter()
+            .map(|of_end| {
+                let (of_state, parameters, time) = of_velocity.pull(of_end);
+                explicit_times.push(time);
+                let mut covector = Covector::new(&of_state, count);
+                covector.parameters = parameters;
+                covector
+            })
+            .collect();
+        let mut largest: Vec<f64> = all.iter().map(Covector::size).collect();
+        let stages = steps.info.collocation.unwrap_or(1);
+        let mut engine = Engine::new(problem, stages, steps.h, Direction::Backward);
+        let mut stepper = self.plan.stepper()?;
+        let mut block: Vec<SolvedStages<N>> = Vec::new();
+        let mut work = |stepper: &mut dyn Stepper<N>, range: std::ops::Range<usize>| {
+            block.clear();
+            for k in range.clone() {
+                stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
+                block.push(stepper.solved_stages().ok_or_else(|| no_tangent(&self.plan, ""))?);
+            }
+            for (k, step) in range.zip(&block).rev() {
+                engine.prepare(step).map_err(|cause| failed(k, cause))?;
+                for (covector, largest) in all.iter_mut().zip(&mut largest) {
+                    engine.pull(step, k, covector).map_err(|cause| failed(k, cause))?;
+                    *largest = contact_geom::numbers::max_or_nan(*largest, covector.size());
+                }
+            }
+            Ok(())
+        };
+        for (range, words) in self.kept.backward() {
+            for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
+        }
+        let taken = self.outcome.steps;
+        Ok(all
+            .iter()
+            .zip(largest)
+            .zip(explicit_times)
+            .map(|((covector, largest), time)| gradient(problem, covector, largest, time, taken))
+            .collect())
+    }
+}
+
+/// The gradient in the variables of the start from that in the initial state `(q, p, z)`; `explicit` is the derivative in
+/// the end time for a fixed end state.
+fn gradient<L: Parametric<N>, const N: usize>(
+    problem: &Problem<'_, L, N>,
+    covector: &Covector<N>,
+    largest: f64,
+    explicit: f64,
+    steps: usize,
+) -> Gradient<N> {
+    let size = covector.size();
+    let of_step = covector.step / steps.max(1) as f64;
+    let mut gradient = Gradient {
+        q: covector.q,
+        rate: covector.p,
+        z: covector.z,
+        parameters: covector.parameters.clone(),
+        t0: covector.time - of_step,
+        t_end: of_step + explicit,
+        growth: if largest > size { largest / size } else { 1.0 },
+    };
+    if !problem.from_momentum {
+        // p = L_v(t, q, v, z; theta).
+        let (lagrangian, x) = (problem.lagrangian, &problem.start);
+        let Hessian { qv, vv, vz, .. } = lagrangian.hessian(problem.t0, x);
+        gradient.q += qv * covector.p;
+        gradient.rate = vv * covector.p;
+        gradient.z += vz.dot(&covector.p);
+        let mut of = ParameterDerivatives::new(lagrangian);
+        for (k, sum) in gradient.parameters.iter_mut().enumerate() {
+            *sum += of.at(lagrangian, Quantity::Parameter(k), problem.t0, x).gradient.y.dot(&covector.p);
+        }
+        gradient.t0 += of.at(lagrangian, Quantity::Time, problem.t0, x).gradient.y.dot(&covector.p);
+    }
+    gradient
+}

@@ -1,0 +1,29 @@
+//! Derivatives of runs: tangents, forward, and gradients, by the adjoint.
+//!
+//! A step of contact Gauss collocation is a Runge-Kutta step on the symplectification, with the coordinates
+//! `y = (q, z, P, rho)`, `P = rho p`, and the motion `q' = V`, `z' = L`, `P' = rho (L_q + f)`, `rho' = -rho L_z`, where
+//! `rho L_v(q, V, z) = P`. Its tangent is the same method for the linearised motion, at the same stages. The adjoint of a
+//! symplectic map is the tangent of its inverse: a covector `(l_q, l_z, l_P, l_rho)` is carried back as the tangent
+//! `w = (l_P, -l_rho, -l_q, l_z)` of the step backward at the same stages, and the derivative in a parameter theta is
+//! `h sum_i b_i d(rho L_theta)[w_i]` summed over the steps. It is the exact gradient of the discrete run. See section 10
+//! of `docs/theory.md`.
+
+mod end_state;
+mod engine;
+mod error;
+mod gradient;
+mod kept_states;
+mod linear_stages;
+mod parameter_derivatives;
+mod solved_stages;
+mod stage_derivatives;
+mod step_maps;
+mod tangent;
+mod variable;
+
+pub use end_state::{EndCovector, EndState, Loss};
+pub use error::SensitivityError;
+pub use gradient::{Gradient, LossGradient, RecordedRun};
+pub use solved_stages::SolvedStages;
+pub use tangent::{StateDerivative, Tangent};
+pub use variable::Variable;

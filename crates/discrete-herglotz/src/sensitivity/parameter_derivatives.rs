@@ -1,0 +1,137 @@
+//! Derivatives of L and of the force with respect to parameters and time, at a point.
+
+use contact_geom::nalgebra::{ArrayStorage, SVector};
+use contact_geom::{ChartVector, Dual, Parametric, VelocityPoint, support::seed};
+
+/// What is differentiated with respect to: a parameter, or the time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    Parameter(usize),
+    Time,
+}
+
+/// A number with a derivative along one direction and the gradient of both.
+type WithGradient<const N: usize> = Dual<Dual<f64, ChartVector<N>>, SVector<Dual<f64, ChartVector<N>>, 1>>;
+
+/// A number with its derivatives along two directions, and the mixed one.
+type AlongTwo = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
+
+/// The derivatives of L, of its gradient, and of the force with respect to a quantity: `L_theta`,
+/// `(L_qtheta, L_vtheta, L_ztheta)`, `f_theta`.
+pub(crate) struct QuantityDerivatives<const N: usize> {
+    pub l: f64,
+    pub gradient: ChartVector<N>,
+    pub force: SVector<f64, N>,
+}
+
+impl<const N: usize> QuantityDerivatives<N> {
+    pub const ZERO: Self = QuantityDerivatives {
+        l: 0.0,
+        gradient: ChartVector { x: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])), y: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])), z: 0.0 },
+        force: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
+    };
+
+    /// Adds a multiple of other derivatives.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        self.l += factor * other.l;
+        self.gradient = self.gradient.plus(other.gradient.scale(factor));
+        self.force += other.force * factor;
+    }
+}
+
+/// Evaluates derivatives with respect to the parameters of a Lagrangian, with buffers for their values.
+pub(crate) struct ParameterDerivatives<const N: usize> {
+    theta: Vec<f64>,
+    with_gradient: Vec<WithGradient<N>>,
+    along_two: Vec<AlongTwo>,
+    simple: Vec<Dual<f64, SVector<f64, 1>>>,
+}
+
+impl<const N: usize> ParameterDerivatives<N> {
+    pub fn new(lagrangian: &impl Parametric<N>) -> Self {
+        let theta = lagrangian.parameters();
+        ParameterDerivatives {
+            with_gradient: theta.iter().map(|x| WithGradient::from(*x)).collect(),
+            along_two: theta.iter().map(|x| AlongTwo::from(*x)).collect(),
+            simple: theta.iter().map(|x| Dual::from(*x)).collect(),
+            theta,
+        }
+    }
+
+    /// The number of parameters.
+    pub fn count(&self) -> usize {
+        self.theta.len()
+    }
+
+    /// The derivatives at a point.
+    #[inline(never)]
+    pub fn at<L: Parametric<N>>(
+        &mut self,
+        lagrangian: &L,
+        quantity: Quantity,
+        t: f64,
+        x: &VelocityPoint<N>,
+    ) -> QuantityDerivatives<N> {
+        let one = SVector::<Dual<f64, ChartVector<N>>, 1>::from_element(Dual::from(1.0));
+        let y = seed(&ChartVector::from(*x));
+        let (q, v, z) = (y.x.map(Dual::constant), y.y.map(Dual::constant), Dual::constant(y.z));
+        let mut time = WithGradient::from(t);
+        if let Quantity::Parameter(k) = quantity {
+            self.with_gradient[k].d = one;
+        } else {
+            time.d = one;
+        }
+        let l = lagrangian.value_at(&self.with_gradient, time, &q, &v, z).d[0];
+        if let Quantity::Parameter(k) = quantity {
+            self.with_gradient[k].d = SVector::<_, 1>::from_element(Dual::from(0.0));
+        }
+        QuantityDerivatives { l: l.re, gradient: l.d, force: self.force(lagrangian, quantity, t, x) }
+    }
+
+    /// `f_theta` at a point; 0 without a force.
+    fn force<L: Parametric<N>>(&mut self, lagrangian: &L, quantity: Quantity, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N> {
+        if const { !L::HINTS.forced } {
+            return SVector::zeros();
+        }
+        let one = SVector::<f64, 1>::from_element(1.0);
+        let y = VelocityPoint { q: x.q.map(Dual::from), v: x.v.map(Dual::from), z: Dual::from(x.z) };
+        let mut time = Dual::from(t);
+        if let Quantity::Parameter(k) = quantity {
+            self.simple[k].d = one;
+        } else {
+            time.d = one;
+        }
+        let force = lagrangian.force_at(&self.simple, time, &y).map(|f| f.d[0]);
+        if let Quantity::Parameter(k) = quantity {
+            self.simple[k].d = SVector::<f64, 1>::zeros();
+        }
+        force
+    }
+
+    /// `d(rho L_theta)[w] + rho f_theta . w_q` at a stage, for the tangent `w = (w_q, w_v, w_z, w_rho)`.
+    #[inline(always)]
+    pub fn along<L: Parametric<N>>(
+        &mut self,
+        lagrangian: &L,
+        quantity: Quantity,
+        (t, x, rho): (f64, &VelocityPoint<N>, f64),
+        (w, w_rho): (&ChartVector<N>, f64),
+    ) -> f64 {
+        let moving = |re: f64, d: f64| AlongTwo::constant(Dual { re, d: SVector::<f64, 1>::from_element(d) });
+        let q = SVector::<AlongTwo, N>::from_fn(|d, _| moving(x.q[d], w.x[d]));
+        let v = SVector::<AlongTwo, N>::from_fn(|d, _| moving(x.v[d], w.y[d]));
+        let one = SVector::<Dual<f64, SVector<f64, 1>>, 1>::from_element(Dual::from(1.0));
+        let mut time = AlongTwo::from(t);
+        if let Quantity::Parameter(k) = quantity {
+            self.along_two[k].d = one;
+        } else {
+            time.d = one;
+        }
+        let l = lagrangian.value_at(&self.along_two, time, &q, &v, moving(x.z, w.z)).d[0];
+        if let Quantity::Parameter(k) = quantity {
+            self.along_two[k].d = SVector::<_, 1>::from_element(Dual::from(0.0));
+        }
+        let force = self.force(lagrangian, quantity, t, x);
+        w_rho * l.re + rho * (l.d[0] + force.dot(&w.x))
+    }
+}

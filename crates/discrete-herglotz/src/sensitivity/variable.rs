@@ -1,0 +1,85 @@
+//! The variables with respect to which a run is differentiated.
+
+use crate::Problem;
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::engine::Column;
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Hessian, Parametric};
+
+/// A variable on which a run depends.
+///
+/// The start is that of the [`Problem`](crate::Problem) as it was given: by a velocity, `(q, v, z)`, or by a momentum,
+/// `(q, p, z)`; derivatives with respect to one of these are for fixed others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Variable {
+    /// A coordinate of the start.
+    Position(usize),
+    /// A velocity of the start, for a start that was given by its velocity.
+    Velocity(usize),
+    /// A momentum of the start, for a start that was given by its momentum.
+    Momentum(usize),
+    /// The action at the start.
+    Action,
+    /// A parameter of the Lagrangian or of the force.
+    Parameter(String),
+    /// The time of the start, for a fixed end time and a fixed number of steps.
+    StartTime,
+    /// The time of the end, for a fixed number of steps.
+    EndTime,
+}
+
+impl Variable {
+    /// All variables of a problem: the start in the order q, v or p, z; the parameters; the times.
+    pub fn all<L: Parametric<N>, const N: usize>(problem: &Problem<'_, L, N>) -> Vec<Variable> {
+        let rate = if problem.from_momentum { Variable::Momentum } else { Variable::Velocity };
+        let start = (0..N).map(Variable::Position).chain((0..N).map(rate)).chain([Variable::Action]);
+        let parameters = problem.lagrangian.parameter_names().into_iter().map(Variable::Parameter);
+        start.chain(parameters).chain([Variable::StartTime, Variable::EndTime]).collect()
+    }
+
+    /// The tangent of the start along the variable, for a run of this number of steps.
+    pub(crate) fn column<L: Parametric<N>, const N: usize>(
+        &self,
+        problem: &Problem<'_, L, N>,
+        steps: usize,
+    ) -> Result<Column<N>, SensitivityError> {
+        let unit = |index: usize| {
+            if index < N { Ok(SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == index)))) } else { Err(SensitivityError::Coordinate { index, count: N }) }
+        };
+        let zero = SVector::<f64, N>::zeros();
+        let (lagrangian, x) = (problem.lagrangian, &problem.start);
+        // The derivatives of `p = L_v(t, q, v, z; theta)` for a given velocity.
+        let with = |q: SVector<f64, N>, v: SVector<f64, N>, z: f64| {
+            let Hessian { qv, vv, vz, .. } = lagrangian.hessian(problem.t0, x);
+            Column::new(q, qv.transpose() * q + vv * v + vz * z, z)
+        };
+        let moved = |quantity: Quantity| {
+            if problem.from_momentum {
+                return zero;
+            }
+            ParameterDerivatives::new(lagrangian).at(lagrangian, quantity, problem.t0, x).gradient.y
+        };
+        let [velocity, momentum] = ["velocity", "momentum"];
+        Ok(match self {
+            Variable::Position(i) if problem.from_momentum => Column::new(unit(*i)?, zero, 0.0),
+            Variable::Position(i) => with(unit(*i)?, zero, 0.0),
+            Variable::Velocity(_) if problem.from_momentum => {
+                return Err(SensitivityError::Start { given: momentum, other: velocity });
+            }
+            Variable::Velocity(i) => with(zero, unit(*i)?, 0.0),
+            Variable::Momentum(i) if problem.from_momentum => Column::new(zero, unit(*i)?, 0.0),
+            Variable::Momentum(_) => return Err(SensitivityError::Start { given: velocity, other: momentum }),
+            Variable::Action if problem.from_momentum => Column::new(zero, zero, 1.0),
+            Variable::Action => with(zero, zero, 1.0),
+            Variable::Parameter(name) => {
+                let index = lagrangian.parameter_index(name)?;
+                Column::new(zero, moved(Quantity::Parameter(index)), 0.0).of_parameter(index)
+            }
+            Variable::StartTime => {
+                Column::new(zero, moved(Quantity::Time), 0.0).of_times(1.0, -1.0 / steps.max(1) as f64)
+            }
+            Variable::EndTime => Column::new(zero, zero, 0.0).of_times(0.0, 1.0 / steps.max(1) as f64),
+        })
+    }
+}
