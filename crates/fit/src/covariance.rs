@@ -1,7 +1,6 @@
 //! The variance of the residuals.
 
-use crate::Loss;
-use crate::residuals::Evaluation;
+use crate::residuals::{Evaluation, Residuals};
 
 /// The factor s^2 of the covariance `s^2 (J^T J)^-1`; `None` without degrees of freedom, and where the loss of the
 /// residuals has no mean curvature.
@@ -9,9 +8,12 @@ use crate::residuals::Evaluation;
 /// For least squares s^2 is the sum of squares divided by the degrees of freedom. For a robust loss with influence
 /// `psi = rho' r` it is `K^2 (sum psi^2/(m - n)) / (mean psi')^2` with `K = 1 + (n/m) var(psi')/(mean psi')^2` (Huber,
 /// Robust Statistics, 1981, section 7.6), which outliers do not inflate.
-pub(crate) fn residual_variance(at: &Evaluation, loss: Loss, weights: &[f64], parameters: usize) -> Option<f64> {
-    let terms: Vec<_> =
-        at.residuals.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(r, _)| loss.term(*r)).collect();
+pub(crate) fn residual_variance<M>(residuals: &Residuals<'_, M>, at: &Evaluation, free: usize) -> Option<f64> {
+    // Each constraint determines one parameter.
+    let (data, parameters) =
+        (at.residuals.len() - residuals.constraints, free.saturating_sub(residuals.constraints));
+    let weighted = at.residuals.iter().zip(&residuals.weights).take(data).filter(|(_, weight)| **weight > 0.0);
+    let terms: Vec<_> = weighted.map(|(r, _)| residuals.loss.term(*r)).collect();
     let degrees_of_freedom = terms.len().checked_sub(parameters).filter(|d| *d > 0)?;
     let mean = |f: &dyn Fn(f64) -> f64| terms.iter().map(|t| f(t.influence_slope)).sum::<f64>() / terms.len() as f64;
     let curvature = mean(&|slope| slope);

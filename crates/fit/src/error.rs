@@ -1,6 +1,8 @@
 //! Errors of fits.
 
 use crate::{ModelFailure, NullSpace};
+use contact_geom::UnknownParameter;
+use discrete_herglotz::InputError;
 use thiserror::Error;
 
 /// Invalid input to a fit, or a model that cannot be evaluated.
@@ -122,6 +124,54 @@ pub enum FitError {
         parameters: Vec<f64>,
         /// The reason.
         failure: ModelFailure,
+    },
+    /// The problem of a motion is invalid.
+    #[error(transparent)]
+    Motion(InputError),
+    /// The Lagrangian has no parameter of this name.
+    #[error(transparent)]
+    LagrangianParameter(#[from] UnknownParameter),
+    /// A coordinate that does not exist.
+    #[error("there is no coordinate {index}; the coordinates are counted from 0 to {}", .count - 1)]
+    Coordinate {
+        /// The index.
+        index: usize,
+        /// The number of coordinates.
+        count: usize,
+    },
+    /// A variable that cannot be an unknown of a fit.
+    #[error(
+        "{variable} cannot be an unknown of a fit; choose among parameters, and positions, velocities and the action of \
+         the start"
+    )]
+    Unknown {
+        /// The variable.
+        variable: String,
+    },
+    /// The parameters of the Lagrangian cannot be set.
+    #[error("the parameters of the Lagrangian cannot be set; implement `Parametric::with_parameters`")]
+    FixedParameters,
+    /// A time of observation, or a node, is outside the span.
+    #[error("the time {index} is {t}; times must be finite and not before the start t0 = {t0}")]
+    Time {
+        /// Its index, counted from 0.
+        index: usize,
+        /// The time.
+        t: f64,
+        /// The time of the start.
+        t0: f64,
+    },
+    /// Nodes of multiple shooting are not in order between the start and the last observation.
+    #[error("the node {index} is at {t}; nodes must ascend strictly between the start and the last observation, {t0} and {t_end}")]
+    Node {
+        /// Its index, counted from 0.
+        index: usize,
+        /// Its time.
+        t: f64,
+        /// The time of the start.
+        t0: f64,
+        /// The time of the last observation.
+        t_end: f64,
     },
     /// The minimizer stopped for a reason that has nothing to do with the data.
     #[error("the minimizer stopped at {}: {reason}; scale the parameters or the data", named_values(names, parameters))]

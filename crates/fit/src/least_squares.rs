@@ -17,11 +17,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// is continued over the free parameters until nothing changes. At the solution the conditions of Karush, Kuhn and Tucker
 /// hold with the tolerances of an unconstrained fit, and convergence is as fast. (A transformation of the parameters
 /// would make the Jacobian singular where a bound is active.) The model is never evaluated outside the bounds.
-#[derive(Clone, Debug)]
 pub struct LeastSquares<'a, M> {
-    residuals: Residuals<'a, M>,
-    bounds: Bounds,
-    settings: Settings,
+    pub(crate) residuals: Residuals<'a, M>,
+    pub(crate) bounds: Bounds,
+    pub(crate) settings: Settings,
+}
+
+impl<M> Clone for LeastSquares<'_, M> {
+    fn clone(&self) -> Self {
+        let LeastSquares { residuals, bounds, settings } = self;
+        LeastSquares { residuals: residuals.clone(), bounds: bounds.clone(), settings: *settings }
+    }
 }
 
 impl<'a, M: Model> LeastSquares<'a, M> {
@@ -40,7 +46,7 @@ impl<'a, M: Model> LeastSquares<'a, M> {
         check_count("measured values", data.len(), model.value_count())?;
         let (bounds, settings) = (Bounds::none(names.len()), Settings::new(names.len()));
         let weights = vec![1.0; data.len()];
-        let residuals = Residuals { model, names, data: data.to_vec(), weights, loss: Loss::Linear };
+        let residuals = Residuals { model, names, data: data.to_vec(), weights, loss: Loss::Linear, constraints: 0 };
         Ok(LeastSquares { residuals, bounds, settings })
     }
 

@@ -162,8 +162,8 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Trial<'_, M> {
         let count = self.residuals.data.len();
         match &*self.current.borrow() {
             Some(evaluation) => {
-                let loss = self.residuals.loss;
-                Some(DVector::from_iterator(count, evaluation.residuals.iter().map(|r| loss.term(*r).root)))
+                let root = |i: usize| self.residuals.loss_of(i).term(evaluation.residuals[i]).root;
+                Some(DVector::from_fn(count, |i, _| root(i)))
             }
             None => {
                 let norm = BARRIER.max(1e3 * (2.0 * self.best.borrow().cost).sqrt());
@@ -194,7 +194,8 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Trial<'_, M> {
             }
         };
         let jacobian = evaluation.jacobian.as_ref()?;
-        let slopes: Vec<f64> = evaluation.residuals.iter().map(|r| self.residuals.loss.term(*r).root_slope).collect();
+        let slope = |(i, r): (usize, &f64)| self.residuals.loss_of(i).term(*r).root_slope;
+        let slopes: Vec<f64> = evaluation.residuals.iter().enumerate().map(slope).collect();
         Some(DMatrix::from_fn(slopes.len(), self.free.len(), |i, j| {
             let index = self.free[j];
             if self.bounds.contains(index, self.unknowns[j]) { slopes[i] * jacobian[(i, index)] } else { 0.0 }

@@ -4,13 +4,22 @@ use crate::{FitError, Loss, Model, ModelFailure};
 use nalgebra::{DMatrix, DVector};
 
 /// `r_i(theta) = w_i (model_i(theta) - y_i)`, with the loss.
-#[derive(Clone, Debug)]
 pub(crate) struct Residuals<'a, M> {
     pub model: &'a M,
     pub names: Vec<String>,
     pub data: Vec<f64>,
     pub weights: Vec<f64>,
     pub loss: Loss,
+    /// The number of last residuals that are constraints: they are not data, and the loss does not apply to them.
+    pub constraints: usize,
+}
+
+impl<M> Clone for Residuals<'_, M> {
+    fn clone(&self) -> Self {
+        let Residuals { model, names, data, weights, loss, constraints } = self;
+        let (names, data, weights) = (names.clone(), data.clone(), weights.clone());
+        Residuals { model, names, data, weights, loss: *loss, constraints: *constraints }
+    }
 }
 
 /// Residuals at a point.
@@ -27,9 +36,14 @@ pub(crate) struct Evaluation {
 }
 
 impl<M: Model> Residuals<'_, M> {
-    /// The number of measured values with a weight.
+    /// The number of measured values with a weight, and of constraints.
     pub fn data_count(&self) -> usize {
         self.weights.iter().filter(|w| **w > 0.0).count()
+    }
+
+    /// The loss of a residual.
+    pub fn loss_of(&self, index: usize) -> Loss {
+        if index + self.constraints < self.data.len() { self.loss } else { Loss::Linear }
     }
 
     pub fn evaluate(&self, theta: &[f64], with_jacobian: bool) -> Result<Evaluation, ModelFailure> {
@@ -45,7 +59,7 @@ impl<M: Model> Residuals<'_, M> {
                 return Err(ModelFailure::Value { index: i, value: values[i] });
             }
             residuals[i] = r;
-            cost += self.loss.cost(r);
+            cost += self.loss_of(i).cost(r);
         }
         if !f64::is_finite(cost) {
             return Err(ModelFailure::Undefined(format!("the cost is {cost}")));
@@ -70,12 +84,11 @@ impl<M: Model> Residuals<'_, M> {
     pub fn failed(&self, parameters: &[f64], failure: ModelFailure) -> FitError {
         FitError::Model { names: self.names.clone(), parameters: parameters.to_vec(), failure }
     }
-}
 
-impl Evaluation {
     /// The derivative of the cost with respect to each parameter, if the Jacobian has been computed.
-    pub fn gradient(&self, loss: Loss) -> Option<DVector<f64>> {
-        let influence = self.residuals.map(|r| loss.term(r).influence);
-        self.jacobian.as_ref().map(|jacobian| jacobian.tr_mul(&influence))
+    pub fn gradient(&self, at: &Evaluation) -> Option<DVector<f64>> {
+        let influence = |i: usize, r: f64| self.loss_of(i).term(r).influence;
+        let influence = DVector::from_fn(self.data.len(), |i, _| influence(i, at.residuals[i]));
+        at.jacobian.as_ref().map(|jacobian| jacobian.tr_mul(&influence))
     }
 }

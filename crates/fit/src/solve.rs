@@ -51,7 +51,7 @@ pub(crate) fn solve<M: Model>(
 
 /// The parameters at bounds beyond which the cost would decrease.
 fn held_at_bounds<M: Model>(residuals: &Residuals<'_, M>, bounds: &Bounds, at: &Evaluation) -> Vec<Option<Bound>> {
-    let gradient = at.gradient(residuals.loss);
+    let gradient = residuals.gradient(at);
     let derivative = |i: usize| gradient.as_ref().map_or(0.0, |g| g[i]);
     (0..at.theta.len()).map(|i| bounds.holds(i, at.theta[i], derivative(i))).collect()
 }
@@ -94,7 +94,7 @@ fn result<M: Model>(
         evaluations,
         rank: svd.rank(),
         degrees_of_freedom: residuals.data_count().saturating_sub(free.len()),
-        residual_variance: residual_variance(&best, residuals.loss, &residuals.weights, free.len()),
+        residual_variance: residual_variance(residuals, &best, free.len()),
         cofactors,
     })
 }
@@ -114,7 +114,7 @@ fn numerical<M: Model>(residuals: &Residuals<'_, M>, at: &Evaluation, reason: St
     FitError::Numerical { names: residuals.names.clone(), parameters: at.theta.clone(), reason }
 }
 
-fn check<M: Model>(residuals: &Residuals<'_, M>, bounds: &Bounds, start: &[f64]) -> Result<(), FitError> {
+pub(crate) fn check<M: Model>(residuals: &Residuals<'_, M>, bounds: &Bounds, start: &[f64]) -> Result<(), FitError> {
     if start.len() != residuals.names.len() {
         let expected = residuals.names.len();
         return Err(FitError::Count { what: "parameters of the start", found: start.len(), expected });
