@@ -4,7 +4,7 @@ mod accuracy;
 mod any_integrator;
 mod builder;
 mod checks;
-mod discretization;
+pub(crate) mod discretization;
 mod end_within_step;
 mod findings;
 mod integrate;
@@ -16,6 +16,7 @@ mod planning;
 mod request;
 mod resume_state;
 
+pub(crate) use motion::Motion;
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use builder::Run;
 pub(crate) use checks::energy::may_drift;

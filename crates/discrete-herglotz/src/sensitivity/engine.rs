@@ -14,7 +14,7 @@ use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::Problem;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Parametric};
+use contact_geom::{ChartVector, Parametric, PhasePoint};
 
 /// The tangent `(dq, dp, dz)` of a motion along one variable.
 pub(crate) struct Column<const N: usize> {
@@ -45,6 +45,32 @@ impl<const N: usize> Column<N> {
         Column { dt0, dh, ..self }
     }
 
+    /// The derivative of the time after this number of steps.
+    pub fn time_after(&self, steps: usize) -> f64 {
+        self.dt0 + steps as f64 * self.dh
+    }
+
+    /// The column for a step from the end of this number of steps to a fixed time.
+    pub fn for_row(&self, steps: usize) -> Self {
+        let dt0 = self.time_after(steps);
+        Self::copied(self).of_times(dt0, -dt0)
+    }
+
+    /// The column at a fixed time, where the state after this number of steps has these rates.
+    pub fn at_fixed_time(&self, steps: usize, rates: &PhasePoint<N>) -> Self {
+        let (mut column, dt) = (Self::copied(self), self.time_after(steps));
+        column.q -= rates.q * dt;
+        column.p -= rates.p * dt;
+        column.z -= rates.z * dt;
+        column
+    }
+
+    /// The same tangent without an initial guess of its rates.
+    fn copied(&self) -> Self {
+        let Column { q, p, z, parameter, dt0, dh, .. } = *self;
+        Column { parameter, dt0, dh, ..Column::new(q, p, z) }
+    }
+
     /// The largest component.
     pub fn size(&self) -> f64 {
         contact_geom::numbers::max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
@@ -65,17 +91,43 @@ pub(crate) struct Covector<const N: usize> {
 }
 
 impl<const N: usize> Covector<N> {
-    pub fn new(of_state: &ChartVector<N>, parameters: usize) -> Self {
+    pub fn new(of_state: &ChartVector<N>, parameters: Vec<f64>) -> Self {
         Covector {
             q: of_state.x,
             p: of_state.y,
             z: of_state.z,
-            parameters: vec![0.0; parameters],
+            parameters,
             time: 0.0,
             step: 0.0,
             rates: StageTangent::ZERO,
             warm: false,
         }
+    }
+
+    /// Adds a covector at the start of a shortened step from the state after this number of steps to a fixed time.
+    pub fn add_row(&mut self, row: &Self, steps: usize) {
+        self.add_state(&ChartVector { x: row.q, y: row.p, z: row.z }, &row.parameters);
+        // The length of the step decreases as its start moves.
+        self.add_time(row.time - row.step, steps);
+    }
+
+    /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
+    pub fn add_at_fixed_time(&mut self, of_state: &ChartVector<N>, parameters: &[f64], rates: &PhasePoint<N>, steps: usize) {
+        self.add_state(of_state, parameters);
+        self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
+    }
+
+    fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
+        self.q += of_state.x;
+        self.p += of_state.y;
+        self.z += of_state.z;
+        self.parameters.iter_mut().zip(parameters).for_each(|(sum, of)| *sum += of);
+    }
+
+    /// Adds a derivative in the time after this number of steps.
+    fn add_time(&mut self, of_time: f64, steps: usize) {
+        self.time += of_time;
+        self.step += steps as f64 * of_time;
     }
 
     /// The largest component.
@@ -111,6 +163,19 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
             of_parameters: ParameterDerivatives::new(lagrangian),
             timed: !problem.structure.autonomous,
         }
+    }
+
+    /// An engine for a shortened step, which is kept in `engine`.
+    pub fn of_row<'e>(
+        engine: &'e mut Option<Self>,
+        problem: &Problem<'a, L, N>,
+        step: &SolvedStages<N>,
+        direction: Direction,
+    ) -> &'e mut Self {
+        let engine = engine.get_or_insert_with(|| Engine::new(problem, step.s, step.h, direction));
+        engine.forward = StepMaps::new(step.s, step.h, Direction::Forward);
+        engine.maps = StepMaps::new(step.s, step.h, direction);
+        engine
     }
 
     /// Evaluates the derivatives at the stages of a step, for the columns or covectors that are carried over it next.

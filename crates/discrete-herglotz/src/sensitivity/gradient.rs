@@ -1,17 +1,21 @@
 //! Gradients of functions of the end of a run, by the adjoint.
 
-use crate::run::{Outcome, Plan, Run, Until};
+use crate::run::discretization::Discretization;
+use crate::run::{Motion, Outcome, Plan, Row, Rows, Run, Until};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
 use crate::sensitivity::engine::{Covector, Engine};
-use crate::sensitivity::kept_states::{KeptStates, for_each_block};
+use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::row_times::{check_times, is_same_time};
 use crate::sensitivity::solved_stages::SolvedStages;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::tangent::{check_tangent, no_tangent};
-use crate::{Problem, Status, StepError, Stepper};
+use crate::{InputError, Problem, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::max_or_nan;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
+use std::ops::Range;
 
 /// The gradient of a number that depends on the end of a run, with respect to all variables of the run; see
 /// [`Variable`](crate::sensitivity::Variable) for what is fixed.
@@ -118,6 +122,42 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     }
 }
 
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
+    /// The same for a loss of the states at these times, which are in the order of the run: a function with its partial
+    /// derivatives in each of them. The times are fixed, except the end of the run.
+    ///
+    /// # Errors
+    /// Those of [`gradient`](Self::gradient) and of [`RecordedRun::pullback_at`].
+    pub fn gradient_at(
+        self,
+        times: &[f64],
+        loss: impl FnOnce(&[EndState<N>]) -> (f64, Vec<EndCovector<N>>),
+        until: Until,
+    ) -> Result<LossGradient<N>, SensitivityError> {
+        let run = self.differentiable()?;
+        let plan = run.plan(until)?;
+        check_tangent(&plan)?;
+        let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
+        let outcome = run.observed(&plan, &mut both)?;
+        let (kept, rows) = both;
+        let recorded = RecordedRun { plan, outcome, kept };
+        if outcome.status != Status::Completed {
+            return Ok(LossGradient { outcome, loss: None });
+        }
+        let state = |row: &Row<N>| {
+            let v = row.v.unwrap_or_else(|| SVector::from_element(f64::NAN));
+            EndState { t: row.t, q: row.q, v, p: row.p, z: row.z.unwrap_or(f64::NAN) }
+        };
+        let states: Vec<EndState<N>> = rows.rows.iter().map(state).collect();
+        let (value, covectors) = loss(&states);
+        if !(value.is_finite() && covectors.iter().all(EndCovector::is_finite)) {
+            return Err(SensitivityError::Loss { value });
+        }
+        let gradient = recorded.pullback_at(times, &covectors)?;
+        Ok(LossGradient { outcome, loss: Some((value, gradient)) })
+    }
+}
+
 impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     /// The outcome of the run.
     pub fn outcome(&self) -> &Outcome<N> {
@@ -145,31 +185,59 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     /// # Errors
     /// Those of [`pullback`](Self::pullback).
     pub fn pullbacks(&self, covectors: &[EndCovector<N>]) -> Result<Vec<Gradient<N>>, SensitivityError> {
+        self.pull(covectors, &[], &[])
+    }
+
+    /// The gradient of a number with these partial derivatives in the states at these times, which are in the order of
+    /// the run. The times are fixed, except the end of the run.
+    ///
+    /// # Errors
+    /// Those of [`pullback`](Self::pullback); [`InputError::Times`](crate::InputError::Times),
+    /// [`InputError::Count`](crate::InputError::Count) where there are fewer covectors than times.
+    pub fn pullback_at(&self, times: &[f64], covectors: &[EndCovector<N>]) -> Result<Gradient<N>, SensitivityError> {
+        let steps = &self.plan.steps;
+        check_times(times, (steps.problem.t0, steps.t_end))?;
+        if covectors.len() != times.len() {
+            let (found, least) = (covectors.len(), times.len());
+            return Err(InputError::Count { what: "the number of covectors", least, found }.into());
+        }
+        let (mut end, mut inner) = (EndCovector::zero(), times.len());
+        if let (Some(t), Some(last)) = (times.last(), covectors.last())
+            && is_same_time(*t, self.outcome.t)
+        {
+            (end, inner) = (*last, inner - 1);
+        }
+        let mut all = self.pull(&[end], &times[..inner], &covectors[..inner])?;
+        all.pop().ok_or(SensitivityError::Step { step: 0, cause: StepError::NonFinite })
+    }
+
+    /// Carries covectors of the end back to the start, and adds those of rows to the first of them.
+    fn pull(
+        &self,
+        of_end: &[EndCovector<N>],
+        times: &[f64],
+        of_rows: &[EndCovector<N>],
+    ) -> Result<Vec<Gradient<N>>, SensitivityError> {
         let steps = &self.plan.steps;
         let problem = steps.problem;
         let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
         let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
         let x = VelocityPoint { q: end.q, v: end.v, z: end.z };
         let of_velocity = VelocityDependence::at(problem, end.t, &x).map_err(|e| failed(self.outcome.steps, e))?;
-        let count = problem.lagrangian.parameter_count();
-        // The derivatives in parameters and time that the velocity at the end has for a fixed state (q, p, z).
-        let mut explicit_times = Vec::with_capacity(covectors.len());
-        let mut all: Vec<Covector<N>> = covectors
-            .iter()
-            .map(|of_end| {
-                let (of_state, parameters, time) = of_velocity.pull(of_end);
-                explicit_times.push(time);
-                let mut covector = Covector::new(&of_state, count);
-                covector.parameters = parameters;
-                covector
-            })
-            .collect();
+        // The derivatives in the end time for a fixed state (q, p, z).
+        let mut explicit_times = Vec::with_capacity(of_end.len());
+        let mut all: Vec<Covector<N>> = Vec::with_capacity(of_end.len());
+        for covector in of_end {
+            let (of_state, parameters, time) = of_velocity.pull(covector);
+            explicit_times.push(time);
+            all.push(Covector::new(&of_state, parameters));
+        }
         let mut largest: Vec<f64> = all.iter().map(Covector::size).collect();
-        let stages = steps.info.collocation.unwrap_or(1);
-        let mut engine = Engine::new(problem, stages, steps.h, Direction::Backward);
+        let mut engine = Engine::new(problem, steps.stages(), steps.h, Direction::Backward);
+        let mut rows = RowCovectors { steps, times, of_rows, engine: None };
         let mut stepper = self.plan.stepper()?;
-        let mut block: Vec<SolvedStages<N>> = Vec::new();
-        let mut work = |stepper: &mut dyn Stepper<N>, range: std::ops::Range<usize>| {
+        let mut block: Vec<SolvedStages<N>> = Vec::with_capacity(BLOCK);
+        let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
             block.clear();
             for k in range.clone() {
                 stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
@@ -179,7 +247,10 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
                 engine.prepare(step).map_err(|cause| failed(k, cause))?;
                 for (covector, largest) in all.iter_mut().zip(&mut largest) {
                     engine.pull(step, k, covector).map_err(|cause| failed(k, cause))?;
-                    *largest = contact_geom::numbers::max_or_nan(*largest, covector.size());
+                    *largest = max_or_nan(*largest, covector.size());
+                }
+                if let Some(first) = all.first_mut() {
+                    rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
                 }
             }
             Ok(())
@@ -188,12 +259,47 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
         }
         let taken = self.outcome.steps;
-        Ok(all
-            .iter()
-            .zip(largest)
-            .zip(explicit_times)
-            .map(|((covector, largest), time)| gradient(problem, covector, largest, time, taken))
-            .collect())
+        let gradients = all.iter().zip(largest).zip(explicit_times);
+        Ok(gradients.map(|((covector, largest), time)| gradient(problem, covector, largest, time, taken)).collect())
+    }
+}
+
+/// The covectors of rows that are not yet added, from the last to the first.
+struct RowCovectors<'r, 'p, L, const N: usize> {
+    steps: &'r Discretization<'p, L, N>,
+    times: &'r [f64],
+    of_rows: &'r [EndCovector<N>],
+    engine: Option<Engine<'p, L, N>>,
+}
+
+impl<L: Parametric<N>, const N: usize> RowCovectors<'_, '_, L, N> {
+    /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start.
+    fn add(&mut self, step: &SolvedStages<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+        let problem = self.steps.problem;
+        while let (Some((t, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) {
+            let passed = if step.h < 0.0 { *t <= step.t } else { *t >= step.t };
+            if is_same_time(*t, step.t) {
+                let near = SVector::from_fn(|d, _| step.v[d].0[0]);
+                let v = self.steps.velocity(step.t, &step.start, Some(near))?;
+                let x = VelocityPoint { q: step.start.q, v, z: step.start.z };
+                let (of_state, parameters, _) = VelocityDependence::at(problem, step.t, &x)?.pull(covector);
+                let rates = self.steps.rates(step.t, &step.start, Some(v))?;
+                to.add_at_fixed_time(&of_state, &parameters, &rates, k);
+            } else if passed {
+                let (short, state, v) = self.steps.shortened(step, *t)?;
+                let x = VelocityPoint { q: state.q, v, z: state.z };
+                let (of_state, parameters, _) = VelocityDependence::at(problem, *t, &x)?.pull(covector);
+                let engine = Engine::of_row(&mut self.engine, problem, &short, Direction::Backward);
+                engine.prepare(&short)?;
+                let mut row = Covector::new(&of_state, parameters);
+                engine.pull(&short, 0, &mut row)?;
+                to.add_row(&row, k);
+            } else {
+                break;
+            }
+            (self.times, self.of_rows) = (times, of_rows);
+        }
+        Ok(())
     }
 }
 

@@ -1,14 +1,16 @@
 //! Forward derivatives of a run.
 
-use crate::run::{Observer, Outcome, OutputRequest, Run, StepView, Stop, Until};
-use crate::sensitivity::SensitivityError;
+use crate::run::{Motion, Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
 use crate::sensitivity::end_state::VelocityDependence;
 use crate::sensitivity::engine::{Column, Engine};
+use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::variable::Variable;
-use crate::{Problem, Status, StepError};
+use crate::sensitivity::{EndState, SensitivityError, SolvedStages};
+use crate::{InputError, Problem, Status, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Parametric, VelocityPoint};
+use contact_geom::numbers::max_or_nan;
+use contact_geom::{Parametric, PhasePoint, VelocityPoint};
 use std::ops::ControlFlow;
 
 /// The derivatives of the final state of a run with respect to variables, one column for each.
@@ -19,9 +21,21 @@ pub struct Tangent<const N: usize> {
     pub outcome: Outcome<N>,
     /// The derivatives, in the order of the variables.
     pub columns: Vec<StateDerivative<N>>,
+    /// The states at the requested times, each with its derivatives.
+    pub rows: Vec<TangentRow<N>>,
     /// The largest derivative along the run divided by the largest one at its end, at least one: round-off of the
     /// derivatives is amplified by it.
     pub growth: f64,
+}
+
+/// The state at a time with its derivatives, one column for each variable. The time is fixed, unless it is the end of the
+/// run, which may itself be a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TangentRow<const N: usize> {
+    /// The state.
+    pub state: EndState<N>,
+    /// The derivatives, in the order of the variables.
+    pub columns: Vec<StateDerivative<N>>,
 }
 
 /// The derivative of a state with respect to one variable.
@@ -38,39 +52,90 @@ pub struct StateDerivative<const N: usize> {
 }
 
 /// Carries columns along a run.
-struct Columns<'a, L, const N: usize> {
-    engine: Engine<'a, L, N>,
+struct Columns<'r, 'p, L, const N: usize> {
+    plan: &'r Plan<'p, L, N>,
+    engine: Engine<'p, L, N>,
+    /// For the shortened steps to rows.
+    row_engine: Option<Engine<'p, L, N>>,
     columns: Vec<Column<N>>,
+    times: RowTimes,
+    rows: Vec<TangentRow<N>>,
     largest: f64,
     taken: usize,
-    failure: Option<Failure>,
+    failure: Option<SensitivityError>,
 }
 
-/// The reason why columns are not carried on.
-enum Failure {
-    /// The stepper does not give its stages.
-    NoStages,
-    Step(usize, StepError),
-}
-
-impl<L: Parametric<N>, const N: usize> Columns<'_, L, N> {
-    fn push(&mut self, at: &StepView<'_, N>) -> Result<(), Failure> {
+impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
+    fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
-        let step = at.stepper.solved_stages().ok_or(Failure::NoStages)?;
-        let failed = |cause| Failure::Step(k, cause);
+        let step = at.stepper.solved_stages().ok_or_else(|| no_tangent(self.plan, ""))?;
+        self.rows_within(&step, at)?;
+        let failed = |cause| SensitivityError::Step { step: k, cause };
         self.engine.prepare(&step).map_err(failed)?;
         for column in &mut self.columns {
             self.engine.push(&step, k, column).map_err(failed)?;
-            self.largest = contact_geom::numbers::max_or_nan(self.largest, column.size());
+            self.largest = max_or_nan(self.largest, column.size());
         }
         self.taken = at.k;
+        self.row_at_end(at)
+    }
+
+    /// The rows between the ends of the last step, from its start by shortened steps.
+    fn rows_within(&mut self, step: &SolvedStages<N>, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+        let k = at.k.saturating_sub(1);
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        let steps = &self.plan.steps;
+        while let Some(t) = self.times.next_within((step.t, at.t)) {
+            let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
+            let engine = Engine::of_row(&mut self.row_engine, steps.problem, &short, Direction::Forward);
+            engine.prepare(&short).map_err(failed)?;
+            let mut columns = Vec::with_capacity(self.columns.len());
+            for column in &self.columns {
+                let mut column = column.for_row(k);
+                engine.push(&short, 0, &mut column).map_err(failed)?;
+                columns.push(column);
+            }
+            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
+            self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);
+        }
+        Ok(())
+    }
+
+    /// The row at the end of the last step, if its time is requested.
+    fn row_at_end(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+        if self.times.next_at(at.t, at.last).is_none() {
+            return Ok(());
+        }
+        let failed = |cause| SensitivityError::Step { step: at.k, cause };
+        let v = at.velocity().map_err(failed)?;
+        let PhasePoint { q, p, z } = at.state;
+        let state = EndState { t: at.t, q, v, p, z };
+        let problem = self.plan.steps.problem;
+        self.rows.push(if at.last && at.k > 0 {
+            row(problem, state, &self.columns, |column| column.time_after(at.k))
+        } else {
+            // The end of the step moves with the times of the run, but not the row.
+            let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
+            let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
+            row(problem, state, &columns, |_| 0.0)
+        }
+        .map_err(failed)?);
         Ok(())
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, L, N> {
+impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
+    }
+
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.times.check(info)
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let row = self.row_at_end(at);
+        self.end_on_failure(row)
     }
 
     fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
@@ -78,7 +143,14 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, L, N> {
         if at.in_failed_step || at.k <= self.taken {
             return ControlFlow::Continue(());
         }
-        match self.push(at) {
+        let pushed = self.push(at);
+        self.end_on_failure(pushed)
+    }
+}
+
+impl<L, const N: usize> Columns<'_, '_, L, N> {
+    fn end_on_failure(&mut self, result: Result<(), SensitivityError>) -> ControlFlow<Stop<N>> {
+        match result {
             Ok(()) => ControlFlow::Continue(()),
             Err(failure) => {
                 self.failure = Some(failure);
@@ -86,6 +158,22 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, L, N> {
             }
         }
     }
+}
+
+/// A row with the derivatives of its velocity; `dt` are the derivatives of its time.
+fn row<L: Parametric<N>, const N: usize>(
+    problem: &Problem<'_, L, N>,
+    state: EndState<N>,
+    columns: &[Column<N>],
+    dt: impl Fn(&Column<N>) -> f64,
+) -> Result<TangentRow<N>, StepError> {
+    let x = VelocityPoint { q: state.q, v: state.v, z: state.z };
+    let of_velocity = VelocityDependence::at(problem, state.t, &x)?;
+    let derivative = |column: &Column<N>| {
+        let Column { q, p, z, parameter, .. } = *column;
+        StateDerivative { q, v: of_velocity.along(&q, &p, z, parameter, dt(column)), p, z }
+    };
+    Ok(TangentRow { state, columns: columns.iter().map(derivative).collect() })
 }
 
 impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
@@ -109,48 +197,70 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     /// integrator whose tangent is not implemented, and where the equations of a tangent cannot be solved. A run that
     /// ends early is reported as the status of the outcome.
     pub fn tangent(self, variables: &[Variable], until: Until) -> Result<Tangent<N>, SensitivityError> {
+        self.tangent_at(variables, &[], until)
+    }
+
+    /// The same with the states and derivatives at these times, which ascend, or descend for a run backward in time.
+    /// States between the ends of steps are those of [`Rows`](crate::Rows): of steps that end there.
+    ///
+    /// # Errors
+    /// Those of [`tangent`](Self::tangent), and [`InputError::Times`](crate::InputError::Times) for times that are not
+    /// in order or outside of the span of the run.
+    pub fn tangent_at(
+        self,
+        variables: &[Variable],
+        times: &[f64],
+        until: Until,
+    ) -> Result<Tangent<N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
-        let problem = plan.steps.problem;
         check_tangent(&plan)?;
+        let problem = plan.steps.problem;
         let columns = variables.iter().map(|v| v.column(problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
-        let stages = plan.steps.info.collocation.unwrap_or(1);
-        let engine = Engine::new(problem, stages, plan.step_size(), Direction::Forward);
-        let mut carried = Columns { engine, columns, largest: 0.0, taken: 0, failure: None };
+        let mut carried = Columns {
+            plan: &plan,
+            engine: Engine::new(problem, plan.steps.stages(), plan.step_size(), Direction::Forward),
+            row_engine: None,
+            columns,
+            times: RowTimes::new(times),
+            rows: Vec::with_capacity(times.len()),
+            largest: 0.0,
+            taken: 0,
+            failure: None,
+        };
         let outcome = run.observed(&plan, &mut carried)?;
-        match carried.failure {
-            None => {}
-            Some(Failure::NoStages) => return Err(no_tangent(&plan, "")),
-            Some(Failure::Step(step, cause)) => return Err(SensitivityError::Step { step, cause }),
+        let Columns { columns, rows, largest, failure, .. } = carried;
+        match failure {
+            None => Ok(tangent(problem, outcome, &columns, rows, largest)),
+            Some(failure) => Err(failure),
         }
-        Ok(tangent(problem, outcome, &carried, plan.count()))
     }
 }
 
 fn tangent<L: Parametric<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     outcome: Outcome<N>,
-    carried: &Columns<'_, L, N>,
-    steps: usize,
+    columns: &[Column<N>],
+    rows: Vec<TangentRow<N>>,
+    largest: f64,
 ) -> Tangent<N> {
     let nan = SVector::from_element(f64::NAN);
-    let of_velocity = outcome.v.and_then(|v| {
-        let x = VelocityPoint { q: outcome.q, v, z: outcome.z_or_start };
-        VelocityDependence::at(problem, outcome.t, &x).ok()
+    let Outcome { status, t, q, p, z_or_start: z, .. } = outcome;
+    let of_state = |column: &Column<N>| StateDerivative { q: column.q, v: nan, p: column.p, z: column.z };
+    let last = outcome.v.filter(|_| status == Status::Completed).and_then(|v| {
+        row(problem, EndState { t, q, v, p, z }, columns, |column| column.time_after(outcome.steps)).ok()
     });
-    let whole = outcome.status == Status::Completed;
-    let columns: Vec<_> = carried.columns.iter().map(|column| {
-        let dt = column.dt0 + steps as f64 * column.dh;
-        let v = of_velocity.as_ref().filter(|_| whole).map_or(nan, |of| of.along(&column.q, &column.p, column.z, column.parameter, dt));
-        StateDerivative { q: column.q, v, p: column.p, z: column.z }
-    }).collect();
-    let last = carried.columns.iter().fold(0.0, |m, column| contact_geom::numbers::max_or_nan(m, column.size()));
-    let growth = if carried.largest > last { carried.largest / last } else { 1.0 };
-    Tangent { outcome, columns, growth }
+    let size = columns.iter().fold(0.0, |m, column| max_or_nan(m, column.size()));
+    Tangent {
+        outcome,
+        columns: last.map_or_else(|| columns.iter().map(of_state).collect(), |row| row.columns),
+        rows,
+        growth: if largest > size { largest / size } else { 1.0 },
+    }
 }
 
 /// Checks that the integrator of a plan has a tangent.
-pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &crate::Plan<'_, L, N>) -> Result<(), SensitivityError> {
+pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>) -> Result<(), SensitivityError> {
     let info = &plan.steps.info;
     if info.collocation.is_none() || info.in_transformed_time || info.divides {
         return Err(no_tangent(plan, ""));
@@ -161,6 +271,6 @@ pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &crate::Plan
     Ok(())
 }
 
-pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(plan: &crate::Plan<'_, L, N>, case: &'static str) -> SensitivityError {
+pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>, case: &'static str) -> SensitivityError {
     SensitivityError::NoTangent { method: plan.steps.info.name.clone(), case }
 }

@@ -1,0 +1,81 @@
+//! Derivatives with applied forces and their parameters.
+
+use crate::gradients::runs::Case;
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, Pendulum, QuadraticInZ, System};
+use contact_geom::{Force, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
+
+/// A force of time, positions, velocities and action, that no structure simplifies, with two parameters.
+#[derive(Clone, Copy, Debug)]
+struct Stirring {
+    a: f64,
+    b: f64,
+}
+
+fn stirring<const N: usize, T: Scalar>([a, b]: [T; 2], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+    SVector::from_fn(|i, _| {
+        let next = x.v[(i + 1) % N];
+        a * (t + x.q[i]).sin() * x.z.cos() - b * x.v[i] * (next * next + 1.0) + a * b * next * x.q[i]
+    })
+}
+
+impl<const N: usize> Force<N> for Stirring {
+    fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        stirring([self.a, self.b].map(T::from), t, x)
+    }
+}
+
+impl<const N: usize> ParametricForce<N> for Stirring {
+    fn parameter_names(&self) -> Vec<String> {
+        ["a", "b"].map(String::from).into()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        vec![self.a, self.b]
+    }
+    fn parameter_count(&self) -> usize {
+        2
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        let [a, b] = *theta else { return None };
+        Some(Stirring { a, b })
+    }
+    fn value_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        stirring([theta[0], theta[1]], t, x)
+    }
+}
+
+/// As for the systems of the catalogue, with a force.
+#[test]
+fn a_general_force() {
+    fn run<const N: usize, S: System<N> + Clone>(system: &S) {
+        let forced = Forced { lagrangian: system.clone(), force: Stirring { a: 0.4, b: 0.3 } };
+        for stages in [1, 2, 3, 5, 8, 12, 16] {
+            let (t0, t_end, steps) = (0.3, 1.1, 4);
+            let case =
+                Case { lagrangian: &forced, t0, start: system.initial(), from_momentum: stages % 2 == 0, t_end, steps, stages };
+            case.compare(system.name(), 3e-13, 1e-8);
+        }
+    }
+    run(&Pendulum::default());
+    run(&QuadraticInZ::default());
+    run(&CoupledInZ::default());
+    run(&DoublePendulum::default());
+    run(&CoupledPlane::default());
+}
+
+/// Linear and quadratic drag; names that the Lagrangian has too are told apart.
+#[test]
+fn drag() {
+    let force = VelocityDrag { linear: [0.2, 0.1].into(), quadratic: 0.3 };
+    let forced = Forced { lagrangian: DoublePendulum::default(), force };
+    let start = VelocityPoint::new([1.0, 0.4], [0.5, -0.7], 0.2);
+    let case = Case { lagrangian: &forced, t0: 0.0, start, from_momentum: false, t_end: 0.8, steps: 4, stages: 8 };
+    case.compare("drag", 3e-13, 1e-8);
+    let nested = Forced { lagrangian: forced, force: Stirring { a: 0.4, b: 0.3 } };
+    assert_eq!(
+        Parametric::<2>::parameter_names(&nested)[4..],
+        ["gamma", "linear[0]", "linear[1]", "quadratic", "a", "b"]
+    );
+    let case = Case { lagrangian: &nested, t0: 0.0, start, from_momentum: false, t_end: 0.8, steps: 4, stages: 6 };
+    case.compare("drag and stirring", 3e-13, 1e-8);
+}
