@@ -10,8 +10,7 @@ use crate::residuals::{Evaluation, Residuals};
 /// Robust Statistics, 1981, section 7.6), which outliers do not inflate.
 pub(crate) fn residual_variance<M>(residuals: &Residuals<'_, M>, at: &Evaluation, free: usize) -> Option<f64> {
     // Each constraint determines one parameter.
-    let (data, parameters) =
-        (at.residuals.len() - residuals.constraints, free.saturating_sub(residuals.constraints));
+    let (data, parameters) = (at.residuals.len() - residuals.constraints, free.saturating_sub(residuals.constraints));
     let weighted = at.residuals.iter().zip(&residuals.weights).take(data).filter(|(_, weight)| **weight > 0.0);
     let terms: Vec<_> = weighted.map(|(r, _)| residuals.loss.term(*r)).collect();
     let degrees_of_freedom = terms.len().checked_sub(parameters).filter(|d| *d > 0)?;

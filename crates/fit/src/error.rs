@@ -162,7 +162,9 @@ pub enum FitError {
         t0: f64,
     },
     /// Nodes of multiple shooting are not in order between the start and the last observation.
-    #[error("the node {index} is at {t}; nodes must ascend strictly between the start and the last observation, {t0} and {t_end}")]
+    #[error(
+        "the node {index} is at {t}; nodes must ascend strictly between the start and the last observation, {t0} and {t_end}"
+    )]
     Node {
         /// Its index, counted from 0.
         index: usize,

@@ -30,6 +30,15 @@ impl<M> Clone for LeastSquares<'_, M> {
     }
 }
 
+impl<M> std::fmt::Debug for LeastSquares<'_, M> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Residuals { names, data, weights, loss, .. } = &self.residuals;
+        let mut fields = f.debug_struct("LeastSquares");
+        fields.field("names", names).field("data", data).field("weights", weights).field("loss", loss);
+        fields.field("bounds", &self.bounds).field("settings", &self.settings).finish_non_exhaustive()
+    }
+}
+
 impl<'a, M: Model> LeastSquares<'a, M> {
     /// The fit of the values of a model to measured ones, with weights 1.
     ///

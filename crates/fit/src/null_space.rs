@@ -63,6 +63,10 @@ impl ScaledSvd {
     pub fn new(mut jacobian: DMatrix<f64>, rank_tolerance: f64) -> Option<Self> {
         const MAX_ITERATIONS_PER_COLUMN: usize = 1000;
         let n = jacobian.ncols();
+        if n == 0 {
+            let (singular_values, v_t) = (DVector::zeros(0), DMatrix::zeros(0, 0));
+            return Some(ScaledSvd { norms: singular_values.clone(), singular_values, v_t, rank: 0 });
+        }
         let norms = DVector::from_iterator(n, jacobian.column_iter().map(|c| c.norm()));
         let norms = norms.map(|norm| if norm == 0.0 { 1.0 } else { norm });
         for (mut column, norm) in jacobian.column_iter_mut().zip(&norms) {

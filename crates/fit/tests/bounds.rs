@@ -23,8 +23,9 @@ fn data(p: [f64; 3]) -> Vec<f64> {
 fn assert_is_minimum(fit: &Fit, lower: &[f64], upper: &[f64]) {
     let gradient = fit.jacobian.tr_mul(&fit.residuals);
     let scale = fit.residuals.norm();
+    // The square root of the tolerance of the cost is 1e-7.
     for i in 0..fit.parameters.len() {
-        let size = 1e-10 * scale * fit.jacobian.column(i).norm();
+        let size = 3e-7 * scale * fit.jacobian.column(i).norm();
         match fit.at_bounds[i] {
             None => assert!(gradient[i].abs() <= size, "{fit}\n{gradient}"),
             Some(Bound::Lower) => assert!(fit.parameters[i] == lower[i] && gradient[i] >= -size, "{fit}"),
@@ -77,9 +78,9 @@ fn a_bound_that_is_active_at_the_solution_of_a_nonlinear_fit() {
     let fixed = problem.clone().bounds("offset", 0.0, 0.0).unwrap().solve(&[1.0, 1.0, 0.0]).unwrap();
     assert_eq!(fixed.at_bounds[2], Some(Bound::Fixed));
     for i in 0..2 {
-        assert!((bounded.parameters[i] / fixed.parameters[i] - 1.0).abs() < 1e-9);
+        assert!((bounded.parameters[i] / fixed.parameters[i] - 1.0).abs() < 1e-7);
         let (a, b) = (bounded.standard_errors()[i].unwrap(), fixed.standard_errors()[i].unwrap());
-        assert!((a / b - 1.0).abs() < 1e-9);
+        assert!((a / b - 1.0).abs() < 1e-7);
     }
     assert_eq!(bounded.standard_error("offset"), None);
     assert_eq!((bounded.rank, bounded.degrees_of_freedom), (2, 18));

@@ -53,7 +53,7 @@ fn exact_data_give_the_parameters_to_round_off() {
     for (found, expected) in fit.parameters.iter().zip(truth) {
         assert!((found / expected - 1.0).abs() < 1e-13, "{fit}");
     }
-    assert!(fit.iterations <= 12, "{fit}");
+    assert!(fit.iterations <= 16, "{fit}");
     assert_eq!(fit.parameter("b1"), Some(fit.parameters[0]));
     assert_eq!(fit.parameter("b3"), None);
 }

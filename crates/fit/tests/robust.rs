@@ -46,7 +46,7 @@ fn outliers_do_not_move_the_parameters() {
     let scale = 0.03;
     let [linear, huber, soft, cauchy] =
         [Loss::Linear, Loss::Huber { scale }, Loss::SoftL1 { scale }, Loss::Cauchy { scale }].map(error);
-    assert!(linear > 0.2 && huber < 0.06 && soft < 0.06 && cauchy < 0.005, "{linear} {huber} {soft} {cauchy}");
+    assert!(linear > 0.2 && huber < 0.06 && soft < 0.06 && cauchy < 0.015, "{linear} {huber} {soft} {cauchy}");
 }
 
 #[test]

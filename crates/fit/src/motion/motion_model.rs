@@ -1,11 +1,11 @@
 //! The model of observed quantities of a motion.
 
 use crate::motion::observed::Observed;
-use crate::motion::tangent_rows::{StepChoice, TangentRow, tangent_rows};
+use crate::motion::tangent_rows::{StepChoice, tangent_rows};
 use crate::{FitError, Model, ModelFailure};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Parametric, VelocityPoint};
-use discrete_herglotz::sensitivity::Variable;
+use discrete_herglotz::sensitivity::{TangentRow, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Until};
 
 /// Observed quantities of a motion as functions of parameters of its Lagrangian and of its start: the [`Model`] of a fit
@@ -17,7 +17,7 @@ use discrete_herglotz::{GaussCollocation, Problem, Until};
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::sensitivity::Variable;
+/// use discrete_herglotz::sensitivity::{TangentRow, Variable};
 /// use herglotz_fit::{LeastSquares, MotionModel, Observed};
 /// let times = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// let angles = [0.886, 0.579, 0.152, -0.294, -0.657, -0.850];
@@ -93,18 +93,7 @@ impl<'a, L: Parametric<N>, const N: usize> MotionModel<'a, L, N> {
         let steps = StepChoice { stages: 8, h: step_size };
         let (times, values, observed) = (Vec::new(), Vec::new(), Vec::new());
         let unknowns = unknowns.to_vec();
-        Ok(MotionModel {
-            lagrangian,
-            t0,
-            initial: start,
-            unknowns,
-            indices,
-            names,
-            steps,
-            times,
-            values,
-            observed,
-        })
+        Ok(MotionModel { lagrangian, t0, initial: start, unknowns, indices, names, steps, times, values, observed })
     }
 
     /// Sets the number of stages of contact Gauss collocation; by default 8.

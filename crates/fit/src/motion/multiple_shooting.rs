@@ -61,11 +61,7 @@ impl<'b, L: Parametric<N>, const N: usize> LeastSquares<'_, MotionModel<'b, L, N
         if let Some(index) = before.zip(nodes).position(|pair| !is_in_order(pair)) {
             return Err(FitError::Node { index, t: nodes[index], t0, t_end });
         }
-        Ok(MultipleShooting {
-            problem: self,
-            shooting: ShootingModel { motion, nodes: nodes.to_vec() },
-            states: None,
-        })
+        Ok(MultipleShooting { problem: self, shooting: ShootingModel { motion, nodes: nodes.to_vec() }, states: None })
     }
 }
 

@@ -1,11 +1,11 @@
 //! The model of multiple shooting: the motion in pieces, whose starts are unknowns.
 
 use crate::motion::motion_model::MotionModel;
-use crate::motion::tangent_rows::{TangentRow, state_variables};
+use crate::motion::tangent_rows::state_variables;
 use crate::{Model, ModelFailure};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{Parametric, VelocityPoint};
-use discrete_herglotz::sensitivity::Variable;
+use discrete_herglotz::sensitivity::{TangentRow, Variable};
 
 /// A motion in pieces that start at nodes. The unknowns are those of the motion, then the state `(q, v, z)` at each node;
 /// the values are those of the motion, then the matching defects: the end of each piece less the node there.
