@@ -1,5 +1,23 @@
 //! Fits of motions to data, and nonlinear least squares.
 //!
+//! A [`MotionModel`] is what was observed of a motion as a function of parameters of its Lagrangian and of its start; its
+//! Jacobian is that of the computed motion, exactly. [`LeastSquares`] fits it, or any other [`Model`], to data.
+//!
+//! ```
+//! use contact_geom::{VelocityPoint, systems::Pendulum};
+//! use discrete_herglotz::sensitivity::Variable;
+//! use herglotz_fit::{LeastSquares, MotionModel, Observed};
+//! let times = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
+//! let angles = [0.886, 0.579, 0.152, -0.294, -0.657, -0.850];
+//! let unknowns = [Variable::Parameter("gamma".into()), Variable::Position(0)];
+//! let guess = (Pendulum { gamma: -0.2 }, VelocityPoint::new([1.0], [0.0], 0.0));
+//! let model = MotionModel::new(&guess.0, 0.0, guess.1, &unknowns, 0.5)?.observe(Observed::Position(0), &times)?;
+//! println!("{}", LeastSquares::new(&model, &angles)?.solve(&model.start())?);
+//! # Ok::<(), herglotz_fit::FitError>(())
+//! ```
+//!
+//! # Least squares
+//!
 //! [`LeastSquares`] minimises `1/2 sum_i C^2 rho((r_i/C)^2)`, `r_i = w_i (model_i(theta) - y_i)`, by the method of
 //! Levenberg and Marquardt with exact Jacobians: with weights or standard deviations of the data, bounds of the
 //! parameters, robust losses, and several starts. A [`Fit`] has the parameters with their covariance, and says which
@@ -19,6 +37,12 @@
 //! assert!((fit.parameters[1] - 1.0).abs() < 0.02);
 //! # Ok::<(), herglotz_fit::FitError>(())
 //! ```
+//!
+//! # Long and chaotic motions
+//!
+//! The end of such a motion depends on its start so strongly that a fit ends in one of many local minima.
+//! [`LeastSquares::multiple_shooting`] cuts the motion at nodes whose states are further unknowns, and [several
+//! starts](LeastSquares::solve_from) find the best of several minima.
 
 mod bounds;
 mod covariance;
