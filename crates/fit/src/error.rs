@@ -19,13 +19,8 @@ pub enum FitError {
         name: String,
     },
     /// A name that is not that of a parameter.
-    #[error("there is no parameter `{name}`; the parameters are {}", known.join(", "))]
-    UnknownParameter {
-        /// The name.
-        name: String,
-        /// The names of all parameters.
-        known: Vec<String>,
-    },
+    #[error(transparent)]
+    UnknownParameter(#[from] UnknownParameter),
     /// A list whose length is wrong.
     #[error("{what}: there are {found}, but there must be {expected}")]
     Count {
@@ -128,9 +123,6 @@ pub enum FitError {
     /// The problem of a motion is invalid.
     #[error(transparent)]
     Motion(InputError),
-    /// The Lagrangian has no parameter of this name.
-    #[error(transparent)]
-    LagrangianParameter(#[from] UnknownParameter),
     /// A coordinate that does not exist.
     #[error("there is no coordinate {index}; the coordinates are counted from 0 to {}", .count - 1)]
     Coordinate {

@@ -4,6 +4,8 @@ use crate::bounds::Bounds;
 use crate::residuals::Residuals;
 use crate::settings::Settings;
 use crate::{Fit, FitError, Loss, Model, MultiStart, solve};
+use contact_geom::UnknownParameter;
+use contact_geom::support::nearest_name;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -53,7 +55,7 @@ impl<'a, M: Model> LeastSquares<'a, M> {
             return Err(FitError::NameTwice { name: name.clone() });
         }
         check_count("measured values", data.len(), model.value_count())?;
-        let (bounds, settings) = (Bounds::none(names.len()), Settings::new(names.len()));
+        let (bounds, settings) = (Bounds::none(names.len()), Settings::default());
         let weights = vec![1.0; data.len()];
         let residuals = Residuals { model, names, data: data.to_vec(), weights, loss: Loss::Linear, constraints: 0 };
         Ok(LeastSquares { residuals, bounds, settings })
@@ -91,7 +93,8 @@ impl<'a, M: Model> LeastSquares<'a, M> {
     pub fn bounds(mut self, name: &str, lower: f64, upper: f64) -> Result<Self, FitError> {
         let names = &self.residuals.names;
         let Some(index) = names.iter().position(|n| n == name) else {
-            return Err(FitError::UnknownParameter { name: name.to_owned(), known: names.clone() });
+            let nearest = nearest_name(name, names.iter().map(String::as_str)).map(str::to_owned);
+            return Err(UnknownParameter { name: name.to_owned(), nearest, known: names.clone() }.into());
         };
         self.bounds.set(name, index, lower, upper)?;
         Ok(self)
@@ -112,7 +115,7 @@ impl<'a, M: Model> LeastSquares<'a, M> {
     /// Sets the largest number of evaluations of the model; by default 100 for each parameter and one more.
     #[must_use]
     pub fn max_evaluations(mut self, count: usize) -> Self {
-        self.settings.max_evaluations = count;
+        self.settings.max_evaluations = Some(count);
         self
     }
 

@@ -45,11 +45,12 @@ pub(crate) fn minimize<M: Model>(
     progress: &mut Progress,
 ) -> End {
     let start = progress.best.clone();
+    let limit = settings.limit(start.theta.len());
     let trial = Trial {
         residuals,
         bounds,
         free,
-        limit: settings.max_evaluations,
+        limit,
         unknowns: DVector::from_iterator(free.len(), free.iter().map(|i| start.theta[*i])),
         current: RefCell::new(Some(start.clone())),
         best: RefCell::new(start),
@@ -58,7 +59,7 @@ pub(crate) fn minimize<M: Model>(
         iterations: Cell::new(progress.iterations),
         is_exhausted: false,
     };
-    let remaining = settings.max_evaluations.saturating_sub(progress.evaluations);
+    let remaining = limit.saturating_sub(progress.evaluations);
     let minimizer = LevenbergMarquardt::new()
         .with_ftol(settings.cost_tolerance)
         .with_xtol(settings.parameter_tolerance)

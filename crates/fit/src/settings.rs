@@ -12,7 +12,8 @@ pub(crate) struct Settings {
     pub gradient_tolerance: f64,
     /// The first step is at most this multiple of the norm of the scaled parameters.
     pub step_bound: f64,
-    pub max_evaluations: usize,
+    /// The largest number of evaluations, if it is set.
+    pub max_evaluations: Option<usize>,
     /// Singular values of the Jacobian below this multiple of the largest one are zero. Columns are scaled to norm 1
     /// before. Exact Jacobians have errors of 1e-15 to 1e-12; a combination of parameters whose error is 1e10 times
     /// larger than that of others is not determined in practice.
@@ -20,16 +21,22 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// The evaluations for each parameter and one more that `levenberg-marquardt` and MINPACK allow by default.
-    const EVALUATIONS_PER_PARAMETER: usize = 100;
+    /// The largest number of evaluations for this number of parameters.
+    pub fn limit(&self, parameters: usize) -> usize {
+        // What `levenberg-marquardt` and MINPACK allow by default.
+        const EVALUATIONS_PER_PARAMETER: usize = 100;
+        self.max_evaluations.unwrap_or(EVALUATIONS_PER_PARAMETER.saturating_mul(parameters.saturating_add(1)))
+    }
+}
 
-    pub fn new(parameters: usize) -> Self {
+impl Default for Settings {
+    fn default() -> Self {
         Settings {
             cost_tolerance: 1e-14,
             parameter_tolerance: 1e-12,
             gradient_tolerance: 1e-12,
             step_bound: 100.0,
-            max_evaluations: Self::EVALUATIONS_PER_PARAMETER.saturating_mul(parameters.saturating_add(1)),
+            max_evaluations: None,
             rank_tolerance: 1e-10,
         }
     }

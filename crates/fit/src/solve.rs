@@ -42,7 +42,7 @@ pub(crate) fn solve<M: Model>(
     };
     let status = match end {
         End::Converged(criterion) => FitStatus::Converged(criterion),
-        End::EvaluationLimit => FitStatus::EvaluationLimit { limit: settings.max_evaluations },
+        End::EvaluationLimit => FitStatus::EvaluationLimit { limit: settings.limit(start.len()) },
         End::Failed(theta, failure) => return Err(residuals.failed(&theta, failure)),
         End::Numerical(reason) => return Err(numerical(residuals, &progress.best, reason)),
     };

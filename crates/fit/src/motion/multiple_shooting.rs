@@ -47,6 +47,9 @@ impl<const N: usize> Display for ShootingFit<N> {
 /// The weights of matching defects, one fit each. With the last one a defect is about 1e-12 of a residual.
 const DEFECT_WEIGHTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 
+/// The tolerance of the cost of all fits but the last.
+const INTERMEDIATE_TOLERANCE: f64 = 1e-6;
+
 impl<'b, L: Parametric<N>, const N: usize> LeastSquares<'_, MotionModel<'b, L, N>> {
     /// The same fit by multiple shooting, with nodes at these times.
     ///
@@ -88,7 +91,7 @@ impl<L: Parametric<N>, const N: usize> MultipleShooting<'_, '_, L, N> {
         solve::check(residuals, bounds, start)?;
         let states = match &self.states {
             Some(states) => states.clone(),
-            None => self.default_states(start).map_err(|failure| residuals.failed(start, failure))?,
+            None => self.default_states(start),
         };
         let scales = self.scales(&states);
         let mut theta = start.to_vec();
@@ -96,57 +99,66 @@ impl<L: Parametric<N>, const N: usize> MultipleShooting<'_, '_, L, N> {
         let mut all_bounds = bounds.clone();
         all_bounds.lower.resize(theta.len(), f64::NEG_INFINITY);
         all_bounds.upper.resize(theta.len(), f64::INFINITY);
-        let mut settings = *settings;
-        if settings.max_evaluations == Settings::new(start.len()).max_evaluations {
-            settings.max_evaluations = Settings::new(theta.len()).max_evaluations;
-        }
+        let limit = settings.limit(theta.len());
         let (mut iterations, mut evaluations) = (0, 0);
         let mut last = None;
-        for weight in DEFECT_WEIGHTS {
-            let problem = self.with_defects(&scales, weight);
-            let fit = solve::solve(&problem, &all_bounds, &settings, &theta)?;
+        for (stage, weight) in DEFECT_WEIGHTS.into_iter().enumerate() {
+            let is_last = stage + 1 == DEFECT_WEIGHTS.len() || self.shooting.nodes.is_empty();
+            let cost_tolerance =
+                if is_last { settings.cost_tolerance } else { settings.cost_tolerance.max(INTERMEDIATE_TOLERANCE) };
+            let max_evaluations = Some(limit.saturating_sub(evaluations));
+            let settings = Settings { cost_tolerance, max_evaluations, ..*settings };
+            let fit = solve::solve(&self.with_defects(&scales, weight), &all_bounds, &settings, &theta)?;
             (iterations, evaluations) = (iterations + fit.iterations, evaluations + fit.evaluations);
-            settings.max_evaluations = settings.max_evaluations.saturating_sub(fit.evaluations);
             let is_at_limit = matches!(fit.status, FitStatus::EvaluationLimit { .. });
             theta.clone_from(&fit.parameters);
             last = Some(fit);
-            if is_at_limit || self.shooting.nodes.is_empty() {
+            if is_last || is_at_limit {
                 break;
             }
         }
-        let fit = last.ok_or(FitError::NoStart)?;
+        let mut fit = last.ok_or(FitError::NoStart)?;
+        if let FitStatus::EvaluationLimit { limit: of_stage } = &mut fit.status {
+            *of_stage = limit;
+        }
         Ok(self.result(Fit { iterations, evaluations, ..fit }, &scales))
     }
 
-    /// The states of the motion, or of the data where they are observed.
-    fn default_states(&self, start: &[f64]) -> Result<Vec<VelocityPoint<N>>, crate::ModelFailure> {
+    /// The states of the motion, or of the data where they are observed. Where velocities are not observed those of the
+    /// positions are taken.
+    fn default_states(&self, start: &[f64]) -> Vec<VelocityPoint<N>> {
         use crate::Observed::{Action, Position, Velocity};
-        let motion = self.shooting.motion;
-        let mut states = self.shooting.nodes_of_motion(start)?;
-        for (t, state) in self.shooting.nodes.iter().zip(&mut states) {
+        let (motion, nodes) = (self.shooting.motion, &self.shooting.nodes);
+        // A motion that cannot be computed from the start may well be computed in pieces.
+        let of_motion = self.shooting.nodes_of_motion(start);
+        let mut states = of_motion.unwrap_or_else(|_| vec![motion.state_at(start); nodes.len()]);
+        // Velocities come last, so that they replace the slopes of positions.
+        for velocities in [false, true] {
             for (quantity, observed) in motion.observed.iter().enumerate() {
-                let Some(value) = self.interpolated(quantity, *t) else { continue };
-                match observed {
-                    Position(i) => state.q[*i] = value,
-                    Velocity(i) => state.v[*i] = value,
-                    Action => state.z = value,
-                    _ => {}
+                for (t, state) in nodes.iter().zip(&mut states) {
+                    let Some((value, slope)) = self.interpolated(quantity, *t) else { continue };
+                    match observed {
+                        Position(i) if !velocities => (state.q[*i], state.v[*i]) = (value, slope),
+                        Velocity(i) if velocities => state.v[*i] = value,
+                        Action if velocities => state.z = value,
+                        _ => {}
+                    }
                 }
             }
         }
-        Ok(states)
+        states
     }
 
-    /// The data of a quantity, interpolated linearly at a time; `None` outside their span.
-    fn interpolated(&self, quantity: usize, t: f64) -> Option<f64> {
+    /// The data of a quantity and their slope at a time, by linear interpolation; `None` outside their span.
+    fn interpolated(&self, quantity: usize, t: f64) -> Option<(f64, f64)> {
         let Residuals { data, weights, .. } = &self.problem.residuals;
         let values = self.shooting.motion.values.iter().zip(data.iter().zip(weights));
         let known = values.filter(|(value, (_, weight))| value.quantity == quantity && **weight > 0.0);
         let points: Vec<(f64, f64)> = known.map(|(value, (y, _))| (value.t, *y)).collect();
         let before = points.iter().filter(|p| p.0 <= t).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let after = points.iter().filter(|p| p.0 >= t).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let fraction = if after.0 > before.0 { (t - before.0) / (after.0 - before.0) } else { 0.0 };
-        Some(before.1 + fraction * (after.1 - before.1))
+        let after = points.iter().filter(|p| p.0 > t).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let slope = (after.1 - before.1) / (after.0 - before.0);
+        Some((before.1 + slope * (t - before.0), slope))
     }
 
     /// The size of each component of the states.
