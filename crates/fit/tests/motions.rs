@@ -41,7 +41,7 @@ fn the_damped_spring_of_the_book_of_diffsol() {
 /// Exact data of the computed motion are reproduced to round-off: parameters, start and action.
 #[test]
 fn parameters_and_start_together() {
-    let truth = Spring { k: 1.3, c: 0.2 };
+    let (truth, guess) = (Spring { k: 1.3, c: 0.2 }, Spring { k: 1.1, c: 0.1 });
     let (q_times, z_times) = (times(40, 12.0), times(7, 10.0));
     let unknowns = [parameter("c"), Variable::Position(0), Variable::Velocity(0), parameter("k"), Variable::Action];
     let model = |guess, start| {
@@ -56,7 +56,6 @@ fn parameters_and_start_together() {
     let mut data = vec![0.0; 47];
     let theta = truth_model.start();
     truth_model.evaluate(&theta, &mut data, None).unwrap();
-    let guess = Spring { k: 1.1, c: 0.1 };
     let fitted = model(&guess, VelocityPoint::new([0.5], [0.0], 0.0));
     assert_eq!(fitted.parameter_names(), ["c", "q[0]", "v[0]", "k", "z"]);
     let fit = LeastSquares::new(&fitted, &data).unwrap().solve(&fitted.start()).unwrap();

@@ -80,6 +80,9 @@ fn a_chaotic_motion() {
     let names = contact_geom::Parametric::parameter_names(&truth);
     let values = contact_geom::Parametric::parameters(&truth);
     let index = names.iter().position(|name| name.contains("gamma")).unwrap();
+    let mut moved = values;
+    moved[index] *= 1.5;
+    let guess = contact_geom::Parametric::with_parameters(&truth, &moved).unwrap();
     let grid = times(150, 15.0);
     let start = VelocityPoint::new([2.0, 2.5], [0.0, 0.0], 0.0);
     let mut unknowns: Vec<Variable> = (0..2).map(Variable::Position).chain((0..2).map(Variable::Velocity)).collect();
@@ -95,9 +98,6 @@ fn a_chaotic_motion() {
     for value in &mut data {
         *value += 0.005 * noise.normal();
     }
-    let mut moved = values.clone();
-    moved[index] *= 1.5;
-    let guess = contact_geom::Parametric::with_parameters(&truth, &moved).unwrap();
     let fitted = model(&guess, VelocityPoint::new([2.05, 2.45], [0.05, -0.05], 0.0));
     let problem = LeastSquares::new(&fitted, &data).unwrap();
     let nodes: Vec<f64> = (1..30).map(|i| 0.5 * f64::from(i)).collect();
