@@ -51,8 +51,15 @@ fn a_general_force() {
         let forced = Forced { lagrangian: system.clone(), force: Stirring { a: 0.4, b: 0.3 } };
         for stages in [1, 2, 3, 5, 8, 12, 16] {
             let (t0, t_end, steps) = (0.3, 1.1, 4);
-            let case =
-                Case { lagrangian: &forced, t0, start: system.initial(), from_momentum: stages % 2 == 0, t_end, steps, stages };
+            let case = Case {
+                lagrangian: &forced,
+                t0,
+                start: system.initial(),
+                from_momentum: stages % 2 == 0,
+                t_end,
+                steps,
+                stages,
+            };
             case.compare(system.name(), 3e-13, 1e-8);
         }
     }

@@ -100,7 +100,11 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         // The run that is differentiated is the run, bit for bit.
         assert_eq!((tangent.outcome.q, tangent.outcome.p, tangent.outcome.z), (plain.q, plain.p, plain.z), "{name}");
         let recorded = run().record(Until::Time(self.t_end)).unwrap();
-        assert_eq!((recorded.outcome().q, recorded.outcome().p, recorded.outcome().z), (plain.q, plain.p, plain.z), "{name}");
+        assert_eq!(
+            (recorded.outcome().q, recorded.outcome().p, recorded.outcome().z),
+            (plain.q, plain.p, plain.z),
+            "{name}"
+        );
         let units: Vec<EndCovector<N>> = (0..3 * N + 1).map(unit).collect();
         let gradients = recorded.pullbacks(&units).unwrap();
         let size = tangent.columns.iter().flat_map(numbers).fold(1e-30, |m, x| max_or_nan(m, x.abs()));
@@ -108,7 +112,15 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
             let differences = numbers(&self.difference(variable));
             for (i, of_column) in numbers(column).into_iter().enumerate() {
                 let gradient = &gradients[i];
-                let all: Vec<f64> = gradient.q.iter().chain(&gradient.rate).chain([&gradient.z]).chain(&gradient.parameters).chain([&gradient.t0, &gradient.t_end]).copied().collect();
+                let all: Vec<f64> = gradient
+                    .q
+                    .iter()
+                    .chain(&gradient.rate)
+                    .chain([&gradient.z])
+                    .chain(&gradient.parameters)
+                    .chain([&gradient.t0, &gradient.t_end])
+                    .copied()
+                    .collect();
                 let (of_gradient, of_difference) = (all[k], differences[i]);
                 let what = format!("{name}, {} stages, component {i} in {variable:?}", self.stages);
                 let apart = (of_column - of_gradient).abs() / size;

@@ -3,7 +3,9 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, QuadraticInZ, System};
-use contact_geom::{ChartVector, DiscretePoint, Lagrangian, Scalar, VelocityPoint, legendre, numbers::MaxAbsOrNan};
+use contact_geom::{
+    ChartVector, DiscretePoint, Lagrangian, Parametric, Scalar, VelocityPoint, legendre, numbers::MaxAbsOrNan,
+};
 use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, error_orders, statements as exact};
 
@@ -66,6 +68,7 @@ impl Lagrangian<1> for Swelling {
         (t * 0.7).exp() * v * v * 0.5 + q * v * t.cos() * 0.4 - q * q * (t + 1.0) * 0.5 - z * (q * q + 0.3) * 0.2
     }
 }
+impl Parametric<1> for Swelling {}
 impl System<1> for Swelling {
     fn name(&self) -> &'static str {
         "swelling"

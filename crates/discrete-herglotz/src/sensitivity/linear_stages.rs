@@ -385,7 +385,13 @@ impl<const N: usize> LinearStages<N> {
 
     /// Fixed-point iteration to round-off; `false` if it does not converge.
     #[inline(always)]
-    fn iterate<S: Simd>(&self, kinds: Kinds, maps: &StepMaps, given: &Inhomogeneity<N>, x: &mut StageTangent<N>) -> bool {
+    fn iterate<S: Simd>(
+        &self,
+        kinds: Kinds,
+        maps: &StepMaps,
+        given: &Inhomogeneity<N>,
+        x: &mut StageTangent<N>,
+    ) -> bool {
         let mut iteration = FixedPointIteration::until(1.0, 0.25);
         loop {
             match iteration.assess(self.update::<S>(kinds, maps, Some(given), x), 1.0) {
@@ -399,7 +405,13 @@ impl<const N: usize> LinearStages<N> {
     /// Computes the values at the stages from the rates, and the rates from these values; without the inhomogeneous
     /// terms, if none are given. Returns the largest change of a rate, relative to the size of the terms.
     #[inline(always)]
-    fn update<S: Simd>(&self, kinds: Kinds, maps: &StepMaps, given: Option<&Inhomogeneity<N>>, x: &mut StageTangent<N>) -> f64 {
+    fn update<S: Simd>(
+        &self,
+        kinds: Kinds,
+        maps: &StepMaps,
+        given: Option<&Inhomogeneity<N>>,
+        x: &mut StageTangent<N>,
+    ) -> f64 {
         let Kinds { motion, z, r } = kinds;
         let s = maps.s;
         let sum = |rates: &Stages, start: Option<&Stages>| {

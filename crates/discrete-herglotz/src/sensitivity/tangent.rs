@@ -103,15 +103,17 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let PhasePoint { q, p, z } = at.state;
         let state = EndState { t: at.t, q, v, p, z };
         let problem = self.plan.steps.problem;
-        self.rows.push(if at.last && at.k > 0 {
-            row(problem, state, &self.columns, |column| column.time_after(at.k))
-        } else {
-            // The end of the step moves with the times of the run, but not the row.
-            let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
-            let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
-            row(problem, state, &columns, |_| 0.0)
-        }
-        .map_err(failed)?);
+        self.rows.push(
+            if at.last && at.k > 0 {
+                row(problem, state, &self.columns, |column| column.time_after(at.k))
+            } else {
+                // The end of the step moves with the times of the run, but not the row.
+                let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
+                let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
+                row(problem, state, &columns, |_| 0.0)
+            }
+            .map_err(failed)?,
+        );
         Ok(())
     }
 }
@@ -263,6 +265,9 @@ pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L,
     Ok(())
 }
 
-pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>, case: &'static str) -> SensitivityError {
+pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(
+    plan: &Plan<'_, L, N>,
+    case: &'static str,
+) -> SensitivityError {
     SensitivityError::NoTangent { method: plan.steps.info.name.clone(), case }
 }
