@@ -29,7 +29,13 @@ fn the_tangent_is_conformally_contact() {
                 let name = format!("{}, {stages} stages", system.name());
                 let entry = |i: usize, j: usize| {
                     let column = &tangent.columns[j];
-                    if i < N { column.q[i] } else if i < 2 * N { column.p[i - N] } else { column.z }
+                    if i < N {
+                        column.q[i]
+                    } else if i < 2 * N {
+                        column.p[i - N]
+                    } else {
+                        column.z
+                    }
                 };
                 let matrix = DMatrix::from_fn(2 * N + 1, 2 * N + 1, entry);
                 let size = matrix.iter().fold(1.0, |m, x: &f64| contact_geom::numbers::max_or_nan(m, x.abs()));

@@ -2,10 +2,9 @@
 
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
+use discrete_herglotz::rules::Midpoint;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
-use discrete_herglotz::{
-    AnyIntegrator, GaussCollocation, InputError, Problem, Status, Steps, TransformedGauss, Until,
-};
+use discrete_herglotz::{CustomMethod, GaussCollocation, InputError, Problem, Status, Steps, TransformedGauss, Until};
 
 struct Constant(f64);
 
@@ -19,7 +18,8 @@ impl<const N: usize> Loss<N> for Constant {
 fn names_starts_and_coordinates() {
     let pendulum = Pendulum::default();
     let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
-    let tangent = |variable: Variable| problem.steps(Steps::Size(0.1)).tangent(&[variable], Until::Time(1.0)).unwrap_err();
+    let tangent =
+        |variable: Variable| problem.steps(Steps::Size(0.1)).tangent(&[variable], Until::Time(1.0)).unwrap_err();
     let unknown = tangent(Variable::Parameter("gama".into()));
     assert_eq!(unknown.to_string(), "there is no parameter `gama`; did you mean `gamma`?");
     let unknown = tangent(Variable::Parameter("mass".into()));
@@ -34,11 +34,12 @@ fn names_starts_and_coordinates() {
 fn integrators_without_tangents() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    let transformed = problem.by(TransformedGauss::new(6)).steps(Steps::Size(0.2)).gradient(&Constant(1.0), Until::Time(1.0));
+    let transformed =
+        problem.by(TransformedGauss::new(6)).steps(Steps::Size(0.2)).gradient(&Constant(1.0), Until::Time(1.0));
     assert!(matches!(transformed, Err(SensitivityError::NoTangent { .. })));
-    let splitting: AnyIntegrator = "strang".parse().unwrap();
-    let splitting = problem.by(splitting).steps(Steps::Size(0.1)).tangent(&[], Until::Time(1.0));
-    assert!(splitting.unwrap_err().to_string().contains("choose `GaussCollocation`"));
+    let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&kepler, h));
+    let mine = problem.by(mine).steps(Steps::Size(0.1)).tangent(&[], Until::Time(1.0));
+    assert!(mine.unwrap_err().to_string().contains("choose `GaussCollocation`"));
 }
 
 /// A Lagrangian with a kink.
@@ -59,7 +60,10 @@ impl Parametric<1> for Kinked {}
 #[test]
 fn switching_functions() {
     let problem = Problem::new(&Kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
-    let found = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
+    let found = problem
+        .by(GaussCollocation { stages: 4 })
+        .steps(Steps::Size(0.1))
+        .tangent(&[Variable::Action], Until::Time(2.0));
     assert!(found.unwrap_err().to_string().contains("switching functions"));
 }
 

@@ -80,7 +80,11 @@ fn losses_of_rows() {
         let short = problem.by(GaussCollocation { stages: 6 }).steps(Steps::Count(100));
         let short = short.tangent(&variables, Until::Time(row.state.t)).unwrap();
         for (a, b) in row.columns.iter().zip(&short.columns).take(8) {
-            assert!((a.q - b.q).norm() + (a.v - b.v).norm() + (a.z - b.z).abs() <= 1e-11, "t = {}: {a:?}, {b:?}", row.state.t);
+            assert!(
+                (a.q - b.q).norm() + (a.v - b.v).norm() + (a.z - b.z).abs() <= 1e-11,
+                "t = {}: {a:?}, {b:?}",
+                row.state.t
+            );
         }
     }
 }

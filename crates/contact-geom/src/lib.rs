@@ -44,7 +44,9 @@ pub mod hamiltonian {
 
 /// Vector spaces of dual parts, and maxima that propagate NaN.
 pub mod numbers {
-    pub use crate::number::{AugmentedVector, Coefficient, MaxAbsOrNan, ScalarOver, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan};
+    pub use crate::number::{
+        AugmentedVector, Coefficient, MaxAbsOrNan, MaxOrNan, ScalarOver, TangentVector, max_abs_or_nan, max_or_nan,
+    };
 }
 
 /// Tools for the other crates of this project: derivatives by dual numbers, seeds, small linear systems, rounding.
@@ -67,9 +69,9 @@ pub mod switching {
 
 pub use dynamics::{
     Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced, HerglotzField, Hessian, Hints, Lagrangian,
-    Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient, Regularity, Structure, Symmetry,
-    Parametric, ParametricForce, TimeTransformation, UnknownParameter, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
-    legendre_jacobian, regularity,
+    Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Parametric, ParametricForce, Quotient, Regularity,
+    Structure, Symmetry, TimeTransformation, UnknownParameter, VelocityDrag, WithoutClosedDerivatives,
+    check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{

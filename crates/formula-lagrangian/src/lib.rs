@@ -119,12 +119,12 @@ mod tape;
 mod token;
 mod translation;
 
+pub use contact_geom::support::nearest_name;
 pub use error::{FormulaError, MOST_COORDINATES, ParseError};
 pub use expression::Expression;
 pub use formula::Formula;
 pub use graph::Graph;
 pub use lagrangian::FormulaLagrangian;
-pub use contact_geom::support::nearest_name;
 pub use node::{Function, Id, Node, Operation};
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
 pub use resets::{Direction, Reset, ResetNodes, Variable};

@@ -203,10 +203,7 @@ impl<const N: usize, L: Parametric<N>, F: ParametricForce<N>> Parametric<N> for 
     }
     fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
         let (own, of_force) = theta.split_at_checked(self.lagrangian.parameter_count())?;
-        Some(Forced {
-            lagrangian: self.lagrangian.with_parameters(own)?,
-            force: self.force.with_parameters(of_force)?,
-        })
+        Some(Forced { lagrangian: self.lagrangian.with_parameters(own)?, force: self.force.with_parameters(of_force)? })
     }
     #[inline(always)]
     fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

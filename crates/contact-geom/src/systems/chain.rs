@@ -1,9 +1,9 @@
 //! A chain of particles joined by nonlinear springs.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// The boundary conditions of a [`Chain`].

@@ -1,9 +1,9 @@
 //! A charged particle in a trap with a uniform magnetic field.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// A charged particle in the plane, in a uniform magnetic field and a harmonic trap, with drag:

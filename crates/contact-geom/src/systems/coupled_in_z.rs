@@ -1,9 +1,9 @@
 //! A Lagrangian in which position, velocity and action are all coupled.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// A pendulum whose inertia depends on its position and its action, and grows with its speed:

@@ -1,9 +1,9 @@
 //! A system with two degrees of freedom in which positions, velocities and action are all coupled.
 
 use super::{System, between};
-use crate::{Lagrangian, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// An anisotropic oscillator in the plane whose inertia depends on position and action, with a magnetic term that grows

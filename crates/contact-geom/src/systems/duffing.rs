@@ -1,9 +1,9 @@
 //! Duffing's oscillator, free and forced.
 
 use super::{System, between};
-use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless:

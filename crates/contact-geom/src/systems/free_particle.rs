@@ -2,9 +2,9 @@
 
 use super::closed_form::relative_exp_m1;
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the

@@ -1,11 +1,11 @@
 //! Kepler's problem with drag, in any dimension.
 
 use super::{System, between};
+use crate::dynamics::parametric_fields;
+use crate::numbers::{Coefficient, ScalarOver};
 use crate::{
     ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint,
 };
-use crate::dynamics::parametric_fields;
-use crate::numbers::{Coefficient, ScalarOver};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: for `mu = 1`, lengths are

@@ -1,9 +1,9 @@
 //! The damped pendulum.
 
 use super::{System, between};
-use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q`

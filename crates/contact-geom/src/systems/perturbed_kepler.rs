@@ -2,9 +2,9 @@
 
 use super::System;
 use super::kepler::{attraction, pericentre, sample_annulus};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// Kepler's problem in the plane with a drag that changes sign periodically,

@@ -1,9 +1,9 @@
 //! The oscillator whose Lagrangian is quadratic in the action.
 
 use super::{System, between};
-use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The oscillator with a drag proportional to the action, `L = v^2/2 - q^2/2 - c z^2/2`. Dimensionless: time in units

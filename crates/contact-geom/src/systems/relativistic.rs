@@ -1,9 +1,9 @@
 //! The relativistic oscillator with drag.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// A relativistic particle on a spring, with drag: `L = -sqrt(1 - v^2) - q^2/2 + gamma z`, `|v| < 1`. Dimensionless:

@@ -1,9 +1,9 @@
 //! The damped spherical pendulum.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// The spherical pendulum with linear drag, `L = (v_theta^2 + sin^2 theta v_phi^2)/2 - (1 - cos theta) + gamma z`, with

@@ -72,7 +72,13 @@ impl<const D: usize> UniformField<D> {
 impl<const D: usize> UniformField<D> {
     /// The Lagrangian, over the type of its parameters.
     #[inline(always)]
-    fn formula<C: Coefficient, T: ScalarOver<C>>(field: &[C], gamma: C, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
+    fn formula<C: Coefficient, T: ScalarOver<C>>(
+        field: &[C],
+        gamma: C,
+        q: &SVector<T, D>,
+        v: &SVector<T, D>,
+        z: T,
+    ) -> T {
         v.dot(v) * 0.5 + Self::work_of(field, q) + z * gamma
     }
 }

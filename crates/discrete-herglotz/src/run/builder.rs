@@ -174,7 +174,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, L, N> {
     /// [`InputError::Hypothesis`] for a resumed run.
     pub(crate) fn differentiable(self) -> Result<Self, InputError> {
         if self.from.is_some() {
-            return Err(InputError::Hypothesis { hypothesis: "a run from its start, since a resumed run has no derivatives" });
+            return Err(InputError::Hypothesis {
+                hypothesis: "a run from its start, since a resumed run has no derivatives",
+            });
         }
         Ok(Run { needs: OutputRequest { action: true, ..self.needs }, ..self })
     }

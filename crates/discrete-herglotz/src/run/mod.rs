@@ -16,11 +16,11 @@ mod planning;
 mod request;
 mod resume_state;
 
-pub(crate) use motion::Motion;
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use builder::Run;
 pub(crate) use checks::energy::may_drift;
 pub use checks::energy_drift::{EnergyDrift, EnergySample};
+pub(crate) use motion::Motion;
 pub use observers::checkpoint::Checkpoint;
 #[cfg(feature = "csv")]
 pub use observers::csv_rows::CsvRows;

@@ -118,7 +118,14 @@ impl<const N: usize> VelocityDependence<N> {
     }
 
     /// The derivative of the velocity along a tangent of the state.
-    pub fn along(&self, q: &SVector<f64, N>, p: &SVector<f64, N>, z: f64, parameter: Option<usize>, dt: f64) -> SVector<f64, N> {
+    pub fn along(
+        &self,
+        q: &SVector<f64, N>,
+        p: &SVector<f64, N>,
+        z: f64,
+        parameter: Option<usize>,
+        dt: f64,
+    ) -> SVector<f64, N> {
         let explicit = parameter.and_then(|k| self.parameters.get(k).copied()).unwrap_or_else(SVector::zeros);
         self.inverse * (p - self.qv.transpose() * q - self.vz * z - explicit - self.time * dt)
     }

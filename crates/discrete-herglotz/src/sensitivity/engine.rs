@@ -68,6 +68,27 @@ impl<const N: usize> Column<N> {
         column
     }
 
+    /// Adds a multiple of another tangent, with that of its rates.
+    pub fn add_multiple(&mut self, factor: f64, other: &Self) {
+        self.q += other.q * factor;
+        self.p += other.p * factor;
+        self.z += other.z * factor;
+        self.rates.add_multiple(factor, &other.rates);
+    }
+
+    /// Multiplies the tangent by a factor, with its rates.
+    pub fn scale(&mut self, factor: f64) {
+        self.q *= factor;
+        self.p *= factor;
+        self.z *= factor;
+        self.rates.scale(factor);
+    }
+
+    /// The Euclidean product of the components `(q, p, z)` with those of another tangent.
+    pub fn dot(&self, other: &Self) -> f64 {
+        self.q.dot(&other.q) + self.p.dot(&other.p) + self.z * other.z
+    }
+
     /// The same tangent without an initial guess of its rates.
     fn copied(&self) -> Self {
         let Column { q, p, z, parameter, dt0, dh, .. } = *self;
@@ -119,7 +140,13 @@ impl<const N: usize> Covector<N> {
     }
 
     /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
-    pub fn add_at_fixed_time(&mut self, of_state: &ChartVector<N>, parameters: &[f64], rates: &PhasePoint<N>, steps: usize) {
+    pub fn add_at_fixed_time(
+        &mut self,
+        of_state: &ChartVector<N>,
+        parameters: &[f64],
+        rates: &PhasePoint<N>,
+        steps: usize,
+    ) {
         self.add_state(of_state, parameters);
         self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
     }
@@ -217,11 +244,13 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     #[inline(always)]
     fn prepare<S: Simd>(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
         if self.actions.is_none() && !step.knows_l {
-            let (t, x) = (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
+            let (t, x) =
+                (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
             self.actions = self.forward.resolvent(-self.lagrangian.rate(t, &x));
         }
         self.at.evaluate::<S, L>(self.lagrangian, &self.forward, step, self.actions.as_ref())?;
-        if self.condenses && !self.linear.is_condensed()
+        if self.condenses
+            && !self.linear.is_condensed()
             && let Some(inverse) = &self.at.form.inverse_mass
         {
             self.linear.condense(&self.maps, &self.at, inverse);
@@ -231,7 +260,12 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     }
 
     #[inline(always)]
-    fn push_column<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, column: &mut Column<N>) -> Result<(), StepError> {
+    fn push_column<S: Simd>(
+        &mut self,
+        step: &SolvedStages<N>,
+        k: usize,
+        column: &mut Column<N>,
+    ) -> Result<(), StepError> {
         let s = step.s;
         let fraction = column.dh / step.h;
         self.set_sources(step, k, column);

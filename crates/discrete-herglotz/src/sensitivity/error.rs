@@ -27,7 +27,9 @@ pub enum SensitivityError {
         case: &'static str,
     },
     /// A variable that the start of the problem does not have.
-    #[error("the start of the problem was given by its {given}, not by its {other}; differentiate with respect to the {given}")]
+    #[error(
+        "the start of the problem was given by its {given}, not by its {other}; differentiate with respect to the {given}"
+    )]
     Start {
         /// What was given.
         given: &'static str,

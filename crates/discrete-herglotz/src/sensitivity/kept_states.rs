@@ -28,7 +28,12 @@ impl KeptStates {
     /// The intervals of steps between kept states, each with the state at its start, from the last to the first.
     pub fn backward(&self) -> impl Iterator<Item = (Range<usize>, &[u64])> {
         let steps = move |i: usize| i * self.interval..((i + 1) * self.interval).min(self.taken);
-        self.states.iter().enumerate().rev().map(move |(i, words)| (steps(i), words.as_slice())).filter(|(r, _)| !r.is_empty())
+        self.states
+            .iter()
+            .enumerate()
+            .rev()
+            .map(move |(i, words)| (steps(i), words.as_slice()))
+            .filter(|(r, _)| !r.is_empty())
     }
 
     fn keep<const N: usize>(&mut self, at: &StepView<'_, N>) {

@@ -1,10 +1,10 @@
 //! Derivatives of L and of the force with respect to parameters and time, at a point.
 
-use contact_geom::nalgebra::{ArrayStorage, SVector};
 use crate::numbers::lanes::{Lanes, branched, forget_branches, vector};
 use crate::numbers::registers::{Stages, blocks};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::stage_derivatives::StageDerivatives;
+use contact_geom::nalgebra::{ArrayStorage, SVector};
 use contact_geom::support::{KernelDual, seed};
 use contact_geom::{ChartVector, Dual, Parametric, VelocityPoint};
 use num_traits::{One, Zero};
@@ -34,7 +34,11 @@ pub(crate) struct QuantityDerivatives<const N: usize> {
 impl<const N: usize> QuantityDerivatives<N> {
     pub const ZERO: Self = QuantityDerivatives {
         l: 0.0,
-        gradient: ChartVector { x: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])), y: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])), z: 0.0 },
+        gradient: ChartVector {
+            x: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
+            y: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
+            z: 0.0,
+        },
         force: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
     };
 
@@ -96,7 +100,13 @@ impl<const N: usize> ParameterDerivatives<N> {
     }
 
     /// `f_theta` at a point; 0 without a force.
-    fn force<L: Parametric<N>>(&mut self, lagrangian: &L, quantity: Quantity, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N> {
+    fn force<L: Parametric<N>>(
+        &mut self,
+        lagrangian: &L,
+        quantity: Quantity,
+        t: f64,
+        x: &VelocityPoint<N>,
+    ) -> SVector<f64, N> {
         if const { !L::HINTS.forced } {
             return SVector::zeros();
         }
@@ -187,4 +197,5 @@ impl<const N: usize> ParameterDerivatives<N> {
 const MAX_PARAMETERS_IN_LANES: usize = 8;
 
 /// SIMD lanes of numbers with their derivatives along two directions, and the mixed one.
-type Nested<S> = KernelDual<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, SVector<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, 1>>;
+type Nested<S> =
+    KernelDual<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, SVector<KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>, 1>>;

@@ -34,11 +34,11 @@ pub(crate) struct StepMaps {
 impl StepMaps {
     pub fn new(s: usize, h: f64, direction: Direction) -> Self {
         let g = Coefficients::of(s);
-        let inside = |i: usize, j: usize, entry: &dyn Fn(usize, usize) -> f64| if i.max(j) < s { entry(i, j) } else { 0.0 };
+        let inside =
+            |i: usize, j: usize, entry: &dyn Fn(usize, usize) -> f64| if i.max(j) < s { entry(i, j) } else { 0.0 };
         let times = Stages(from_fn(|i| h * g.c[i.min(s - 1)].0));
-        let map = |entry: &dyn Fn(usize, usize) -> f64| {
-            StageMap::new(&from_fn(|i| from_fn(|j| inside(i, j, entry))), s)
-        };
+        let map =
+            |entry: &dyn Fn(usize, usize) -> f64| StageMap::new(&from_fn(|i| from_fn(|j| inside(i, j, entry))), s);
         match direction {
             Direction::Forward => StepMaps {
                 s,

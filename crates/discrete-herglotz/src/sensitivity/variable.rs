@@ -45,7 +45,11 @@ impl Variable {
         steps: usize,
     ) -> Result<Column<N>, SensitivityError> {
         let unit = |index: usize| {
-            if index < N { Ok(SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == index)))) } else { Err(SensitivityError::Coordinate { index, count: N }) }
+            if index < N {
+                Ok(SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == index))))
+            } else {
+                Err(SensitivityError::Coordinate { index, count: N })
+            }
         };
         let zero = SVector::<f64, N>::zeros();
         let (lagrangian, x) = (problem.lagrangian, &problem.start);
