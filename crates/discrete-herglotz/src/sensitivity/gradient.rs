@@ -66,6 +66,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     pub fn record(self, until: Until) -> Result<RecordedRun<'p, L, N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
+        // An integrator without a tangent is refused before the run.
         StepTangent::new(&plan.steps, Direction::Backward)?;
         let mut kept = KeptStates::new();
         let outcome = run.observed(&plan, &mut kept)?;
@@ -136,6 +137,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     ) -> Result<LossGradient<N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
+        // An integrator without a tangent is refused before the run.
         StepTangent::new(&plan.steps, Direction::Backward)?;
         let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;

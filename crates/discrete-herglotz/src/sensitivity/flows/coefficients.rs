@@ -14,6 +14,8 @@ const MAX_DEFECT: f64 = 1e-9;
 pub(super) struct CoefficientDerivatives<const N: usize> {
     pub mass: SMatrix<f64, N, N>,
     pub gamma: f64,
+    /// The change of that derivative where z increases by 1: `f_z` is not constant if it is not 0.
+    pub bend: f64,
     pub linear: SVector<f64, N>,
     pub quadratic: f64,
 }
@@ -21,7 +23,13 @@ pub(super) struct CoefficientDerivatives<const N: usize> {
 impl<const N: usize> CoefficientDerivatives<N> {
     /// Those of the duration and of the time, on which no coefficient depends.
     pub fn zero() -> Self {
-        CoefficientDerivatives { mass: SMatrix::zeros(), gamma: 0.0, linear: SVector::zeros(), quadratic: 0.0 }
+        CoefficientDerivatives {
+            mass: SMatrix::zeros(),
+            gamma: 0.0,
+            bend: 0.0,
+            linear: SVector::zeros(),
+            quadratic: 0.0,
+        }
     }
 
     /// The derivatives in each parameter, at a time and a position. They are evaluated at points where the others vanish,
@@ -51,14 +59,31 @@ impl<const N: usize> CoefficientDerivatives<N> {
                     quadratic = bend.mean() / (N as f64).sqrt();
                     linear = -once - bend;
                 }
-                CoefficientDerivatives { mass, gamma: still.gradient.z, linear, quadratic }
+                let above = VelocityPoint { z: rest.z + 1.0, ..*rest };
+                let bend = of.at(lagrangian, Quantity::Parameter(k), t, &above).gradient.z - still.gradient.z;
+                CoefficientDerivatives { mass, gamma: still.gradient.z, bend, linear, quadratic }
             })
             .collect()
     }
 
+    /// Why a splitting with a linear drag in z is not differentiable in the parameter: it makes L nonlinear in z.
+    pub fn obstacle_in_action(&self) -> Option<&'static str> {
+        let bends = self.bend.abs() > MAX_DEFECT * (1.0 + self.gamma.abs());
+        bends.then_some(" in a parameter that makes the Lagrangian nonlinear in z, as it is not for the present value")
+    }
+
+    /// Whether the parameter changes the drag of the velocity.
+    pub fn has_drag(&self) -> bool {
+        self.linear.norm() + self.quadratic.abs() > MAX_DEFECT
+    }
+
     /// Why the flow with a drag of the velocity is not differentiable in the parameter: it requires a diagonal mass matrix,
-    /// and for a quadratic drag equal masses and equal linear drags. `equal` states that they are equal now.
-    pub fn obstacle(&self, has_quadratic: bool, equal: bool) -> Option<&'static str> {
+    /// and for a quadratic drag equal masses and equal linear drags, which `equal` states of the present values, and a scheme
+    /// that is not of Runge-Kutta-Nyström type.
+    pub fn obstacle(&self, has_quadratic: bool, equal: bool, nystrom: bool) -> Option<&'static str> {
+        if let Some(obstacle) = self.obstacle_in_action() {
+            return Some(obstacle);
+        }
         let size = MAX_DEFECT * (1.0 + self.mass.norm() + self.linear.norm());
         let diagonal = self.mass.diagonal();
         if (self.mass - SMatrix::from_diagonal(&diagonal)).norm() > size {
@@ -70,8 +95,11 @@ impl<const N: usize> CoefficientDerivatives<N> {
                 " with a quadratic drag, in a parameter that changes masses or linear drags by different amounts",
             );
         }
-        if !has_quadratic && self.quadratic.abs() > size && !equal {
+        if self.quadratic.abs() > size && !equal {
             return Some(" with different masses or linear drags, in a parameter of a quadratic drag");
+        }
+        if self.quadratic.abs() > size && nystrom {
+            return Some(", a Runge-Kutta-Nyström scheme, in a parameter of a quadratic drag");
         }
         None
     }

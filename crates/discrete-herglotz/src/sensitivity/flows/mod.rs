@@ -60,6 +60,8 @@ pub(crate) struct FlowEngine<'a, const N: usize> {
     method: Box<dyn SubFlows<N> + 'a>,
     of_parameters: ParameterDerivatives<N>,
     flows: Vec<SubFlow<N>>,
+    /// Why the steps are not differentiable in each parameter, if they are not.
+    obstacles: Vec<Option<&'static str>>,
 }
 
 impl<'a, const N: usize> FlowEngine<'a, N> {
@@ -73,9 +75,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
             StepFormula::Splitting(scheme) if !problem.structure.is_affine_in_z() => {
                 Box::new(ActionFlows::new(problem, &scheme, of)?)
             }
-            StepFormula::Splitting(scheme)
-                if const { L::HINTS.forced } && !lagrangian.force_structure().is_of_positions() =>
-            {
+            StepFormula::Splitting(scheme) if DragFlows::applies(problem, of) => {
                 Box::new(DragFlows::new(problem, &scheme, of)?)
             }
             StepFormula::Splitting(scheme) => Box::new(LinearDragFlows::new(problem, &scheme, of)?),
@@ -85,18 +85,27 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
                 Box::new(Rules { lagrangian, nodes, lengths })
             }
         };
-        Ok(FlowEngine { method, of_parameters, flows: Vec::new() })
+        let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
+        Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
     }
 
     /// Why the steps are not differentiable in a parameter, if they are not.
     pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
-        self.method.obstacle(parameter)
+        self.obstacles.get(parameter).copied().flatten()
     }
 
     fn linearise(&mut self, step: &StepEnds<N>, with_sources: bool) -> Result<(), StepError> {
         self.flows.clear();
         let of = with_sources.then_some(&mut self.of_parameters);
-        self.method.linearise(step, of, &mut self.flows)
+        self.method.linearise(step, of, &mut self.flows)?;
+        if let Some(first) = self.flows.first_mut() {
+            for (source, obstacle) in first.sources.iter_mut().zip(&self.obstacles) {
+                if obstacle.is_some() {
+                    source.z = f64::NAN;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.

@@ -88,15 +88,16 @@ impl<const N: usize> Sums<N> {
     }
 }
 
-/// A solved step with the linearisation of its equations.
+/// The factors of the derivative of the first two equations of a step in `(q1, z1)`.
+type Factors = LU<f64, Dyn, Dyn>;
+
+/// A step with given ends, and the linearisation of its equations there.
 struct RuleStepEnd<'s, 'l, L, const N: usize> {
     step: &'s RuleStep<'l, L>,
     start: PhasePoint<N>,
     end: PhasePoint<N>,
     at: Vec<AtNode<N>>,
     sums: Sums<N>,
-    /// The factors of the derivative of the first two equations in `(q1, z1)`.
-    lu: LU<f64, Dyn, Dyn>,
 }
 
 impl<L: Parametric<N>, const N: usize> RuleStepEnd<'_, '_, L, N> {
@@ -135,12 +136,17 @@ impl<L: Parametric<N>, const N: usize> RuleStepEnd<'_, '_, L, N> {
     }
 
     /// The derivative of the end along a change of the start, where q1 and z1 do not change, of `p0`, and of the others.
-    fn end_along(&self, mut change: Change<'_, N>, p0: &SVector<f64, N>) -> Result<ChartVector<N>, StepError> {
+    fn end_along(
+        &self,
+        factors: &Factors,
+        mut change: Change<'_, N>,
+        p0: &SVector<f64, N>,
+    ) -> Result<ChartVector<N>, StepError> {
         let sums = self.change(&change);
         let of_momentum = p0 * (1.0 + self.sums.z0) + self.start.p * sums.z0 + sums.start;
         let of_action = -change.z0 - sums.s;
         let residual = DVector::from_fn(N + 1, |i, _| if i < N { of_momentum[i] } else { of_action });
-        let solved = self.lu.solve(&residual).ok_or(StepError::Singular { pivot: 0.0 })?;
+        let solved = factors.solve(&residual).ok_or(StepError::Singular { pivot: 0.0 })?;
         change.q1 = SVector::from_fn(|i, _| -solved[i]);
         change.z1 = -solved[N];
         let sums = self.change(&change);
@@ -163,13 +169,13 @@ impl<L> RuleStep<'_, L> {
     where
         L: Parametric<N>,
     {
-        let solved = self.solve(state, guess)?;
+        let (solved, factors) = self.solve(state, guess)?;
         let zero = SVector::<f64, N>::zeros();
         let mut state_map = TangentMatrix::identity();
         for j in 0..=2 * N {
             let unit = |from: usize| SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(from + i == j)));
             let z0 = f64::from(u8::from(j == 2 * N));
-            let image = solved.end_along(Change { q0: unit(0), z0, ..Change::ZERO }, &unit(N))?;
+            let image = solved.end_along(&factors, Change { q0: unit(0), z0, ..Change::ZERO }, &unit(N))?;
             state_map.set_column(j, &image);
         }
         let mut sources = Vec::new();
@@ -179,20 +185,21 @@ impl<L> RuleStep<'_, L> {
             for quantity in quantities {
                 explicit.clear();
                 explicit.extend(solved.at.iter().map(|at| of.at(self.lagrangian, quantity, at.t, &at.x)));
-                sources.push(solved.end_along(Change { explicit: &explicit, ..Change::ZERO }, &zero)?);
+                sources.push(solved.end_along(&factors, Change { explicit: &explicit, ..Change::ZERO }, &zero)?);
             }
             // The derivatives in the time are still those of the nodes.
-            sources.push(solved.end_along(Change { h: 1.0, explicit: &explicit, ..Change::ZERO }, &zero)?);
+            sources.push(solved.end_along(&factors, Change { h: 1.0, explicit: &explicit, ..Change::ZERO }, &zero)?);
         }
         *state = solved.end;
         Ok(SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 })
     }
 
+    /// Solves the equations of the step by Newton's method; returns the solution with its factors.
     fn solve<'s, const N: usize>(
         &'s self,
         start: &PhasePoint<N>,
         (mut q1, mut z1): (SVector<f64, N>, f64),
-    ) -> Result<RuleStepEnd<'s, 's, L, N>, StepError>
+    ) -> Result<(RuleStepEnd<'s, 's, L, N>, Factors), StepError>
     where
         L: Parametric<N>,
     {
@@ -204,9 +211,7 @@ impl<L> RuleStep<'_, L> {
                 sums.add(node, self.h, at.l, &at.gradient, &at.force);
             }
             let end = PhasePoint { q: q1, p: sums.end / (1.0 - sums.z1), z: z1 };
-            // The matrix is set below, from changes of the sums.
-            let lu = DMatrix::identity(N + 1, N + 1).lu();
-            let mut solved = RuleStepEnd { step: self, start: *start, end, at, sums, lu };
+            let solved = RuleStepEnd { step: self, start: *start, end, at, sums };
             let mut matrix = DMatrix::zeros(N + 1, N + 1);
             for j in 0..=N {
                 let q1 = SVector::from_fn(|i, _| f64::from(u8::from(i == j)));
@@ -218,11 +223,11 @@ impl<L> RuleStep<'_, L> {
                 }
                 matrix[(N, j)] = z1 - of.s;
             }
-            solved.lu = matrix.lu();
+            let factors = matrix.lu();
             let momentum = start.p * (1.0 + solved.sums.z0) + solved.sums.start;
             let action = z1 - start.z - solved.sums.s;
             let residual = DVector::from_fn(N + 1, |i, _| if i < N { momentum[i] } else { action });
-            let change = solved.lu.solve(&residual).ok_or(StepError::Singular { pivot: 0.0 })?;
+            let change = factors.solve(&residual).ok_or(StepError::Singular { pivot: 0.0 })?;
             let (mut size, mut moved) = (0.0, 0.0);
             for i in 0..N {
                 size = max_or_nan(size, q1[i].abs() + (q1[i] - start.q[i]).abs());
@@ -235,7 +240,7 @@ impl<L> RuleStep<'_, L> {
                 return Err(StepError::NonFinite);
             }
             if moved <= CONVERGED || moved >= last && moved <= STAGNATED {
-                return Ok(solved);
+                return Ok((solved, factors));
             }
             last = moved;
             q1 -= SVector::<f64, N>::from_fn(|i, _| change[i]);

@@ -100,17 +100,40 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for LinearDragFlows<'_, L, N>
         }
         Ok(())
     }
+
+    fn obstacle(&self, parameter: usize) -> Option<&'static str> {
+        let of = self.coefficients.get(parameter)?;
+        let drags = " in a parameter of a drag of the velocity that is 0, with this mass matrix or rate L_z";
+        of.obstacle_in_action().or_else(|| of.has_drag().then_some(drags))
+    }
 }
 
 /// Kicks, and drifts with a drag of the velocity.
 pub(super) struct DragFlows<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     law: DragLaw<N>,
+    nystrom: bool,
     coefficients: Vec<CoefficientDerivatives<N>>,
     parts: Vec<Part>,
 }
 
 impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
+    /// Whether the drag of a problem is that of the velocity: if there is one, or if a parameter changes it, where the flow
+    /// allows it.
+    pub fn applies(problem: &Problem<'a, L, N>, of: &mut ParameterDerivatives<N>) -> bool {
+        if const { !L::HINTS.forced } {
+            return false;
+        }
+        if !problem.lagrangian.force_structure().is_of_positions() {
+            return true;
+        }
+        let rest = rest_of(problem);
+        let coefficients = CoefficientDerivatives::all(problem.lagrangian, of, problem.t0, &rest);
+        let law = form_of(problem).and_then(|form| DragLaw::of(&form, problem.t0, &rest));
+        let allowed = problem.lagrangian.structure().has_constant_rate() && law.is_ok();
+        allowed && coefficients.iter().any(CoefficientDerivatives::has_drag)
+    }
+
     /// # Errors
     /// Those of [`DragSplitting::new`](crate::splitting::DragSplitting::new).
     pub fn new(
@@ -121,7 +144,7 @@ impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
         let (form, rest) = (form_of(problem)?, rest_of(problem));
         let law = DragLaw::of(&form, problem.t0, &rest)?;
         let coefficients = CoefficientDerivatives::all(problem.lagrangian, of, problem.t0, &rest);
-        Ok(DragFlows { form, law, coefficients, parts: parts(scheme) })
+        Ok(DragFlows { form, law, nystrom: scheme.is_nystrom(), coefficients, parts: parts(scheme) })
     }
 }
 
@@ -142,12 +165,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for DragFlows<'_, L, N> {
                 }
                 Part::Drift { start, duration } => {
                     let coefficients = of.map(|_| &self.coefficients[..]);
-                    let mut flow = velocity_drag::linearise(&self.law, duration * step.h, coefficients, &mut state);
-                    for (index, source) in flow.sources.iter_mut().take(self.coefficients.len()).enumerate() {
-                        if self.obstacle(index).is_some() {
-                            source.z = f64::NAN;
-                        }
-                    }
+                    let flow = velocity_drag::linearise(&self.law, duration * step.h, coefficients, &mut state);
                     SubFlow { start, duration, ..flow }
                 }
             });
@@ -157,7 +175,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for DragFlows<'_, L, N> {
 
     fn obstacle(&self, parameter: usize) -> Option<&'static str> {
         let equal = has_equal_coefficients(&self.law);
-        self.coefficients.get(parameter)?.obstacle(self.law.quadratic != 0.0, equal)
+        self.coefficients.get(parameter)?.obstacle(self.law.quadratic != 0.0, equal, self.nystrom)
     }
 }
 
@@ -185,14 +203,11 @@ impl<'a, L: Parametric<N>, const N: usize> ActionFlows<'a, L, N> {
         let (form, rest) = (form_of(problem)?, rest_of(problem));
         let flow = Riccati::of(lagrangian, t, &problem.state)?;
         let coefficients = CoefficientDerivatives::all(lagrangian, of, t, &rest);
-        // The rate L_z = b + 2 c z is known at the action of the start, and at another one.
-        let further = CoefficientDerivatives::all(lagrangian, of, t, &VelocityPoint { z: rest.z + 1.0, ..rest });
-        let of_flow = coefficients.iter().zip(&further).map(|(near, far)| {
-            let c = 0.5 * (far.gamma - near.gamma);
-            [near.gamma - 2.0 * c * rest.z, c]
-        });
+        // The rate is L_z = b + 2 c z.
+        let of_flow = coefficients.iter().map(|of| [of.gamma - of.bend * rest.z, 0.5 * of.bend]);
+        let of_flow = of_flow.collect();
         let substeps = scheme.substeps().ok_or(InputError::Unclaimed { claim: "z_affine" })?;
-        Ok(ActionFlows { form, flow, of_flow: of_flow.collect(), coefficients, z: rest.z, substeps })
+        Ok(ActionFlows { form, flow, of_flow, coefficients, z: rest.z, substeps })
     }
 
     /// `b z + c z^2` at the action of the kicks.
