@@ -9,9 +9,11 @@
 mod gradients {
     mod agreement;
     mod contact;
+    mod flows;
     mod forces;
     mod invalid_input;
     mod losses;
+    mod lyapunov;
     mod pendulum;
     mod runs;
 }

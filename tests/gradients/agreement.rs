@@ -2,6 +2,7 @@
 
 use crate::gradients::runs::{Case, weyl};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use discrete_herglotz::GaussCollocation;
 
 /// Every system, from sampled states, with 1 to 16 stages, forward and backward in time, from velocities and momenta.
 ///
@@ -25,9 +26,9 @@ fn forward_backward_and_differences_agree() {
                     from_momentum: draw % 2 == 1,
                     t_end: t0 + span,
                     steps: 3 + draw as usize % 3,
-                    stages,
+                    method: GaussCollocation { stages },
                 };
-                case.compare(&format!("{} from {start:?}", system.name()), 3e-13, 1e-8);
+                case.compare(&format!("{}, {stages} stages, from {start:?}", system.name()), 3e-13, 1e-8);
             }
         }
     }

@@ -4,12 +4,13 @@ use crate::gradients::runs::Case;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, Pendulum, QuadraticInZ, System};
 use contact_geom::{Force, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
+use discrete_herglotz::GaussCollocation;
 
 /// A force of time, positions, velocities and action, that no structure simplifies, with two parameters.
 #[derive(Clone, Copy, Debug)]
-struct Stirring {
-    a: f64,
-    b: f64,
+pub struct Stirring {
+    pub a: f64,
+    pub b: f64,
 }
 
 fn stirring<const N: usize, T: Scalar>([a, b]: [T; 2], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -58,9 +59,9 @@ fn a_general_force() {
                 from_momentum: stages % 2 == 0,
                 t_end,
                 steps,
-                stages,
+                method: GaussCollocation { stages },
             };
-            case.compare(system.name(), 3e-13, 1e-8);
+            case.compare(&format!("{}, {stages} stages", system.name()), 3e-13, 1e-8);
         }
     }
     run(&Pendulum::default());
@@ -76,13 +77,29 @@ fn drag() {
     let force = VelocityDrag { linear: [0.2, 0.1].into(), quadratic: 0.3 };
     let forced = Forced { lagrangian: DoublePendulum::default(), force };
     let start = VelocityPoint::new([1.0, 0.4], [0.5, -0.7], 0.2);
-    let case = Case { lagrangian: &forced, t0: 0.0, start, from_momentum: false, t_end: 0.8, steps: 4, stages: 8 };
+    let case = Case {
+        lagrangian: &forced,
+        t0: 0.0,
+        start,
+        from_momentum: false,
+        t_end: 0.8,
+        steps: 4,
+        method: GaussCollocation { stages: 8 },
+    };
     case.compare("drag", 3e-13, 1e-8);
     let nested = Forced { lagrangian: forced, force: Stirring { a: 0.4, b: 0.3 } };
     assert_eq!(
         Parametric::<2>::parameter_names(&nested)[4..],
         ["gamma", "linear[0]", "linear[1]", "quadratic", "a", "b"]
     );
-    let case = Case { lagrangian: &nested, t0: 0.0, start, from_momentum: false, t_end: 0.8, steps: 4, stages: 6 };
+    let case = Case {
+        lagrangian: &nested,
+        t0: 0.0,
+        start,
+        from_momentum: false,
+        t_end: 0.8,
+        steps: 4,
+        method: GaussCollocation { stages: 6 },
+    };
     case.compare("drag and stirring", 3e-13, 1e-8);
 }

@@ -3,21 +3,52 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{Parametric, VelocityPoint, legendre};
+use discrete_herglotz::rules::{self, CompositionMethod};
 use discrete_herglotz::sensitivity::{EndCovector, StateDerivative, Variable};
-use discrete_herglotz::{GaussCollocation, Outcome, Problem, Start, Status, Steps, Until};
+use discrete_herglotz::{GaussCollocation, Outcome, Problem, Run, SplittingScheme, Start, Status, Steps, Until};
+
+/// An integrator whose runs are differentiated.
+pub trait Method: Copy {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N>;
+}
+
+impl Method for GaussCollocation {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+        problem.by(self)
+    }
+}
+
+impl Method for SplittingScheme {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+        problem.by(self)
+    }
+}
+
+impl Method for rules::Method {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+        problem.by(self)
+    }
+}
+
+/// Compositions.
+impl Method for (rules::Method, SplittingScheme) {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+        problem.by(CompositionMethod::new(self.0, self.1))
+    }
+}
 
 /// A run of a system.
-pub struct Case<'a, L, const N: usize> {
+pub struct Case<'a, L, M, const N: usize> {
     pub lagrangian: &'a L,
     pub t0: f64,
     pub start: VelocityPoint<N>,
     pub from_momentum: bool,
     pub t_end: f64,
     pub steps: usize,
-    pub stages: usize,
+    pub method: M,
 }
 
-impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
+impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
     fn start(&self) -> Start<N> {
         if self.from_momentum {
             Start::Momentum(legendre(self.lagrangian, self.t0, &self.start), self.start.v)
@@ -50,7 +81,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         }
         let lagrangian = changed.as_ref().unwrap_or(self.lagrangian);
         let problem = Problem::new(lagrangian, t0, start).unwrap();
-        let run = problem.by(GaussCollocation { stages: self.stages }).steps(Steps::Count(self.steps));
+        let run = self.method.run(&problem).steps(Steps::Count(self.steps));
         let outcome = run.run(Until::Time(t_end)).unwrap();
         assert_eq!(outcome.status, Status::Completed);
         outcome
@@ -93,7 +124,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
     /// the largest derivative.
     pub fn compare(&self, name: &str, adjoint: f64, difference: f64) {
         let problem = self.problem();
-        let run = || problem.by(GaussCollocation { stages: self.stages }).steps(Steps::Count(self.steps));
+        let run = || self.method.run(&problem).steps(Steps::Count(self.steps));
         let variables = Variable::all(&problem);
         let tangent = run().tangent(&variables, Until::Time(self.t_end)).unwrap();
         let plain = run().run(Until::Time(self.t_end)).unwrap();
@@ -122,7 +153,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
                     .copied()
                     .collect();
                 let (of_gradient, of_difference) = (all[k], differences[i]);
-                let what = format!("{name}, {} stages, component {i} in {variable:?}", self.stages);
+                let what = format!("{name}, component {i} in {variable:?}");
                 let apart = (of_column - of_gradient).abs() / size;
                 assert!(apart <= adjoint, "{what}: forward {of_column:e}, backward {of_gradient:e}, apart {apart:e}");
                 let apart = (of_column - of_difference).abs() / size;

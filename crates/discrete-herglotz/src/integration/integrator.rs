@@ -1,5 +1,6 @@
 //! Integrators: the trait, the properties of a method and the options of its stepper.
 
+use crate::rules::Node;
 use crate::{InputError, Problem, SplittingScheme, Stepper};
 use std::borrow::Cow;
 
@@ -95,6 +96,23 @@ pub trait Integrator<'a, L, const N: usize> {
     fn batch_kernel(&self) -> Option<BatchKernel> {
         None
     }
+
+    /// The sub-flows of which a step consists, from which the tangent of the step is computed; `None` where the tangent is
+    /// not implemented, and for collocation, whose tangent is computed from its stages.
+    fn step_formula(&self) -> Option<StepFormula> {
+        None
+    }
+}
+
+/// The sub-flows of which a step consists.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StepFormula {
+    /// The exact flows of a splitting scheme.
+    Splitting(SplittingScheme),
+    /// One step of the quadrature rule with these nodes.
+    Rule(&'static [Node]),
+    /// Steps of the symmetric rule with these nodes, over the fractions of a step that are the substeps of a scheme.
+    Composition(&'static [Node], SplittingScheme),
 }
 
 /// A kernel that takes the steps of an [`Integrator`] for many motions at once.

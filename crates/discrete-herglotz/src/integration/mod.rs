@@ -16,7 +16,7 @@ pub(crate) mod stepper;
 pub use check_claims::{check_claims, check_unforced};
 pub(crate) use check_claims::{check_kicks, depends_on_action, is_separable};
 pub use dense_step::DenseStep;
-pub use integrator::{BatchKernel, Integrator, MethodInfo, StepperOptions};
+pub use integrator::{BatchKernel, Integrator, MethodInfo, StepFormula, StepperOptions};
 pub use interrupt::{INTERRUPTION, Interrupt};
 pub use plan_entry::PlanEntry;
 pub use problem::{Problem, Start};

@@ -1,5 +1,6 @@
 //! Discrete Lagrangians as integrators.
 
+use crate::integration::StepFormula;
 use crate::{
     DiscreteLagrangian, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper, StepperOptions,
     rules::{AnyDiscreteLagrangian, Composition, Flow, Method, Quadrature, Rule},
@@ -30,6 +31,11 @@ pub trait DiscretizationMethod<'a, L, const N: usize> {
     /// # Errors
     /// An [`InputError`] where the method cannot construct it.
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError>;
+
+    /// The formula of its step, from which the tangent is computed; `None`, the default, where it is not implemented.
+    fn step_formula(&self) -> Option<StepFormula> {
+        None
+    }
 }
 
 /// Implements [`Integrator`] for a discretisation method. (A blanket implementation would overlap with implementations
@@ -56,6 +62,10 @@ macro_rules! integrates {
             ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
                 let ld = DiscretizationMethod::<'a, L, N>::discretise(self, problem, h)?;
                 Ok(Box::new(Flow::with_guess(ld, problem.t0, problem.state, problem.start.v)?))
+            }
+
+            fn step_formula(&self) -> Option<StepFormula> {
+                DiscretizationMethod::<'a, L, N>::step_formula(self)
             }
         }
     };
@@ -86,6 +96,10 @@ impl<'a, L: Lagrangian<N> + 'a, R: Rule, const N: usize> DiscretizationMethod<'a
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError> {
         Quadrature::new(problem.lagrangian, h)
     }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(StepFormula::Rule(R::NODES))
+    }
 }
 
 impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> for Method {
@@ -106,6 +120,10 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
 
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError> {
         Method::discretise(*self, problem.lagrangian, h, problem.t0, &problem.state)
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(self.nodes().map_or(StepFormula::Splitting(SplittingScheme::STRANG), StepFormula::Rule))
     }
 }
 
@@ -204,5 +222,16 @@ impl<'a, L: Lagrangian<N>, D: DiscretizationMethod<'a, L, N>, const N: usize> In
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         let rule = |h| self.rule.discretise(problem, h);
         Ok(Box::new(Composition::new(rule, &self.scheme, h, problem.t0, problem.state)?))
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        match self.rule.step_formula()? {
+            StepFormula::Rule(nodes) => Some(StepFormula::Composition(nodes, self.scheme)),
+            // A composition of kick, drift, kick is the splitting of the scheme.
+            StepFormula::Splitting(rule) if rule == SplittingScheme::STRANG => {
+                Some(StepFormula::Splitting(self.scheme))
+            }
+            _ => None,
+        }
     }
 }

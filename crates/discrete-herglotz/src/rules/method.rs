@@ -3,7 +3,7 @@
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use crate::{
     DiscreteLagrangian, DiscreteStep, InputError, StepError,
-    rules::{LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Trapezoidal},
+    rules::{LeftMidpoint, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal},
     solve::Solver,
     splitting::Strang,
 };
@@ -105,6 +105,17 @@ impl Method {
             Method::Strang => {
                 Known { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
             }
+        }
+    }
+
+    /// The nodes of a quadrature rule; `None` for the Strang splitting.
+    pub(crate) fn nodes(self) -> Option<&'static [Node]> {
+        match self {
+            Method::Rectangle => Some(RectangleRule::NODES),
+            Method::LeftMidpoint => Some(LeftMidpointRule::NODES),
+            Method::Midpoint => Some(MidpointRule::NODES),
+            Method::Trapezoidal => Some(TrapezoidalRule::NODES),
+            Method::Strang => None,
         }
     }
 

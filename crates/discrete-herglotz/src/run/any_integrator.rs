@@ -4,7 +4,7 @@ use crate::{
     DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
     StepperOptions, TransformedGauss,
     gauss::Gauss,
-    integration::BatchKernel,
+    integration::{BatchKernel, StepFormula},
     rules::{CompositionMethod, Method},
 };
 use contact_geom::Lagrangian;
@@ -119,6 +119,10 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
         each!(*self, integrator => Integrator::<'a, L, N>::batch_kernel(&integrator))
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        each!(*self, integrator => Integrator::<'a, L, N>::step_formula(&integrator))
     }
 }
 

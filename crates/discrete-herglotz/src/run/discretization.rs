@@ -6,7 +6,8 @@ use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::motion::{Motion, NearbyVelocity};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, Shared, StepSelection};
-use crate::sensitivity::SolvedStages;
+use crate::sensitivity::flows::StepEnds;
+use crate::sensitivity::step_tangent::TakenStep;
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
@@ -136,17 +137,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         self.info.collocation.unwrap_or(1)
     }
 
-    /// The stages of the step from the start of a step to a time within it, with the state there and its velocity.
+    /// The step from the start of a step to a time within it, with the state there and its velocity.
     pub fn shortened(
         &self,
-        step: &SolvedStages<N>,
+        step: &TakenStep<N>,
         t: f64,
-    ) -> Result<(SolvedStages<N>, PhasePoint<N>, SVector<f64, N>), StepError> {
-        let near = SVector::from_fn(|d, _| step.v[d].0[0]);
-        let stepper = self.step_to(&(step.t, step.start), t, Some(near), None)?;
-        let state = stepper.state();
-        let v = self.velocity(t, &state, stepper.last_velocity())?;
-        Ok((stepper.solved_stages().ok_or(StepError::NonFinite)?, state, v))
+    ) -> Result<(TakenStep<N>, PhasePoint<N>, SVector<f64, N>), StepError> {
+        let (t0, start) = step.start();
+        let stepper = self.step_to(&(t0, *start), t, Some(step.velocity()), None)?;
+        let end = stepper.state();
+        let v = self.velocity(t, &end, stepper.last_velocity())?;
+        let short = match step {
+            TakenStep::Collocation(_) => {
+                TakenStep::Collocation(Box::new(stepper.solved_stages().ok_or(StepError::NonFinite)?))
+            }
+            TakenStep::Flow(_) => TakenStep::Flow(StepEnds { t: t0, h: t - t0, start: *start, end }),
+        };
+        Ok((short, end, v))
     }
 
     /// Whether the steps of a Gauss method have enough stages for defect samples between the nodes.

@@ -68,6 +68,27 @@ impl<const N: usize> Column<N> {
         column
     }
 
+    /// Adds a multiple of another tangent, with that of its rates.
+    pub fn add_multiple(&mut self, factor: f64, other: &Self) {
+        self.q += other.q * factor;
+        self.p += other.p * factor;
+        self.z += other.z * factor;
+        self.rates.add_multiple(factor, &other.rates);
+    }
+
+    /// Multiplies the tangent by a factor, with its rates.
+    pub fn scale(&mut self, factor: f64) {
+        self.q *= factor;
+        self.p *= factor;
+        self.z *= factor;
+        self.rates.scale(factor);
+    }
+
+    /// The Euclidean product of the components `(q, p, z)` with those of another tangent.
+    pub fn dot(&self, other: &Self) -> f64 {
+        self.q.dot(&other.q) + self.p.dot(&other.p) + self.z * other.z
+    }
+
     /// The same tangent without an initial guess of its rates.
     fn copied(&self) -> Self {
         let Column { q, p, z, parameter, dt0, dh, .. } = *self;

@@ -4,13 +4,13 @@ use crate::run::discretization::Discretization;
 use crate::run::{Motion, Outcome, Plan, Row, Rows, Run, Until};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
-use crate::sensitivity::engine::{Covector, Engine};
+use crate::sensitivity::engine::Covector;
 use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::row_times::{check_times, is_same_time};
-use crate::sensitivity::solved_stages::SolvedStages;
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::tangent::{check_tangent, no_tangent};
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
+use crate::sensitivity::tangent::no_tangent;
 use crate::{InputError, Problem, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
@@ -26,7 +26,8 @@ pub struct Gradient<const N: usize> {
     pub rate: SVector<f64, N>,
     /// In the initial action.
     pub z: f64,
-    /// In the parameters, in the order of [`Parametric::parameter_names`].
+    /// In the parameters, in the order of [`Parametric::parameter_names`]; NaN for a parameter in which the steps of a
+    /// splitting are not differentiable, because its hypotheses hold only for one value.
     pub parameters: Vec<f64>,
     /// In the time of the start, for a fixed end time and a fixed number of steps.
     pub t0: f64,
@@ -65,7 +66,8 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     pub fn record(self, until: Until) -> Result<RecordedRun<'p, L, N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
-        check_tangent(&plan)?;
+        // An integrator without a tangent is refused before the run.
+        StepTangent::new(&plan.steps, Direction::Backward)?;
         let mut kept = KeptStates::new();
         let outcome = run.observed(&plan, &mut kept)?;
         Ok(RecordedRun { plan, outcome, kept })
@@ -135,7 +137,8 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     ) -> Result<LossGradient<N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
-        check_tangent(&plan)?;
+        // An integrator without a tangent is refused before the run.
+        StepTangent::new(&plan.steps, Direction::Backward)?;
         let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;
         let (kept, rows) = both;
@@ -231,20 +234,21 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             explicit_times.push(time);
             all.push(Covector::new(&of_state, parameters));
         }
-        let mut engine = Engine::new(problem, steps.stages(), steps.h, Direction::Backward);
-        let mut rows = RowCovectors { steps, times, of_rows, engine: None };
+        let mut engine = StepTangent::new(steps, Direction::Backward)?;
+        let mut rows = RowCovectors { steps, times, of_rows, engine: RowTangent::new() };
         let mut stepper = self.plan.stepper()?;
-        let mut block: Vec<SolvedStages<N>> = Vec::with_capacity(BLOCK);
+        let mut block: Vec<TakenStep<N>> = Vec::with_capacity(BLOCK);
         let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
             block.clear();
             for k in range.clone() {
+                let before = (stepper.time(), stepper.state());
                 stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
-                block.push(stepper.solved_stages().ok_or_else(|| no_tangent(&self.plan, ""))?);
+                block.push(engine.taken(&*stepper, steps.h, before).ok_or_else(|| no_tangent(&self.plan, ""))?);
             }
             for (k, step) in range.zip(&block).rev() {
                 engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
                 if let Some(first) = all.first_mut() {
-                    rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
+                    rows.add(&mut engine, step, k, first).map_err(|cause| failed(k, cause))?;
                 }
             }
             Ok(())
@@ -263,29 +267,35 @@ struct RowCovectors<'r, 'p, L, const N: usize> {
     steps: &'r Discretization<'p, L, N>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
-    engine: Option<Engine<'p, L, N>>,
+    engine: RowTangent<'p, L, N>,
 }
 
-impl<L: Parametric<N>, const N: usize> RowCovectors<'_, '_, L, N> {
-    /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start.
-    fn add(&mut self, step: &SolvedStages<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
+    /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start; `engine` is the tangent of whole
+    /// steps.
+    fn add(
+        &mut self,
+        engine: &mut StepTangent<'p, L, N>,
+        step: &TakenStep<N>,
+        k: usize,
+        to: &mut Covector<N>,
+    ) -> Result<(), StepError> {
         let problem = self.steps.problem;
+        let (t0, start) = step.start();
         while let (Some((t, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) {
-            let passed = if step.h < 0.0 { *t <= step.t } else { *t >= step.t };
-            if is_same_time(*t, step.t) {
-                let near = SVector::from_fn(|d, _| step.v[d].0[0]);
-                let v = self.steps.velocity(step.t, &step.start, Some(near))?;
-                let x = VelocityPoint { q: step.start.q, v, z: step.start.z };
-                let (of_state, parameters, _) = VelocityDependence::at(problem, step.t, &x)?.pull(covector);
-                let rates = self.steps.rates(step.t, &step.start, Some(v))?;
+            let passed = if step.length() < 0.0 { *t <= t0 } else { *t >= t0 };
+            if is_same_time(*t, t0) {
+                let v = self.steps.velocity(t0, start, Some(step.velocity()))?;
+                let x = VelocityPoint { q: start.q, v, z: start.z };
+                let (of_state, parameters, _) = VelocityDependence::at(problem, t0, &x)?.pull(covector);
+                let rates = self.steps.rates(t0, start, Some(v))?;
                 to.add_at_fixed_time(&of_state, &parameters, &rates, k);
             } else if passed {
                 let (short, state, v) = self.steps.shortened(step, *t)?;
                 let x = VelocityPoint { q: state.q, v, z: state.z };
                 let (of_state, parameters, _) = VelocityDependence::at(problem, *t, &x)?.pull(covector);
-                let engine = Engine::of_row(&mut self.engine, problem, &short, Direction::Backward);
                 let mut row = Covector::new(&of_state, parameters);
-                engine.pull(&short, 0, std::slice::from_mut(&mut row))?;
+                self.engine.pull(engine, problem, &short, std::slice::from_mut(&mut row))?;
                 to.add_row(&row, k);
             } else {
                 break;

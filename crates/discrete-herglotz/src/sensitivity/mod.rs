@@ -7,24 +7,31 @@
 //! `w = (l_P, -l_rho, -l_q, l_z)` of the step backward at the same stages, and the derivative in a parameter theta is
 //! `h sum_i b_i d(rho L_theta)[w_i]` summed over the steps. It is the exact gradient of the discrete run. See section 10
 //! of `docs/theory.md`.
+//!
+//! Splittings, quadrature rules and their compositions are differentiated sub-flow by sub-flow. [Lyapunov
+//! exponents](crate::Run::lyapunov_exponents) are the growth rates of the tangent.
 
 mod end_state;
 mod engine;
 mod error;
+pub(crate) mod flows;
 mod gradient;
 mod kept_states;
 mod linear_stages;
+mod lyapunov;
 mod parameter_derivatives;
 mod row_times;
 mod solved_stages;
 mod stage_derivatives;
 mod step_maps;
+pub(crate) mod step_tangent;
 mod tangent;
 mod variable;
 
 pub use end_state::{EndCovector, EndState, Loss};
 pub use error::SensitivityError;
 pub use gradient::{Gradient, LossGradient, RecordedRun};
+pub use lyapunov::LyapunovExponents;
 pub use solved_stages::SolvedStages;
 pub use tangent::{StateDerivative, Tangent, TangentRow};
 pub use variable::Variable;

@@ -2,11 +2,12 @@
 
 use crate::run::{Motion, Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
 use crate::sensitivity::end_state::VelocityDependence;
-use crate::sensitivity::engine::{Column, Engine};
+use crate::sensitivity::engine::Column;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::variable::Variable;
-use crate::sensitivity::{EndState, SensitivityError, SolvedStages};
+use crate::sensitivity::{EndState, SensitivityError};
 use crate::{InputError, Problem, Status, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
@@ -54,9 +55,11 @@ pub struct StateDerivative<const N: usize> {
 /// Carries columns along a run.
 struct Columns<'r, 'p, L, const N: usize> {
     plan: &'r Plan<'p, L, N>,
-    engine: Engine<'p, L, N>,
+    engine: StepTangent<'p, L, N>,
     /// For the shortened steps to rows.
-    row_engine: Option<Engine<'p, L, N>>,
+    row_engine: RowTangent<'p, L, N>,
+    /// The time and the state at the start of the next step.
+    before: (f64, PhasePoint<N>),
     columns: Vec<Column<N>>,
     times: RowTimes,
     rows: Vec<TangentRow<N>>,
@@ -68,7 +71,9 @@ struct Columns<'r, 'p, L, const N: usize> {
 impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
-        let step = at.stepper.solved_stages().ok_or_else(|| no_tangent(self.plan, ""))?;
+        let before = std::mem::replace(&mut self.before, (at.t, at.state));
+        let taken = self.engine.taken(at.stepper, self.plan.step_size(), before);
+        let step = taken.ok_or_else(|| no_tangent(self.plan, ""))?;
         self.rows_within(&step, at)?;
         let failed = |cause| SensitivityError::Step { step: k, cause };
         let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
@@ -78,15 +83,14 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     }
 
     /// The rows between the ends of the last step, from its start by shortened steps.
-    fn rows_within(&mut self, step: &SolvedStages<N>, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+    fn rows_within(&mut self, step: &TakenStep<N>, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let failed = |cause| SensitivityError::Step { step: k, cause };
         let steps = &self.plan.steps;
-        while let Some(t) = self.times.next_within((step.t, at.t)) {
+        while let Some(t) = self.times.next_within((step.start().0, at.t)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
-            let engine = Engine::of_row(&mut self.row_engine, steps.problem, &short, Direction::Forward);
             let mut columns: Vec<_> = self.columns.iter().map(|column| column.for_row(k)).collect();
-            engine.push(&short, 0, &mut columns).map_err(failed)?;
+            self.row_engine.push(&mut self.engine, steps.problem, &short, &mut columns).map_err(failed)?;
             let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
             self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);
         }
@@ -128,6 +132,7 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        self.before = (at.t, at.state);
         let row = self.row_at_end(at);
         self.end_on_failure(row)
     }
@@ -208,13 +213,17 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     ) -> Result<Tangent<N>, SensitivityError> {
         let run = self.differentiable()?;
         let plan = run.plan(until)?;
-        check_tangent(&plan)?;
+        let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
         let problem = plan.steps.problem;
         let columns = variables.iter().map(|v| v.column(problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
+        if let Some(case) = columns.iter().find_map(|column| engine.obstacle(column.parameter?)) {
+            return Err(no_tangent(&plan, case));
+        }
         let mut carried = Columns {
             plan: &plan,
-            engine: Engine::new(problem, plan.steps.stages(), plan.step_size(), Direction::Forward),
-            row_engine: None,
+            engine,
+            row_engine: RowTangent::new(),
+            before: (problem.t0, problem.state),
             columns,
             times: RowTimes::new(times),
             rows: Vec::with_capacity(times.len()),
@@ -253,18 +262,7 @@ fn tangent<L: Parametric<N>, const N: usize>(
     }
 }
 
-/// Checks that the integrator of a plan has a tangent.
-pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>) -> Result<(), SensitivityError> {
-    let info = &plan.steps.info;
-    if info.collocation.is_none() || info.in_transformed_time || info.divides {
-        return Err(no_tangent(plan, ""));
-    }
-    if plan.steps.switches {
-        return Err(no_tangent(plan, " for Lagrangians with switching functions"));
-    }
-    Ok(())
-}
-
+/// The error of a run whose integrator has no tangent.
 pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(
     plan: &Plan<'_, L, N>,
     case: &'static str,

@@ -102,7 +102,7 @@ impl ActionMap for RiccatiMap {
 
 impl Riccati {
     /// Determines b and c from a Lagrangian and verifies that `L_z = b + 2 c z`.
-    pub(super) fn of<const N: usize>(
+    pub(crate) fn of<const N: usize>(
         lagrangian: &impl Lagrangian<N>,
         t: f64,
         state: &PhasePoint<N>,

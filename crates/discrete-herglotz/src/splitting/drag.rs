@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The number of nodes of the quadrature along a drift. Its order 12 is higher than that of every scheme here.
-pub(super) const QUADRATURE_NODES: usize = 6;
+pub(crate) const QUADRATURE_NODES: usize = 6;
 
 /// The rate `gamma(t) = L_z` of a linear drag.
 #[derive(Clone, Copy, Debug)]

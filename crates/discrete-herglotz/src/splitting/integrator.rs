@@ -4,7 +4,8 @@ use super::separable::SeparableForm;
 use super::velocity_drag::check_force;
 use super::{ActionSplitting, DragSplitting, Splitting};
 use crate::SplittingScheme;
-use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
+use crate::integration::{BatchKernel, StepFormula};
+use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 
@@ -63,5 +64,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
         Some(BatchKernel::Splitting(*self))
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(StepFormula::Splitting(*self))
     }
 }

@@ -12,7 +12,7 @@ mod strang;
 #[cfg(test)]
 mod tests;
 mod velocity_drag;
-mod velocity_drag_flow;
+pub(crate) mod velocity_drag_flow;
 
 pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
 pub use action_strang::ActionStrang;

@@ -11,7 +11,7 @@ use crate::{
     splitting::drag::Drift,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, ForceStructure, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{ForceStructure, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + gamma z` with an applied force of the form
 /// `f_i(t, q) - c_i v_i - k |v| v_i` ([`ForceStructure::Drag`]).
@@ -99,18 +99,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> DragSplitting<'a, L, N> {
             return Err(InputError::Unclaimed { claim: "constant_rate" });
         }
         check_force(form.lagrangian, scheme.is_nystrom())?;
-        let (linear, quadratic) = match form.lagrangian.force_structure() {
-            ForceStructure::Drag { linear, quadratic } => (linear, quadratic),
-            _ => (SVector::zeros(), 0.0),
-        };
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        let gamma = form.lagrangian.rate(t0, &rest);
-        let refused = InputError::Forced { method: "a splitting with a mass matrix that has other entries" };
-        let mass = form.diagonal_mass().ok_or(refused)?;
-        if quadratic != 0.0 && mass.iter().any(|m| *m != mass[0]) {
-            return Err(InputError::Forced { method: "a splitting with different masses beside a quadratic drag" });
-        }
-        let law = DragLaw { gamma, mass, linear, quadratic };
+        let law = DragLaw::of(&form, t0, &rest)?;
+        let gamma = law.gamma;
         let kick = form.first_kick(t0, &state.q, 0.0)?;
         let SubstepTable { first, joined, closing } = SubstepTable::new(scheme, h, |s| Drift::constant(gamma, s));
         let with_flow = |stages: Vec<Stage>| stages.into_iter().map(|stage| (stage, law.over(stage.span))).collect();

@@ -1,13 +1,16 @@
 //! The flow of the kinetic part with a drag of the velocity.
 
 use super::drag::QUADRATURE_NODES;
+use super::separable::SeparableForm;
+use crate::InputError;
 use crate::gauss::tables::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, ForceStructure, Lagrangian, VelocityPoint};
 use std::array::from_fn;
 
 /// The kinetic part of a Lagrangian with its drag: `p_i' = (gamma - c_i/m_i) p_i - k/m^2 |p| p_i`, `q_i' = p_i/m_i`,
 /// `z' = gamma z + sum_i p_i^2/(2 m_i)`. Where k is not 0, the masses are equal and so are the `c_i`.
-pub(super) struct DragLaw<const N: usize> {
+pub(crate) struct DragLaw<const N: usize> {
     pub gamma: f64,
     pub mass: SVector<f64, N>,
     pub linear: SVector<f64, N>,
@@ -16,7 +19,7 @@ pub(super) struct DragLaw<const N: usize> {
 
 /// The flow of a [`DragLaw`] over a time s.
 #[derive(Clone, Debug)]
-pub(super) enum DragFlow<const N: usize> {
+pub(crate) enum DragFlow<const N: usize> {
     /// Without a quadratic drag.
     Linear {
         /// `e^(gamma s) - 1`.
@@ -47,6 +50,28 @@ fn length(rate: f64, s: f64) -> f64 {
 }
 
 impl<const N: usize> DragLaw<N> {
+    /// The law of a separable Lagrangian with a drag of the velocity, at a time and a point at rest.
+    ///
+    /// # Errors
+    /// [`InputError::Forced`] for a mass matrix of another form.
+    pub fn of<L: Lagrangian<N>>(
+        form: &SeparableForm<&L, N>,
+        t: f64,
+        rest: &VelocityPoint<N>,
+    ) -> Result<Self, InputError> {
+        let (linear, quadratic) = match form.lagrangian.force_structure() {
+            ForceStructure::Drag { linear, quadratic } => (linear, quadratic),
+            _ => (SVector::zeros(), 0.0),
+        };
+        let gamma = form.lagrangian.rate(t, rest);
+        let refused = InputError::Forced { method: "a splitting with a mass matrix that has other entries" };
+        let mass = form.diagonal_mass().ok_or(refused)?;
+        if quadratic != 0.0 && mass.iter().any(|m| *m != mass[0]) {
+            return Err(InputError::Forced { method: "a splitting with different masses beside a quadratic drag" });
+        }
+        Ok(DragLaw { gamma, mass, linear, quadratic })
+    }
+
     /// The flow over a time s of either sign.
     pub fn over(&self, s: f64) -> DragFlow<N> {
         let DragLaw { gamma, mass, linear, quadratic } = self;

@@ -1,0 +1,47 @@
+//! The derivative of the flow of an action that is a polynomial of degree two.
+
+use super::exponential_integrals::{length, moment};
+use super::sub_flow::SubFlow;
+use super::tangent_matrix::TangentMatrix;
+use crate::splitting::Riccati;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{ChartVector, PhasePoint};
+
+/// Applies the flow of `f(z) = b z + c z^2` over a time s to a state, `z -> phi(z)`, `p -> phi'(z) p`, with its derivatives;
+/// `coefficients` are those of `(b, c)` in each parameter.
+///
+/// With the integral l of `e^(b u)` over s, and `D = 1 - c l z`, it is `phi = e^(b s) z / D` and `phi' = e^(b s) / D^2`.
+pub(super) fn linearise<const N: usize>(
+    Riccati { b, c }: Riccati,
+    s: f64,
+    coefficients: Option<&[[f64; 2]]>,
+    state: &mut PhasePoint<N>,
+) -> SubFlow<N> {
+    let PhasePoint { p, z, .. } = *state;
+    let (growth, l) = ((b * s).exp(), length(b, s));
+    let below = 1.0 - c * l * z;
+    let below = if below > 0.0 { below } else { f64::NAN };
+    let slope = growth / (below * below);
+    let image = growth * z / below;
+    let state_map = TangentMatrix {
+        pp: SMatrix::identity() * slope,
+        pz: p * (2.0 * slope * c * l / below),
+        zz: slope,
+        ..TangentMatrix::identity()
+    };
+    let mut sources = Vec::new();
+    if let Some(coefficients) = coefficients {
+        let source = |of_image: f64, of_slope: f64| ChartVector { x: SVector::zeros(), y: p * of_slope, z: of_image };
+        let lasts = moment(b, s);
+        for [db, dc] in coefficients {
+            // The change of -D/z.
+            let bend = dc * l + c * lasts * db;
+            let stretch = s * db;
+            sources.push(source(image * (stretch + bend * z / below), slope * (stretch + 2.0 * bend * z / below)));
+        }
+        sources.push(source(0.0, 0.0));
+        sources.push(source((b + c * image) * image, (b + 2.0 * c * image) * slope));
+    }
+    (state.p, state.z) = (p * slope, image);
+    SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 }
+}

@@ -1,0 +1,143 @@
+//! Tangents and adjoints of steps that are compositions of sub-flows: splittings, quadrature rules and compositions of rules.
+//!
+//! The derivative of each sub-flow in the state, in the parameters, in the time and in its duration has a closed form, or
+//! follows from the linearised equations of the rule. The tangent of a step is their product; its adjoint is the product of
+//! their transposes, in the reverse order.
+
+mod action_map;
+mod coefficients;
+mod drift;
+mod exponential_integrals;
+mod kick;
+mod rule_step;
+mod rules;
+mod splittings;
+mod sub_flow;
+mod tangent_matrix;
+mod velocity_drag;
+
+use crate::integration::StepFormula;
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::engine::{Column, Covector};
+use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
+use crate::{Problem, StepError};
+use contact_geom::numbers::max_or_nan;
+use contact_geom::{Parametric, PhasePoint};
+use rules::Rules;
+use splittings::{ActionFlows, DragFlows, LinearDragFlows};
+use sub_flow::SubFlow;
+
+/// The ends of a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StepEnds<const N: usize> {
+    pub t: f64,
+    pub h: f64,
+    pub start: PhasePoint<N>,
+    pub end: PhasePoint<N>,
+}
+
+/// A method whose steps are compositions of sub-flows.
+trait SubFlows<const N: usize> {
+    /// Appends the sub-flows of a step, linearised at its states; with their sources, if `of` is given.
+    ///
+    /// # Errors
+    /// [`StepError`] for a step of a rule that cannot be solved.
+    fn linearise(
+        &self,
+        step: &StepEnds<N>,
+        of: Option<&mut ParameterDerivatives<N>>,
+        flows: &mut Vec<SubFlow<N>>,
+    ) -> Result<(), StepError>;
+
+    /// Why the steps are not differentiable in a parameter, if they are not.
+    fn obstacle(&self, _parameter: usize) -> Option<&'static str> {
+        None
+    }
+}
+
+/// The tangent of steps that are compositions of sub-flows, with its workspace.
+pub(crate) struct FlowEngine<'a, const N: usize> {
+    method: Box<dyn SubFlows<N> + 'a>,
+    of_parameters: ParameterDerivatives<N>,
+    flows: Vec<SubFlow<N>>,
+    /// Why the steps are not differentiable in each parameter, if they are not.
+    obstacles: Vec<Option<&'static str>>,
+}
+
+impl<'a, const N: usize> FlowEngine<'a, N> {
+    /// # Errors
+    /// Those of the steps of the method.
+    pub fn new<L: Parametric<N>>(problem: &Problem<'a, L, N>, formula: StepFormula) -> Result<Self, SensitivityError> {
+        let lagrangian = problem.lagrangian;
+        let mut of_parameters = ParameterDerivatives::new(lagrangian);
+        let of = &mut of_parameters;
+        let method: Box<dyn SubFlows<N> + 'a> = match formula {
+            StepFormula::Splitting(scheme) if !problem.structure.is_affine_in_z() => {
+                Box::new(ActionFlows::new(problem, &scheme, of)?)
+            }
+            StepFormula::Splitting(scheme) if DragFlows::applies(problem, of) => {
+                Box::new(DragFlows::new(problem, &scheme, of)?)
+            }
+            StepFormula::Splitting(scheme) => Box::new(LinearDragFlows::new(problem, &scheme, of)?),
+            StepFormula::Rule(nodes) => Box::new(Rules { lagrangian, nodes, lengths: vec![1.0] }),
+            StepFormula::Composition(nodes, scheme) => {
+                let lengths = scheme.substeps().unwrap_or_else(|| vec![1.0]);
+                Box::new(Rules { lagrangian, nodes, lengths })
+            }
+        };
+        let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
+        Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
+    }
+
+    /// Why the steps are not differentiable in a parameter, if they are not.
+    pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
+        self.obstacles.get(parameter).copied().flatten()
+    }
+
+    fn linearise(&mut self, step: &StepEnds<N>, with_sources: bool) -> Result<(), StepError> {
+        self.flows.clear();
+        let of = with_sources.then_some(&mut self.of_parameters);
+        self.method.linearise(step, of, &mut self.flows)?;
+        if let Some(first) = self.flows.first_mut() {
+            for (source, obstacle) in first.sources.iter_mut().zip(&self.obstacles) {
+                if obstacle.is_some() {
+                    source.z = f64::NAN;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
+    pub fn push(&mut self, step: &StepEnds<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+        let with_sources =
+            columns.iter().any(|column| column.parameter.is_some() || column.dt0 != 0.0 || column.dh != 0.0);
+        self.linearise(step, with_sources)?;
+        let mut largest = 0.0;
+        for column in columns {
+            self.flows.iter().for_each(|flow| flow.push(k, column));
+            largest = max_or_nan(largest, column.size());
+        }
+        if largest.is_finite() { Ok(largest) } else { Err(StepError::NonFinite) }
+    }
+
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn pull(&mut self, step: &StepEnds<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+        self.linearise(step, true)?;
+        for covector in covectors {
+            self.flows.iter().rev().for_each(|flow| flow.pull(k, covector));
+            let size = covector.size();
+            if !size.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            covector.largest = max_or_nan(covector.largest, size);
+        }
+        Ok(())
+    }
+}

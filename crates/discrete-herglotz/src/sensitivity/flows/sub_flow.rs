@@ -1,0 +1,56 @@
+//! A linearised sub-flow of a step.
+
+use super::tangent_matrix::TangentMatrix;
+use crate::sensitivity::engine::{Column, Covector};
+use contact_geom::ChartVector;
+
+/// A sub-flow of a step, linearised at the state where it acts: an exact flow of a splitting, or a step of a quadrature
+/// rule.
+#[derive(Clone, Debug)]
+pub(super) struct SubFlow<const N: usize> {
+    /// The derivative in the state.
+    pub state: TangentMatrix<N>,
+    /// The derivatives in each parameter, in the time at which it starts, and in its duration; empty if not requested.
+    pub sources: Vec<ChartVector<N>>,
+    /// The time at which it starts, from the start of the step, and its duration, in units of the step size.
+    pub start: f64,
+    pub duration: f64,
+}
+
+impl<const N: usize> SubFlow<N> {
+    /// The derivatives in the time and in the duration.
+    fn of_times(&self) -> Option<[&ChartVector<N>; 2]> {
+        let [.., time, duration] = self.sources.as_slice() else { return None };
+        Some([time, duration])
+    }
+
+    /// Carries a column over the sub-flow, in the k-th step of the run.
+    pub fn push(&self, k: usize, column: &mut Column<N>) {
+        let mut image = self.state.push(&ChartVector { x: column.q, y: column.p, z: column.z });
+        if let Some(source) = column.parameter.and_then(|index| self.sources.get(index)) {
+            image = image.plus(*source);
+        }
+        if let Some([time, duration]) = self.of_times()
+            && (column.dt0 != 0.0 || column.dh != 0.0)
+        {
+            let dt = column.dt0 + (k as f64 + self.start) * column.dh;
+            image = image.plus(time.scale(dt)).plus(duration.scale(self.duration * column.dh));
+        }
+        (column.q, column.p, column.z) = (image.x, image.y, image.z);
+    }
+
+    /// Carries a covector back over the sub-flow, in the k-th step of the run.
+    pub fn pull(&self, k: usize, covector: &mut Covector<N>) {
+        let w = ChartVector { x: covector.q, y: covector.p, z: covector.z };
+        for (sum, source) in covector.parameters.iter_mut().zip(&self.sources) {
+            *sum += source.dot(&w);
+        }
+        if let Some([time, duration]) = self.of_times() {
+            let of_time = time.dot(&w);
+            covector.time += of_time;
+            covector.step += (k as f64 + self.start) * of_time + self.duration * duration.dot(&w);
+        }
+        let image = self.state.pull(&w);
+        (covector.q, covector.p, covector.z) = (image.x, image.y, image.z);
+    }
+}

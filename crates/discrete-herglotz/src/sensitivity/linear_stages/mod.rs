@@ -1,0 +1,295 @@
+//! The linear stage equations of the tangent of a step, forward or backward: their coefficients, and which of the
+//! solutions in the modules applies.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+mod condensed;
+mod direct;
+mod iteration;
+
+use crate::StepError;
+use crate::gauss::tables::coefficients::MAX_STAGES;
+use crate::numbers::registers::Stages;
+use crate::sensitivity::stage_derivatives::{StageDerivatives, StageMatrix, StageVector};
+use crate::sensitivity::step_maps::{Direction, StepMaps};
+use condensed::CondensedMaps;
+use contact_geom::nalgebra::SMatrix;
+use direct::Fallback;
+use iteration::Kinds;
+use pulp::Simd;
+
+/// The coefficients of the linearised motion on the symplectification at the stages of a step. For the tangent
+/// `(q, P, z, r)` of `(q, P, z, rho)`, with the rates `(v, P', z', r')`:
+///
+/// `rho W v = P - r L_v - rho (v_q q + v_z z)`, `q' = v`, `P' = r p_r + rho (p_q q + p_v v + p_z z)`,
+/// `z' = z_q.q + L_v.v + L_z z`, `r' = -r L_z - rho (r_q.q + r_v.v + r_z z)`.
+///
+/// For the tangent of the step `v_q = L_vq`, `v_z = L_vz`, `p_r = L_q + f`, `p_q = L_qq + f_q`, `p_v = L_qv + f_v`,
+/// `p_z = L_qz + f_z`, `z_q = L_q`, `r_q = L_zq`, `r_v = L_zv`, `r_z = L_zz`. For its adjoint, the tangent of the step
+/// backward, the terms of the force are transposed: `v_q = L_vq + f_v^T`, `p_r = L_q`, `p_q = L_qq + f_q^T`,
+/// `p_v = L_qv`, `p_z = L_qz`, `z_q = L_q + f`, `r_q = L_zq + f_z`. The matrices are stored with the factor rho.
+pub(crate) struct LinearStages<const N: usize> {
+    pub direction: Direction,
+    /// Whether z and r act on the motion of q and P.
+    coupled: bool,
+    inverse_mass: StageMatrix<N>,
+    l_v: StageVector<N>,
+    l_z: Stages,
+    v_q: StageMatrix<N>,
+    v_z: StageVector<N>,
+    p_r: StageVector<N>,
+    p_q: StageMatrix<N>,
+    p_v: StageMatrix<N>,
+    p_z: StageVector<N>,
+    z_q: StageVector<N>,
+    r_q: StageVector<N>,
+    r_v: StageVector<N>,
+    r_z: Stages,
+    /// Whether the equations have the terms `v_q`, `p_v`.
+    has_velocity_terms: bool,
+    condensed: Option<Box<CondensedMaps<N>>>,
+    /// The equations are solved by LU factorisation where their iteration does not converge.
+    fallback: Option<Box<Fallback<N>>>,
+}
+
+/// The rates of a tangent at the stages, and its values there.
+#[derive(Clone)]
+pub(crate) struct StageTangent<const N: usize> {
+    pub v: StageVector<N>,
+    pub p_rate: StageVector<N>,
+    pub z_rate: Stages,
+    pub r_rate: Stages,
+    pub q: StageVector<N>,
+    pub p: StageVector<N>,
+    pub z: Stages,
+    pub r: Stages,
+}
+
+impl<const N: usize> StageTangent<N> {
+    pub const ZERO: Self = StageTangent {
+        v: [Stages::ZERO; N],
+        p_rate: [Stages::ZERO; N],
+        z_rate: Stages::ZERO,
+        r_rate: Stages::ZERO,
+        q: [Stages::ZERO; N],
+        p: [Stages::ZERO; N],
+        z: Stages::ZERO,
+        r: Stages::ZERO,
+    };
+
+    /// Adds a multiple of the rates of another tangent; the values at the stages follow from the rates.
+    pub fn add_multiple(&mut self, factor: f64, other: &Self) {
+        let pairs = self.v.iter_mut().chain(&mut self.p_rate).zip(other.v.iter().chain(&other.p_rate));
+        let others = [(&mut self.z_rate, &other.z_rate), (&mut self.r_rate, &other.r_rate)];
+        for (to, from) in pairs.chain(others) {
+            to.0.iter_mut().zip(&from.0).for_each(|(to, from)| *to += factor * from);
+        }
+    }
+
+    /// Multiplies the rates by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        let rates = self.v.iter_mut().chain(&mut self.p_rate).chain([&mut self.z_rate, &mut self.r_rate]);
+        rates.flat_map(|rates| &mut rates.0).for_each(|rate| *rate *= factor);
+    }
+}
+
+/// The inhomogeneous terms: the values without the rates, and sources of the rates (`rho W v` contains `-v`).
+#[derive(Clone)]
+pub(crate) struct Inhomogeneity<const N: usize> {
+    pub q: StageVector<N>,
+    pub p: StageVector<N>,
+    pub z: Stages,
+    pub r: Stages,
+    pub v_source: StageVector<N>,
+    pub p_source: StageVector<N>,
+    pub z_source: Stages,
+    pub r_source: Stages,
+    /// Whether there is a tangent of rho: r or its source is not 0.
+    pub has_r: bool,
+}
+
+impl<const N: usize> Inhomogeneity<N> {
+    pub const ZERO: Self = Inhomogeneity {
+        q: [Stages::ZERO; N],
+        p: [Stages::ZERO; N],
+        z: Stages::ZERO,
+        r: Stages::ZERO,
+        v_source: [Stages::ZERO; N],
+        p_source: [Stages::ZERO; N],
+        z_source: Stages::ZERO,
+        r_source: Stages::ZERO,
+        has_r: false,
+    };
+}
+
+impl<const N: usize> LinearStages<N> {
+    /// The workspace; `coupled` states that z acts on the motion by more than a rate that depends on time alone.
+    pub fn new(direction: Direction, coupled: bool, has_velocity_terms: bool) -> Self {
+        let (vector, matrix) = ([Stages::ZERO; N], [[Stages::ZERO; N]; N]);
+        LinearStages {
+            direction,
+            coupled,
+            inverse_mass: matrix,
+            l_v: vector,
+            l_z: Stages::ZERO,
+            v_q: matrix,
+            v_z: vector,
+            p_r: vector,
+            p_q: matrix,
+            p_v: matrix,
+            p_z: vector,
+            z_q: vector,
+            r_q: vector,
+            r_v: vector,
+            r_z: Stages::ZERO,
+            has_velocity_terms,
+            condensed: None,
+            fallback: None,
+        }
+    }
+
+    /// Prepares the maps for constant mass and rate, where the derivatives at the stages are set and L is separable.
+    #[cold]
+    pub fn condense(&mut self, maps: &StepMaps, at: &StageDerivatives<N>, inverse_mass: &SMatrix<f64, N, N>) {
+        let gamma = at.l_z.0[0];
+        let (z, r) = (maps.resolvent(-gamma), maps.resolvent(gamma));
+        self.condensed = z.zip(r).map(|(z, r)| {
+            Box::new(CondensedMaps { inverse_mass: *inverse_mass, positions: maps.twice(&at.rho), z, r })
+        });
+    }
+
+    /// Forgets the maps, for steps of another length.
+    pub fn forget(&mut self) {
+        self.condensed = None;
+    }
+
+    /// Whether the maps were prepared.
+    pub fn is_condensed(&self) -> bool {
+        self.condensed.is_some()
+    }
+
+    /// Sets the coefficients from the derivatives at the stages.
+    #[inline(always)]
+    pub fn set(&mut self, at: &StageDerivatives<N>) {
+        let rho = &at.rho.0;
+        let times = |a: &Stages| Stages(std::array::from_fn(|i| rho[i] * a.0[i]));
+        self.inverse_mass = at.inverse_mass;
+        self.l_v = at.l_v;
+        self.l_z = at.l_z;
+        self.p_r = at.l_q;
+        self.z_q = at.l_q;
+        for d in 0..N {
+            for e in 0..N {
+                self.p_q[d][e] = times(&at.qq[d][e]);
+                if self.has_velocity_terms {
+                    self.v_q[d][e] = times(&at.qv[e][d]);
+                    self.p_v[d][e] = times(&at.qv[d][e]);
+                }
+            }
+        }
+        if self.coupled {
+            self.r_z = times(&at.zz);
+            for d in 0..N {
+                self.v_z[d] = times(&at.vz[d]);
+                self.p_z[d] = times(&at.qz[d]);
+                (self.r_q[d], self.r_v[d]) = (self.p_z[d], self.v_z[d]);
+            }
+        }
+        let Some(force) = &at.force else { return };
+        for d in 0..N {
+            match self.direction {
+                Direction::Forward => {
+                    add(&mut self.p_r[d], &force.value[d]);
+                    add(&mut self.p_z[d], &times(&force.z[d]));
+                    for e in 0..N {
+                        add(&mut self.p_q[d][e], &times(&force.q[d][e]));
+                        add(&mut self.p_v[d][e], &times(&force.v[d][e]));
+                    }
+                }
+                Direction::Backward => {
+                    add(&mut self.z_q[d], &force.value[d]);
+                    add(&mut self.r_q[d], &times(&force.z[d]));
+                    for e in 0..N {
+                        add(&mut self.p_q[d][e], &times(&force.q[e][d]));
+                        add(&mut self.v_q[d][e], &times(&force.v[e][d]));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Solves the stage equations for a tangent, whose rates are the initial guess.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
+    #[inline(always)]
+    pub fn solve<S: Simd>(
+        &mut self,
+        maps: &StepMaps,
+        given: &Inhomogeneity<N>,
+        x: &mut StageTangent<N>,
+    ) -> Result<(), StepError> {
+        if self.coupled {
+            return self.solve_for::<S>(Kinds { motion: true, z: true, r: true }, maps, given, x);
+        }
+        if let Some(condensed) = self.condensed.take() {
+            let solved = self.solve_condensed::<S>(&condensed, maps, given, x);
+            self.condensed = Some(condensed);
+            if solved {
+                return Ok(());
+            }
+        }
+        // The tangents of rho, of the motion, and of z, each of which depends on those before it.
+        if given.has_r {
+            self.solve_for::<S>(Kinds { motion: false, z: false, r: true }, maps, given, x)?;
+        } else {
+            (x.r, x.r_rate) = (Stages::ZERO, Stages::ZERO);
+        }
+        x.z = Stages::ZERO;
+        self.solve_for::<S>(Kinds { motion: true, z: false, r: false }, maps, given, x)?;
+        self.solve_for::<S>(Kinds { motion: false, z: true, r: false }, maps, given, x)
+    }
+
+    #[inline(always)]
+    fn solve_for<S: Simd>(
+        &mut self,
+        kinds: Kinds,
+        maps: &StepMaps,
+        given: &Inhomogeneity<N>,
+        x: &mut StageTangent<N>,
+    ) -> Result<(), StepError> {
+        if !self.iterate::<S>(kinds, maps, given, x) {
+            self.solve_directly::<S>(kinds, maps, given, x)?;
+        }
+        Ok(())
+    }
+}
+
+#[inline(always)]
+fn add(to: &mut Stages, x: &Stages) {
+    for i in 0..MAX_STAGES {
+        to.0[i] += x.0[i];
+    }
+}
+
+#[inline(always)]
+pub(crate) fn product(a: &Stages, b: &Stages) -> Stages {
+    let mut out = Stages::ZERO;
+    add_product(&mut out, a, b);
+    out
+}
+
+#[inline(always)]
+pub(crate) fn add_product(to: &mut Stages, a: &Stages, b: &Stages) {
+    for i in 0..MAX_STAGES {
+        to.0[i] += a.0[i] * b.0[i];
+    }
+}
+
+#[inline(always)]
+pub(crate) fn subtract_product(to: &mut Stages, a: &Stages, b: &Stages) {
+    for i in 0..MAX_STAGES {
+        to.0[i] -= a.0[i] * b.0[i];
+    }
+}

@@ -1,0 +1,172 @@
+//! Lyapunov exponents of a run.
+
+use crate::StepError;
+use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Until};
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::engine::Column;
+use crate::sensitivity::step_maps::Direction;
+use crate::sensitivity::step_tangent::StepTangent;
+use crate::sensitivity::tangent::no_tangent;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Parametric, PhasePoint};
+use std::ops::ControlFlow;
+
+/// The Lyapunov exponents of a run: the mean growth rates of its tangent in `(q, p, z)`.
+///
+/// They are those of the discrete run. Without an applied force, the sum of all `2n + 1` exponents is `n + 1` times
+/// [`rate`](Self::rate), to round-off. If `L_z` is constant too, one of them equals the rate, and the others are `n` pairs
+/// of this sum, to round-off, after any number of steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LyapunovExponents<const N: usize> {
+    /// The outcome of the run. Where it ended early, the exponents are those of its whole steps.
+    pub outcome: Outcome<N>,
+    /// The `2n + 1` exponents, in descending order; NaN if no step was taken.
+    pub exponents: Vec<f64>,
+    /// The same of the second half of the run, in the same order: its difference is an estimate of the error of a run
+    /// of finite length, and it does not depend on the initial directions.
+    pub of_second_half: Vec<f64>,
+    /// The mean rate `ln sigma_d / h` of the conformal factor.
+    pub rate: f64,
+}
+
+/// A frame of tangents that is carried along a run, and made orthonormal after each step.
+struct Frame<'r, 'p, L, const N: usize> {
+    plan: &'r Plan<'p, L, N>,
+    engine: StepTangent<'p, L, N>,
+    columns: Vec<Column<N>>,
+    /// The logarithms of the factors by which the frame was stretched.
+    logarithms: Vec<f64>,
+    /// The time and the logarithms in the middle of the run.
+    middle: Option<(f64, Vec<f64>)>,
+    before: (f64, PhasePoint<N>),
+    taken: usize,
+    failure: Option<SensitivityError>,
+}
+
+/// The directions z, then all q, then all p in the reverse order.
+///
+/// For constant `L_z` the direction z is invariant, and the spans of the first k of the others are, in `(q, p)`, isotropic
+/// and their symplectic complements the spans of the first 2n - k, which steps preserve. So the stretching factors of
+/// paired directions have the product `sigma_d` in each step.
+fn initial_frame<const N: usize>() -> Vec<Column<N>> {
+    let zero = SVector::<f64, N>::zeros();
+    let unit = |i: usize| SVector::<f64, N>::from_fn(|j, _| f64::from(u8::from(i == j)));
+    let positions = (0..N).map(|i| Column::new(unit(i), zero, 0.0));
+    let momenta = (0..N).rev().map(|i| Column::new(zero, unit(i), 0.0));
+    std::iter::once(Column::new(zero, zero, 1.0)).chain(positions).chain(momenta).collect()
+}
+
+/// Makes columns orthonormal, in their order, and adds the logarithms of their lengths; a second pass makes them orthogonal to
+/// round-off.
+fn orthonormalise<const N: usize>(columns: &mut [Column<N>], logarithms: &mut [f64]) -> Result<(), StepError> {
+    for (i, logarithm) in logarithms.iter_mut().enumerate() {
+        let (before, rest) = columns.split_at_mut(i);
+        let Some(column) = rest.first_mut() else { return Ok(()) };
+        for _ in 0..2 {
+            for other in before.iter() {
+                column.add_multiple(-column.dot(other), other);
+            }
+        }
+        let length = column.dot(column).sqrt();
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        *logarithm += length.ln();
+        column.scale(1.0 / length);
+    }
+    Ok(())
+}
+
+impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
+    fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+        let k = at.k.saturating_sub(1);
+        let before = std::mem::replace(&mut self.before, (at.t, at.state));
+        let step = self.engine.taken(at.stepper, self.plan.step_size(), before);
+        let step = step.ok_or_else(|| no_tangent(self.plan, ""))?;
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
+        orthonormalise(&mut self.columns, &mut self.logarithms).map_err(failed)?;
+        self.taken = at.k;
+        if 2 * at.k >= self.plan.count() && self.middle.is_none() {
+            self.middle = Some((at.t, self.logarithms.clone()));
+        }
+        Ok(())
+    }
+}
+
+impl<L: Parametric<N>, const N: usize> Observer<N> for Frame<'_, '_, L, N> {
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::ACTION
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        self.before = (at.t, at.state);
+        ControlFlow::Continue(())
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        // A part of a step, where a run ends within it, is not carried over.
+        if at.in_failed_step || at.k <= self.taken {
+            return ControlFlow::Continue(());
+        }
+        match self.push(at) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(failure) => {
+                self.failure = Some(failure);
+                ControlFlow::Break(Stop::here("a derivative that cannot be computed"))
+            }
+        }
+    }
+}
+
+impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
+    /// Performs the run and computes its Lyapunov exponents by the method of Benettin and others (1980): the tangent of
+    /// the discrete run, made orthonormal after each step.
+    ///
+    /// ```
+    /// use contact_geom::{VelocityPoint, systems::Duffing};
+    /// use discrete_herglotz::{Problem, Steps, Until};
+    /// let duffing = Duffing::forced();
+    /// let problem = Problem::new(&duffing, 0.0, VelocityPoint::new([0.1], [0.0], 0.0))?;
+    /// let lyapunov = problem.steps(Steps::Size(0.1)).lyapunov_exponents(Until::Time(50.0))?;
+    /// // A pair, and the exponent of z: in total twice the rate.
+    /// let sum: f64 = lyapunov.exponents.iter().sum();
+    /// assert!((sum - 2.0 * lyapunov.rate).abs() < 1e-12);
+    /// # Ok::<(), discrete_herglotz::sensitivity::SensitivityError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run), [`SensitivityError::NoTangent`], and [`SensitivityError::Step`] where the tangent of a
+    /// step cannot be computed. A run that ends early is reported as the status of the outcome.
+    pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents<N>, SensitivityError> {
+        let run = self.differentiable()?.with_conformal_factor();
+        let plan = run.plan(until)?;
+        let columns = initial_frame();
+        let (t0, state) = (plan.steps.problem.t0, plan.steps.problem.state);
+        let mut frame = Frame {
+            plan: &plan,
+            engine: StepTangent::new(&plan.steps, Direction::Forward)?,
+            logarithms: vec![0.0; columns.len()],
+            columns,
+            middle: None,
+            before: (t0, state),
+            taken: 0,
+            failure: None,
+        };
+        let outcome = run.observed(&plan, &mut frame)?;
+        let Frame { logarithms, middle, before: (t, _), failure, .. } = frame;
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        let (t_middle, until_middle) = middle.unwrap_or((t0, vec![0.0; logarithms.len()]));
+        let mut pairs: Vec<[f64; 2]> = logarithms
+            .iter()
+            .zip(&until_middle)
+            .map(|(whole, first)| [whole / (t - t0), (whole - first) / (t - t_middle)])
+            .collect();
+        pairs.sort_by(|a, b| b[0].total_cmp(&a[0]));
+        let rate = outcome.log_factor.map_or(f64::NAN, |factor| factor / (t - t0));
+        let [exponents, of_second_half] = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect());
+        Ok(LyapunovExponents { outcome, exponents, of_second_half, rate })
+    }
+}

@@ -1,0 +1,171 @@
+//! The tangent of the steps of a run, for every integrator that has one.
+
+use crate::run::discretization::Discretization;
+use crate::sensitivity::engine::{Column, Covector, Engine};
+use crate::sensitivity::flows::{FlowEngine, StepEnds};
+use crate::sensitivity::step_maps::Direction;
+use crate::sensitivity::{SensitivityError, SolvedStages};
+use crate::{Problem, StepError, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Parametric, PhasePoint};
+
+/// A step that was taken, with what its tangent needs.
+pub(crate) enum TakenStep<const N: usize> {
+    /// The stages of a collocation step.
+    Collocation(Box<SolvedStages<N>>),
+    /// The ends of a step that consists of sub-flows.
+    Flow(StepEnds<N>),
+}
+
+impl<const N: usize> TakenStep<N> {
+    /// The time and the state at the start.
+    pub fn start(&self) -> (f64, &PhasePoint<N>) {
+        match self {
+            TakenStep::Collocation(step) => (step.t, &step.start),
+            TakenStep::Flow(step) => (step.t, &step.start),
+        }
+    }
+
+    /// The length.
+    pub fn length(&self) -> f64 {
+        match self {
+            TakenStep::Collocation(step) => step.h,
+            TakenStep::Flow(step) => step.h,
+        }
+    }
+
+    /// A velocity within the step.
+    pub fn velocity(&self) -> SVector<f64, N> {
+        match self {
+            TakenStep::Collocation(step) => SVector::from_fn(|d, _| step.v[d].0[0]),
+            TakenStep::Flow(step) => (step.end.q - step.start.q) / step.h,
+        }
+    }
+}
+
+/// The tangent of the steps of an integrator, forward or as its adjoint.
+pub(crate) enum StepTangent<'a, L, const N: usize> {
+    /// From the stages of contact Gauss collocation.
+    Collocation(Box<Engine<'a, L, N>>),
+    /// From the sub-flows of a splitting, a rule or a composition.
+    Flow(Box<FlowEngine<'a, N>>),
+}
+
+impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
+    /// The tangent of the steps of a run.
+    ///
+    /// # Errors
+    /// [`SensitivityError::NoTangent`] for an integrator without tangent; those of the steps of a splitting.
+    pub fn new(steps: &Discretization<'a, L, N>, direction: Direction) -> Result<Self, SensitivityError> {
+        let info = &steps.info;
+        let refused = |case| Err(SensitivityError::NoTangent { method: info.name.clone(), case });
+        if steps.switches {
+            return refused(" for Lagrangians with switching functions");
+        }
+        if info.in_transformed_time || info.divides {
+            return refused("");
+        }
+        if info.collocation.is_some() {
+            return Ok(Self::collocation(steps.problem, steps.stages(), steps.h, direction));
+        }
+        match steps.integrator.step_formula() {
+            Some(formula) => Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula)?))),
+            None => refused(""),
+        }
+    }
+
+    fn collocation(problem: &Problem<'a, L, N>, stages: usize, h: f64, direction: Direction) -> Self {
+        StepTangent::Collocation(Box::new(Engine::new(problem, stages, h, direction)))
+    }
+
+    /// The last step of a stepper, which started at the given time and state.
+    pub fn taken(&self, stepper: &dyn Stepper<N>, h: f64, (t, start): (f64, PhasePoint<N>)) -> Option<TakenStep<N>> {
+        match self {
+            StepTangent::Collocation(_) => Some(TakenStep::Collocation(Box::new(stepper.solved_stages()?))),
+            StepTangent::Flow(_) => Some(TakenStep::Flow(StepEnds { t, h, start, end: stepper.state() })),
+        }
+    }
+
+    /// Why the steps are not differentiable in a parameter, if they are not.
+    pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
+        match self {
+            StepTangent::Collocation(_) => None,
+            StepTangent::Flow(engine) => engine.obstacle(parameter),
+        }
+    }
+
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
+    ///
+    /// # Errors
+    /// [`StepError`] where the equations of the tangent cannot be solved.
+    pub fn push(&mut self, step: &TakenStep<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+        match (self, step) {
+            (StepTangent::Collocation(engine), TakenStep::Collocation(step)) => engine.push(step, k, columns),
+            (StepTangent::Flow(engine), TakenStep::Flow(step)) => engine.push(step, k, columns),
+            _ => Err(StepError::NonFinite),
+        }
+    }
+
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn pull(&mut self, step: &TakenStep<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+        match (self, step) {
+            (StepTangent::Collocation(engine), TakenStep::Collocation(step)) => engine.pull(step, k, covectors),
+            (StepTangent::Flow(engine), TakenStep::Flow(step)) => engine.pull(step, k, covectors),
+            _ => Err(StepError::NonFinite),
+        }
+    }
+}
+
+/// The tangent of shortened steps, which is kept from one to the next.
+pub(crate) struct RowTangent<'a, L, const N: usize> {
+    collocation: Option<Engine<'a, L, N>>,
+}
+
+impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
+    pub fn new() -> Self {
+        RowTangent { collocation: None }
+    }
+
+    /// Carries columns over a shortened step from its start; `steps` is the tangent of whole steps.
+    ///
+    /// # Errors
+    /// Those of [`StepTangent::push`].
+    pub fn push(
+        &mut self,
+        steps: &mut StepTangent<'a, L, N>,
+        problem: &Problem<'a, L, N>,
+        step: &TakenStep<N>,
+        columns: &mut [Column<N>],
+    ) -> Result<(), StepError> {
+        match step {
+            TakenStep::Collocation(step) => {
+                let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Forward);
+                engine.push(step, 0, columns).map(|_| ())
+            }
+            TakenStep::Flow(_) => steps.push(step, 0, columns).map(|_| ()),
+        }
+    }
+
+    /// Carries covectors back over a shortened step; `steps` is the tangent of whole steps.
+    ///
+    /// # Errors
+    /// Those of [`StepTangent::push`].
+    pub fn pull(
+        &mut self,
+        steps: &mut StepTangent<'a, L, N>,
+        problem: &Problem<'a, L, N>,
+        step: &TakenStep<N>,
+        covectors: &mut [Covector<N>],
+    ) -> Result<(), StepError> {
+        match step {
+            TakenStep::Collocation(step) => {
+                let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Backward);
+                engine.pull(step, 0, covectors)
+            }
+            TakenStep::Flow(_) => steps.pull(step, 0, covectors),
+        }
+    }
+}
