@@ -8,8 +8,8 @@ use contact_geom::nalgebra::SVector;
 /// How the search for a critical path ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathStatus {
-    /// The path satisfies the discrete Herglotz equations (with their forces) to round-off. An [unresolved step](CriticalPath::unresolved)
-    /// indicates that it may not approximate a motion.
+    /// The path satisfies the discrete Herglotz equations, with their forces, to round-off. An
+    /// [unresolved step](CriticalPath::unresolved) indicates that it may not approximate a motion.
     Found,
     /// The search did not converge within the limit of iterations.
     NotConverged,

@@ -7,6 +7,7 @@ mod critical_path;
 mod deflation;
 mod elimination;
 mod end;
+mod herglotz_equation;
 mod index;
 mod newton;
 mod path_check;

@@ -334,10 +334,13 @@ impl Run {
                 "interrupted at t = {t}; the same command with --resume continues from there"
             ))),
             Status::Completed | Status::Stopped { .. } => Ok(()),
-            Status::Failed { cause, .. } if scene.accumulation(&cause).is_some() => {
-                Err(Failure::Run(scene.accumulation(&cause).unwrap_or_default()))
+            status => {
+                let accumulation = match &status {
+                    Status::Failed { cause, .. } => scene.accumulation(cause),
+                    _ => None,
+                };
+                Err(Failure::Run(accumulation.unwrap_or_else(|| status.to_string())))
             }
-            status => Err(Failure::Run(status.to_string())),
         }
     }
 }

@@ -65,8 +65,8 @@ fn events_have_columns_and_a_time_from_which_they_count() {
     assert!(second.lines().nth(1).unwrap().contains(",,7.0000000000000000e0,,3.14159265358979"), "{second}");
 
     // The events of a member, with its own parameters.
-    let told = succeed(&["sweep", &file, "--out", &at.path("sweep"), "--plot"]);
-    assert!(told.starts_with("2 members: 2 completed"), "{told}");
+    let printed = succeed(&["sweep", &file, "--out", &at.path("sweep"), "--plot"]);
+    assert!(printed.starts_with("2 members: 2 completed"), "{printed}");
     let all = at.read("sweep/events.csv");
     assert!(all.starts_with(&format!("index,a,{header}")), "{all}");
     let of_first = lines_with(&lines_with(&all, "event", "sin(theta - 1)"), "index", "0");
@@ -98,8 +98,8 @@ fn columns_of_events_after_an_interruption() {
     let parts = ["run", &file, "--out", &at.path("parts")];
     assert_eq!(crate::support::fail(&[&parts[..], &["--interrupt-at", "0.5"]].concat()).0, Some(1));
     let other = at.write("other.toml", &damped.replace("7*a", "8*a"));
-    let (code, told) = crate::support::fail(&["run", &other, "--out", &at.path("parts"), "--resume"]);
-    assert!(code == Some(2) && told.contains("the scene differs from that of the interrupted run"), "{told}");
+    let (code, printed) = crate::support::fail(&["run", &other, "--out", &at.path("parts"), "--resume"]);
+    assert!(code == Some(2) && printed.contains("the scene differs from that of the interrupted run"), "{printed}");
     succeed(&[&parts[..], &["--resume"]].concat());
     let events = at.read("whole/events.csv");
     assert_eq!(events, at.read("parts/events.csv"));
@@ -238,8 +238,8 @@ e = [0.8, 0.9]
     assert_eq!(crate::support::fail(&[&parts[..], &["--interrupt-at", "0.5"]].concat()).0, Some(1));
     succeed(&[&parts[..], &["--resume"]].concat());
     assert_eq!(all, at.read("parts/events.csv"));
-    let told = succeed(&["sweep", &file, "--out", &at.path("sweep")]);
-    assert!(told.starts_with("2 members: 2 completed"), "{told}");
+    let printed = succeed(&["sweep", &file, "--out", &at.path("sweep")]);
+    assert!(printed.starts_with("2 members: 2 completed"), "{printed}");
     let of_sweep = at.read("sweep/events.csv");
     assert!(of_sweep.starts_with("index,e,event,t,x,x',p_x,z,speed,x after,x' after,z after\n"), "{of_sweep}");
     assert!(of_sweep.contains(bounces.lines().nth(1).unwrap()), "{of_sweep}");
