@@ -10,8 +10,10 @@ mod gradients {
     mod agreement;
     mod contact;
     mod forces;
+    mod impacts;
     mod invalid_input;
     mod losses;
     mod pendulum;
     mod runs;
+    mod switches;
 }

@@ -1,7 +1,7 @@
 //! Input that cannot be differentiated.
 
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System};
-use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
+use contact_geom::{Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
 use discrete_herglotz::{
     AnyIntegrator, GaussCollocation, InputError, Problem, Status, Steps, TransformedGauss, Until,
@@ -39,28 +39,6 @@ fn integrators_without_tangents() {
     let splitting: AnyIntegrator = "strang".parse().unwrap();
     let splitting = problem.by(splitting).steps(Steps::Size(0.1)).tangent(&[], Until::Time(1.0));
     assert!(splitting.unwrap_err().to_string().contains("choose `GaussCollocation`"));
-}
-
-/// A Lagrangian with a kink.
-struct Kinked;
-
-impl Lagrangian<1> for Kinked {
-    const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        v[0] * v[0] * 0.5 - q[0].abs()
-    }
-    fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
-        values.push(x.q[0]);
-    }
-}
-
-impl Parametric<1> for Kinked {}
-
-#[test]
-fn switching_functions() {
-    let problem = Problem::new(&Kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
-    let found = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
-    assert!(found.unwrap_err().to_string().contains("switching functions"));
 }
 
 #[test]

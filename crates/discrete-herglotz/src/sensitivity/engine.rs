@@ -53,10 +53,29 @@ impl<const N: usize> Column<N> {
         self.dt0 + steps as f64 * self.dh
     }
 
-    /// The column for a step from the end of this number of steps to a fixed time.
-    pub fn for_row(&self, steps: usize) -> Self {
-        let dt0 = self.time_after(steps);
-        Self::copied(self).of_times(dt0, -dt0)
+    /// The column for a step to a fixed time, where the time of its start has this derivative.
+    pub fn to_fixed_time(&self, dt: f64) -> Self {
+        Self::copied(self).of_times(dt, -dt)
+    }
+
+    /// The derivative in the length of a step from a fixed state.
+    pub fn of_length() -> Self {
+        Column::new(SVector::zeros(), SVector::zeros(), 0.0).of_times(0.0, 1.0)
+    }
+
+    /// Sets the tangent of the state.
+    pub fn set_state(&mut self, to: &ChartVector<N>) {
+        (self.q, self.p, self.z, self.warm) = (to.x, to.y, to.z, false);
+    }
+
+    /// The tangent of the state.
+    pub fn state(&self) -> ChartVector<N> {
+        ChartVector { x: self.q, y: self.p, z: self.z }
+    }
+
+    /// Carries the column over a step of length zero, with these rates of the state.
+    pub fn push_at_once(&mut self, rates: &ChartVector<N>) {
+        self.set_state(&self.state().plus(rates.scale(self.dh)));
     }
 
     /// The column at a fixed time, where the state after this number of steps has these rates.
@@ -111,20 +130,45 @@ impl<const N: usize> Covector<N> {
         }
     }
 
-    /// Adds a covector at the start of a shortened step from the state after this number of steps to a fixed time.
-    pub fn add_row(&mut self, row: &Self, steps: usize) {
-        self.add_state(&ChartVector { x: row.q, y: row.p, z: row.z }, &row.parameters);
-        // The length of the step decreases as its start moves.
-        self.add_time(row.time - row.step, steps);
+    /// The derivatives in the state.
+    pub fn state(&self) -> ChartVector<N> {
+        ChartVector { x: self.q, y: self.p, z: self.z }
+    }
+
+    /// Sets the derivatives in the state.
+    pub fn set_state(&mut self, to: &ChartVector<N>) {
+        (self.q, self.p, self.z, self.warm) = (to.x, to.y, to.z, false);
+    }
+
+    /// Carries the covector back over a step of length zero, with these rates of the state.
+    pub fn pull_at_once(&mut self, rates: &ChartVector<N>) {
+        self.step += self.q.dot(&rates.x) + self.p.dot(&rates.y) + self.z * rates.z;
+    }
+
+    /// Takes the derivatives in the time of the start and in the length, those for a fixed length and a fixed start.
+    pub fn take_times(&mut self) -> [f64; 2] {
+        [std::mem::take(&mut self.time), std::mem::take(&mut self.step)]
+    }
+
+    /// Adds a multiple of the derivatives in the state and in the parameters of another covector.
+    pub fn add_multiple(&mut self, factor: f64, of: &Self) {
+        let parameters: Vec<f64> = of.parameters.iter().map(|x| factor * x).collect();
+        self.add_state(&of.state().scale(factor), &parameters);
     }
 
     /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
-    pub fn add_at_fixed_time(&mut self, of_state: &ChartVector<N>, parameters: &[f64], rates: &PhasePoint<N>, steps: usize) {
+    pub fn add_at_fixed_time(
+        &mut self,
+        of_state: &ChartVector<N>,
+        parameters: &[f64],
+        rates: &PhasePoint<N>,
+        steps: usize,
+    ) {
         self.add_state(of_state, parameters);
         self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
     }
 
-    fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
+    pub fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
         self.q += of_state.x;
         self.p += of_state.y;
         self.z += of_state.z;
@@ -132,7 +176,7 @@ impl<const N: usize> Covector<N> {
     }
 
     /// Adds a derivative in the time after this number of steps.
-    fn add_time(&mut self, of_time: f64, steps: usize) {
+    pub fn add_time(&mut self, of_time: f64, steps: usize) {
         self.time += of_time;
         self.step += steps as f64 * of_time;
     }
@@ -217,11 +261,13 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     #[inline(always)]
     fn prepare<S: Simd>(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
         if self.actions.is_none() && !step.knows_l {
-            let (t, x) = (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
+            let (t, x) =
+                (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
             self.actions = self.forward.resolvent(-self.lagrangian.rate(t, &x));
         }
         self.at.evaluate::<S, L>(self.lagrangian, &self.forward, step, self.actions.as_ref())?;
-        if self.condenses && !self.linear.is_condensed()
+        if self.condenses
+            && !self.linear.is_condensed()
             && let Some(inverse) = &self.at.form.inverse_mass
         {
             self.linear.condense(&self.maps, &self.at, inverse);
@@ -231,7 +277,12 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     }
 
     #[inline(always)]
-    fn push_column<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, column: &mut Column<N>) -> Result<(), StepError> {
+    fn push_column<S: Simd>(
+        &mut self,
+        step: &SolvedStages<N>,
+        k: usize,
+        column: &mut Column<N>,
+    ) -> Result<(), StepError> {
         let s = step.s;
         let fraction = column.dh / step.h;
         self.set_sources(step, k, column);

@@ -2,12 +2,15 @@
 
 use crate::run::discretization::Discretization;
 use crate::run::{Motion, Outcome, Plan, Row, Rows, Run, Until};
+use crate::sensitivity::PartPoint;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
 use crate::sensitivity::engine::{Covector, Engine};
+use crate::sensitivity::gradient_parts::PartCovectors;
 use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::row_times::{check_times, is_same_time};
+use crate::sensitivity::solved_part::SolvedStep;
 use crate::sensitivity::solved_stages::SolvedStages;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::tangent::{check_tangent, no_tangent};
@@ -234,17 +237,23 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
         let mut engine = Engine::new(problem, steps.stages(), steps.h, Direction::Backward);
         let mut rows = RowCovectors { steps, times, of_rows, engine: None };
         let mut stepper = self.plan.stepper()?;
-        let mut block: Vec<SolvedStages<N>> = Vec::with_capacity(BLOCK);
+        let mut of_parts = PartCovectors { steps, engine: None };
+        let mut block: Vec<SolvedStep<N>> = Vec::with_capacity(BLOCK);
         let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
             block.clear();
             for k in range.clone() {
                 stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
-                block.push(stepper.solved_stages().ok_or_else(|| no_tangent(&self.plan, ""))?);
+                block.push(SolvedStep::last_of(stepper).ok_or_else(|| no_tangent(&self.plan, ""))?);
             }
             for (k, step) in range.zip(&block).rev() {
-                engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
-                if let Some(first) = all.first_mut() {
-                    rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
+                match step {
+                    SolvedStep::Whole(step) => {
+                        engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
+                        if let Some(first) = all.first_mut() {
+                            rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
+                        }
+                    }
+                    SolvedStep::Parts(parts, end) => of_parts.pull((parts, end, k), &mut all, &mut rows)?,
                 }
             }
             Ok(())
@@ -259,7 +268,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
 }
 
 /// The covectors of rows that are not yet added, from the last to the first.
-struct RowCovectors<'r, 'p, L, const N: usize> {
+pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
     steps: &'r Discretization<'p, L, N>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
@@ -269,30 +278,60 @@ struct RowCovectors<'r, 'p, L, const N: usize> {
 impl<L: Parametric<N>, const N: usize> RowCovectors<'_, '_, L, N> {
     /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start.
     fn add(&mut self, step: &SolvedStages<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+        let of_start = self.add_within(step, to)?;
+        to.add_time(of_start, k);
+        let v = SVector::from_fn(|d, _| step.v[d].0[0]);
+        self.add_at_start(&PartPoint { t: step.t, state: step.start, v }, k, to)
+    }
+
+    /// Adds the covectors of the rows after the start of a step, or of a part of one, to that at its start. Returns the
+    /// derivative in the time of this start.
+    pub fn add_within(&mut self, step: &SolvedStages<N>, to: &mut Covector<N>) -> Result<f64, StepError> {
         let problem = self.steps.problem;
-        while let (Some((t, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) {
-            let passed = if step.h < 0.0 { *t <= step.t } else { *t >= step.t };
-            if is_same_time(*t, step.t) {
-                let near = SVector::from_fn(|d, _| step.v[d].0[0]);
-                let v = self.steps.velocity(step.t, &step.start, Some(near))?;
-                let x = VelocityPoint { q: step.start.q, v, z: step.start.z };
-                let (of_state, parameters, _) = VelocityDependence::at(problem, step.t, &x)?.pull(covector);
-                let rates = self.steps.rates(step.t, &step.start, Some(v))?;
-                to.add_at_fixed_time(&of_state, &parameters, &rates, k);
-            } else if passed {
-                let (short, state, v) = self.steps.shortened(step, *t)?;
-                let x = VelocityPoint { q: state.q, v, z: state.z };
-                let (of_state, parameters, _) = VelocityDependence::at(problem, *t, &x)?.pull(covector);
-                let engine = Engine::of_row(&mut self.engine, problem, &short, Direction::Backward);
-                let mut row = Covector::new(&of_state, parameters);
-                engine.pull(&short, 0, std::slice::from_mut(&mut row))?;
-                to.add_row(&row, k);
-            } else {
+        let mut of_start = 0.0;
+        while let Some(t) = self.times.last().copied() {
+            let passed = if step.h < 0.0 { t <= step.t } else { t >= step.t };
+            if is_same_time(t, step.t) || !passed {
                 break;
             }
-            (self.times, self.of_rows) = (times, of_rows);
+            let (short, state, v) = self.steps.shortened(step, t)?;
+            let Some(mut row) = self.take(&PartPoint { t, state, v })? else { break };
+            let engine = Engine::of_row(&mut self.engine, problem, &short, Direction::Backward);
+            engine.pull(&short, 0, std::slice::from_mut(&mut row))?;
+            let [of_its_start, of_length] = row.take_times();
+            to.add_multiple(1.0, &row);
+            // The length of the step decreases as its start moves.
+            of_start += of_its_start - of_length;
         }
+        Ok(of_start)
+    }
+
+    /// Adds the covector of a row at the start of a step, the k-th of the run.
+    pub fn add_at_start(&mut self, at: &PartPoint<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+        if !self.times.last().is_some_and(|t| is_same_time(*t, at.t)) {
+            return Ok(());
+        }
+        let v = self.steps.velocity(at.t, &at.state, Some(at.v))?;
+        let at = PartPoint { v, ..*at };
+        let Some(row) = self.take(&at)? else { return Ok(()) };
+        let rates = self.steps.rates(at.t, &at.state, Some(v))?;
+        to.add_at_fixed_time(&row.state(), &row.parameters, &rates, k);
         Ok(())
+    }
+
+    /// The covector of a row at a point, if there is one at its time.
+    pub fn take_at(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
+        if self.times.last().is_some_and(|t| is_same_time(*t, at.t)) { self.take(at) } else { Ok(None) }
+    }
+
+    /// The covector of the last row, at its point.
+    fn take(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
+        let (Some((_, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) else {
+            return Ok(None);
+        };
+        (self.times, self.of_rows) = (times, of_rows);
+        let (of_state, parameters, _) = VelocityDependence::at(self.steps.problem, at.t, &at.point())?.pull(covector);
+        Ok(Some(Covector::new(&of_state, parameters)))
     }
 }
 

@@ -4,9 +4,10 @@ use crate::run::{Motion, Observer, Outcome, OutputRequest, Plan, Run, RunInfo, S
 use crate::sensitivity::end_state::VelocityDependence;
 use crate::sensitivity::engine::{Column, Engine};
 use crate::sensitivity::row_times::RowTimes;
+use crate::sensitivity::solved_part::SolvedStep;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::variable::Variable;
-use crate::sensitivity::{EndState, SensitivityError, SolvedStages};
+use crate::sensitivity::{EndCovector, EndState, SensitivityError, SolvedStages};
 use crate::{InputError, Problem, Status, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
@@ -23,9 +24,22 @@ pub struct Tangent<const N: usize> {
     pub columns: Vec<StateDerivative<N>>,
     /// The states at the requested times, each with its derivatives.
     pub rows: Vec<TangentRow<N>>,
+    /// The zeros of switching functions that the motion has met, in the order of the run.
+    pub switches: Vec<SwitchTime>,
     /// The largest derivative along the run divided by the largest one at its end, at least one: round-off of the
     /// derivatives is amplified by it.
     pub growth: f64,
+}
+
+/// A zero of a switching function along a run, with the derivatives of its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SwitchTime {
+    /// The time.
+    pub t: f64,
+    /// The index of the function.
+    pub index: usize,
+    /// The derivatives of the time, in the order of the variables.
+    pub derivatives: Vec<f64>,
 }
 
 /// The state at a time with its derivatives, one column for each variable. The time is fixed, unless it is the end of the
@@ -52,40 +66,60 @@ pub struct StateDerivative<const N: usize> {
 }
 
 /// Carries columns along a run.
-struct Columns<'r, 'p, L, const N: usize> {
-    plan: &'r Plan<'p, L, N>,
+pub(super) struct Columns<'r, 'p, L, const N: usize> {
+    pub(super) plan: &'r Plan<'p, L, N>,
     engine: Engine<'p, L, N>,
-    /// For the shortened steps to rows.
-    row_engine: Option<Engine<'p, L, N>>,
-    columns: Vec<Column<N>>,
-    times: RowTimes,
-    rows: Vec<TangentRow<N>>,
-    largest: f64,
+    /// For the shortened steps to rows, and for parts of steps.
+    pub(super) row_engine: Option<Engine<'p, L, N>>,
+    pub(super) columns: Vec<Column<N>>,
+    pub(super) times: RowTimes,
+    pub(super) rows: Vec<TangentRow<N>>,
+    pub(super) switches: Vec<SwitchTime>,
+    pub(super) largest: f64,
     taken: usize,
     failure: Option<SensitivityError>,
+}
+
+impl<const N: usize> StateDerivative<N> {
+    /// The derivative of a number with these partial derivatives in the state, for a fixed time.
+    pub fn dot(&self, of: &EndCovector<N>) -> f64 {
+        self.q.dot(&of.q) + self.v.dot(&of.v) + self.p.dot(&of.p) + self.z * of.z
+    }
 }
 
 impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
-        let step = at.stepper.solved_stages().ok_or_else(|| no_tangent(self.plan, ""))?;
-        self.rows_within(&step, at)?;
-        let failed = |cause| SensitivityError::Step { step: k, cause };
-        let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
-        self.largest = max_or_nan(self.largest, largest);
+        match SolvedStep::last_of(at.stepper).ok_or_else(|| no_tangent(self.plan, ""))? {
+            SolvedStep::Whole(step) => {
+                let starts: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
+                self.rows_within(&step, at.t, &starts, k)?;
+                let failed = |cause| SensitivityError::Step { step: k, cause };
+                let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
+                self.largest = max_or_nan(self.largest, largest);
+            }
+            SolvedStep::Parts(parts, end) => self.push_parts(&parts, &end, k)?,
+        }
         self.taken = at.k;
         self.row_at_end(at)
     }
 
-    /// The rows between the ends of the last step, from its start by shortened steps.
-    fn rows_within(&mut self, step: &SolvedStages<N>, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
-        let k = at.k.saturating_sub(1);
+    /// The rows before the end of a step or of a part of one, from its start by shortened steps; `starts` are the
+    /// derivatives of the time of the start.
+    pub(super) fn rows_within(
+        &mut self,
+        step: &SolvedStages<N>,
+        end: f64,
+        starts: &[f64],
+        k: usize,
+    ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
         let steps = &self.plan.steps;
-        while let Some(t) = self.times.next_within((step.t, at.t)) {
+        while let Some(t) = self.times.next_within((step.t, end)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
             let engine = Engine::of_row(&mut self.row_engine, steps.problem, &short, Direction::Forward);
-            let mut columns: Vec<_> = self.columns.iter().map(|column| column.for_row(k)).collect();
+            let mut columns: Vec<_> =
+                self.columns.iter().zip(starts).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
             engine.push(&short, 0, &mut columns).map_err(failed)?;
             let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
             self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);
@@ -103,15 +137,17 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let PhasePoint { q, p, z } = at.state;
         let state = EndState { t: at.t, q, v, p, z };
         let problem = self.plan.steps.problem;
-        self.rows.push(if at.last && at.k > 0 {
-            row(problem, state, &self.columns, |column| column.time_after(at.k))
-        } else {
-            // The end of the step moves with the times of the run, but not the row.
-            let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
-            let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
-            row(problem, state, &columns, |_| 0.0)
-        }
-        .map_err(failed)?);
+        self.rows.push(
+            if at.last && at.k > 0 {
+                row(problem, state, &self.columns, |column| column.time_after(at.k))
+            } else {
+                // The end of the step moves with the times of the run, but not the row.
+                let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
+                let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
+                row(problem, state, &columns, |_| 0.0)
+            }
+            .map_err(failed)?,
+        );
         Ok(())
     }
 }
@@ -153,7 +189,7 @@ impl<L, const N: usize> Columns<'_, '_, L, N> {
 }
 
 /// A row with the derivatives of its velocity; `dt` are the derivatives of its time.
-fn row<L: Parametric<N>, const N: usize>(
+pub(super) fn row<L: Parametric<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     state: EndState<N>,
     columns: &[Column<N>],
@@ -216,14 +252,15 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
             columns,
             times: RowTimes::new(times),
             rows: Vec::with_capacity(times.len()),
+            switches: Vec::new(),
             largest: 0.0,
             taken: 0,
             failure: None,
         };
         let outcome = run.observed(&plan, &mut carried)?;
-        let Columns { columns, rows, largest, failure, .. } = carried;
+        let Columns { columns, rows, switches, largest, failure, .. } = carried;
         match failure {
-            None => Ok(tangent(problem, outcome, &columns, rows, largest)),
+            None => Ok(Tangent { switches, ..tangent(problem, outcome, &columns, rows, largest) }),
             Some(failure) => Err(failure),
         }
     }
@@ -247,6 +284,7 @@ fn tangent<L: Parametric<N>, const N: usize>(
         outcome,
         columns: last.map_or_else(|| columns.iter().map(of_state).collect(), |row| row.columns),
         rows,
+        switches: Vec::new(),
         growth: if largest > size { largest / size } else { 1.0 },
     }
 }
@@ -257,12 +295,12 @@ pub(crate) fn check_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L,
     if info.collocation.is_none() || info.in_transformed_time || info.divides {
         return Err(no_tangent(plan, ""));
     }
-    if plan.steps.switches {
-        return Err(no_tangent(plan, " for Lagrangians with switching functions"));
-    }
     Ok(())
 }
 
-pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>, case: &'static str) -> SensitivityError {
+pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(
+    plan: &Plan<'_, L, N>,
+    case: &'static str,
+) -> SensitivityError {
     SensitivityError::NoTangent { method: plan.steps.info.name.clone(), case }
 }
