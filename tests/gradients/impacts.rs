@@ -2,6 +2,7 @@
 
 use crate::gradients::runs::{Case, weyl};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::systems::UniformField;
 use contact_geom::{Scalar, VelocityPoint};
@@ -208,7 +209,6 @@ fn grazing_impacts() {
             -q[0] + self.0
         }
     }
-    let mut refused = 0;
     for exponent in 2..=16 {
         let height = 0.5 - 10.0_f64.powi(-exponent);
         let system = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Ceiling(height), Impact::Elastic);
@@ -226,12 +226,10 @@ fn grazing_impacts() {
                 let found = tangent.switches[0].derivatives[0];
                 let expected = -(1.0 - rate) / rate;
                 assert!((found / expected - 1.0).abs() <= 1e-15 / (rate * rate), "{exponent}: {found} and {expected}");
-                assert!(tangent.growth.max(tangent.columns[0].v[0].abs()) >= 0.1 / rate, "{exponent}");
+                assert!(max_or_nan(tangent.growth, tangent.columns[0].v[0].abs()) >= 0.1 / rate, "{exponent}");
             }
-            Err(SensitivityError::Grazing { .. }) => refused += 1,
-            Err(SensitivityError::Passage { cause, .. }) => panic!("{exponent}: {cause}"),
+            Err(SensitivityError::Grazing { .. }) => assert!(exponent >= 15, "{exponent}"),
             Err(other) => panic!("{exponent}: {other}"),
         }
     }
-    println!("refused {refused}");
 }
