@@ -6,8 +6,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts};
 use contact_geom::systems::UniformField;
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint};
-use discrete_herglotz::sensitivity::{SensitivityError, Variable};
-use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
+use discrete_herglotz::sensitivity::{EndCovector, Variable};
+use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 
 /// Implements [`Parametric`] for a type with these fields, whose formula is `formula(theta, t, q, v, z)`.
 macro_rules! parametric {
@@ -51,6 +51,13 @@ mod formula {
 
     pub fn Bouncing<T: Scalar>(theta: &[T], _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - q[0] * theta[0] - z * 0.05
+    }
+
+    pub fn Disk<T: Scalar>(theta: &[T], t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        let (zero, inside) = (T::zero(), Disk::surface(theta[1], t, q));
+        let potential = inside.if_less(zero, theta[0] * (q[0] * 0.3 + 1.0), zero);
+        let mass = inside.if_less(zero, T::from(1.2), T::one());
+        v.dot(v) * mass * 0.5 - potential - q[1] * 0.1 - z * 0.05
     }
 
     pub fn Step<T: Scalar>(theta: &[T], _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -178,7 +185,7 @@ fn two_impacts_at_one_instant() {
     }
 }
 
-/// A step of the potential refracts the motion, which is refused with the reason.
+/// A step of the potential, at which the motion is refracted or reflected.
 struct Step {
     height: f64,
 }
@@ -195,14 +202,65 @@ impl Lagrangian<1> for Step {
 
 parametric!(Step, 1, height);
 
+/// The motion from -1 with velocity 1 reaches the step at t = 1, and is at `sqrt(1 - 2 height)` or -1 at t = 2.
 #[test]
-fn refraction_is_refused() {
-    let system = Step { height: 0.2 };
-    let problem = Problem::new(&system, 0.0, VelocityPoint::new([-1.0], [1.0], 0.0)).unwrap();
-    let run = || problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
-    let forward = run().tangent(&[Variable::Position(0)], Until::Time(2.0)).unwrap_err();
-    assert!(matches!(forward, SensitivityError::Passage { index: 0, .. }), "{forward}");
-    let recorded = run().record(Until::Time(2.0)).unwrap();
-    let backward = recorded.pullback(&discrete_herglotz::sensitivity::EndCovector::zero()).unwrap_err();
-    assert!(matches!(backward, SensitivityError::Passage { index: 0, .. }), "{backward}");
+fn refraction_and_reflection() {
+    let variables = [Variable::Position(0), Variable::Velocity(0), Variable::Parameter("height".into())];
+    let root = 0.6_f64.sqrt();
+    for (height, expected) in [(0.2, [root, 1.0 / root + root, -1.0 / root]), (0.8, [-1.0, -2.0, 0.0])] {
+        let system = Step { height };
+        let problem = Problem::new(&system, 0.0, VelocityPoint::new([-1.0], [1.0], 0.0)).unwrap();
+        let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
+        let tangent = run.tangent(&variables, Until::Time(2.0)).unwrap();
+        for (column, expected) in tangent.columns.iter().zip(expected) {
+            assert!((column.q[0] - expected).abs() <= 1e-10, "height {height}: {} and {expected}", column.q[0]);
+        }
+    }
+}
+
+/// A disk of another potential, with an index of refraction for the mass too, that moves.
+struct Disk {
+    height: f64,
+    radius: f64,
+}
+
+impl Disk {
+    fn surface<T: Scalar>(radius: T, t: T, q: &SVector<T, 2>) -> T {
+        let x = q[0] - t * 0.1;
+        x * x + q[1] * q[1] - radius * radius
+    }
+}
+
+impl Lagrangian<2> for Disk {
+    const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        formula::Disk(&[self.height, self.radius].map(T::from), t, q, v, z)
+    }
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<2>, values: &mut Vec<f64>) {
+        values.push(Disk::surface(self.radius, t, &x.q));
+    }
+}
+
+parametric!(Disk, 2, height, radius);
+
+#[test]
+fn jumps_across_a_curved_surface_that_moves() {
+    for (height, switches) in [(0.2, 2), (3.0, 1)] {
+        let system = Disk { height, radius: 0.8 };
+        let start = VelocityPoint::new([-1.5, 0.2], [1.3, 0.1], 0.0);
+        let case = Case { lagrangian: &system, t0: 0.0, start, from_momentum: false, t_end: 3.0, steps: 5, stages: 6 };
+        let (_, tangent, _) = case.agree("disk", 1e-11);
+        assert_eq!(tangent.switches.len(), switches, "height {height}");
+        case.compare("disk", 1e-11, 1e-5);
+    }
+}
+
+/// Impacts that accumulate before the end: the run has a status and no gradient.
+#[test]
+fn accumulating_impacts() {
+    let system = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, Impact::Restitution(0.5));
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
+    let found = run.gradient_of(|end| (end.q[0], EndCovector::zero()), Until::Time(6.0)).unwrap();
+    assert!(found.loss.is_none() && found.outcome.status != Status::Completed, "{}", found.outcome.status);
 }

@@ -253,7 +253,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
                             rows.add(step, k, first).map_err(|cause| failed(k, cause))?;
                         }
                     }
-                    SolvedStep::Parts(parts, end) => of_parts.pull((parts, end, k), &mut all, &mut rows)?,
+                    SolvedStep::Parts(parts) => of_parts.pull((parts, k), &mut all, &mut rows)?,
                 }
             }
             Ok(())

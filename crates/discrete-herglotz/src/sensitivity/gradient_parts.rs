@@ -11,10 +11,10 @@ use crate::sensitivity::engine::{Covector, Engine};
 use crate::sensitivity::gradient::RowCovectors;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::switch::Switch;
-use crate::sensitivity::{PartEnd, Passage, SensitivityError, SolvedPart};
+use crate::sensitivity::{PartEnd, SensitivityError, SolvedPart};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{ChartVector, Parametric, PhasePoint};
+use contact_geom::{ChartVector, Parametric};
 
 /// Carries covectors over the parts of steps.
 pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
@@ -24,10 +24,10 @@ pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
 
 impl<L: Parametric<N>, const N: usize> PartCovectors<'_, '_, L, N> {
     /// Carries covectors from the end of a step, the k-th of the run, to its start, and adds those of its rows to the
-    /// first of them; `end` is the state at its end.
+    /// first of them.
     pub fn pull(
         &mut self,
-        (parts, end, k): (&[SolvedPart<N>], &PhasePoint<N>, usize),
+        (parts, k): (&[SolvedPart<N>], usize),
         all: &mut [Covector<N>],
         rows: &mut RowCovectors<'_, '_, L, N>,
     ) -> Result<(), SensitivityError> {
@@ -35,7 +35,7 @@ impl<L: Parametric<N>, const N: usize> PartCovectors<'_, '_, L, N> {
         // The derivatives in the time of the end of a part.
         let mut times = vec![0.0; all.len()];
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.to.rates_after(self.steps, end).map_err(failed)?;
+            let rates = last.next.rates(self.steps).map_err(failed)?;
             for (covector, time) in all.iter_mut().zip(&mut times) {
                 let along = covector.state().dot(&rates);
                 covector.add_time(along, k + 1);
@@ -77,14 +77,10 @@ impl<L: Parametric<N>, const N: usize> PartCovectors<'_, '_, L, N> {
         let (problem, t, h) = (self.steps.problem, part.to.t, self.steps.h);
         let mut gradient = None;
         if let PartEnd::Switch { index, rising, passage } = part.end {
-            if let Some(cause) = passage.without_derivative() {
-                return Err(SensitivityError::Passage { t, index, cause });
-            }
             let switch = Switch { problem, index, rising, at: &part.to, step: k, h };
-            if passage == Passage::Reset {
-                let reset = switch.reset()?;
+            if let Some(change) = switch.passage(passage, &part.next)? {
                 for (covector, time) in all.iter_mut().zip(&mut *times) {
-                    let (state, parameters, of_time) = reset.pull(&covector.state());
+                    let (state, parameters, of_time) = change.pull(&covector.state());
                     covector.set_state(&ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
                     covector.add_state(&state, &parameters);
                     *time += of_time;

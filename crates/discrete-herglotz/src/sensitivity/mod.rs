@@ -8,6 +8,7 @@
 //! `h sum_i b_i d(rho L_theta)[w_i]` summed over the steps. It is the exact gradient of the discrete run. See section 10
 //! of `docs/theory.md`.
 
+mod corner_derivatives;
 mod end_state;
 mod engine;
 mod error;

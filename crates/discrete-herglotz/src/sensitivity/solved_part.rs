@@ -15,6 +15,8 @@ pub struct SolvedPart<const N: usize> {
     pub(crate) from: PartPoint<N>,
     /// The end, before anything happens there.
     pub(crate) to: PartPoint<N>,
+    /// The point from which the motion continues.
+    pub(crate) next: PartPoint<N>,
     pub(crate) end: PartEnd,
 }
 
@@ -63,21 +65,12 @@ pub enum Passage {
     Continuous,
     /// Its state is replaced.
     Reset,
-    /// It is refracted or reflected where L jumps.
-    Corner,
+    /// It crosses a jump of L with another momentum.
+    Refraction,
+    /// It is reflected at a jump of L.
+    Reflection,
     /// Its state is replaced at the limit of a sequence of resets.
     Accumulation,
-}
-
-impl Passage {
-    /// Why the passage has no derivative, if it has none.
-    pub(crate) fn without_derivative(self) -> Option<&'static str> {
-        match self {
-            Passage::Continuous | Passage::Reset => None,
-            Passage::Corner => Some("L jumps there, so that the motion is refracted or reflected"),
-            Passage::Accumulation => Some("it is the limit of infinitely many resets"),
-        }
-    }
 }
 
 /// A time, a state and its velocity.
@@ -98,20 +91,13 @@ impl<const N: usize> PartPoint<N> {
         let PhasePoint { q, p, z } = motion.rates(self.t, &self.state, Some(self.v))?;
         Ok(ChartVector { x: q, y: p, z })
     }
-
-    /// The same at the end of a step after what happened at this point.
-    pub fn rates_after(&self, motion: &impl Motion<N>, state: &PhasePoint<N>) -> Result<ChartVector<N>, StepError> {
-        let v = motion.velocity(self.t, state, Some(self.v))?;
-        PartPoint { t: self.t, state: *state, v }.rates(motion)
-    }
 }
 
 /// A step with its solved stages.
 #[allow(clippy::large_enum_variant)] // Nearly all are whole.
 pub(crate) enum SolvedStep<const N: usize> {
     Whole(SolvedStages<N>),
-    /// With the state at the end of the step.
-    Parts(Vec<SolvedPart<N>>, PhasePoint<N>),
+    Parts(Vec<SolvedPart<N>>),
 }
 
 impl<const N: usize> SolvedStep<N> {
@@ -121,6 +107,6 @@ impl<const N: usize> SolvedStep<N> {
             return Some(SolvedStep::Whole(stages));
         }
         let parts = stepper.solved_parts();
-        if parts.is_empty() { None } else { Some(SolvedStep::Parts(parts, stepper.state())) }
+        if parts.is_empty() { None } else { Some(SolvedStep::Parts(parts)) }
     }
 }

@@ -1,9 +1,10 @@
 //! The derivatives of a switching function and of a reset at its zero.
 
+use crate::sensitivity::corner_derivatives::CornerDerivatives;
 use crate::sensitivity::end_state::{EndCovector, VelocityDependence};
 use crate::sensitivity::engine::Column;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use crate::sensitivity::{PartPoint, SensitivityError, ridders};
+use crate::sensitivity::{PartPoint, Passage, SensitivityError, ridders};
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
@@ -23,7 +24,7 @@ fn moving(re: f64, d: f64) -> Along {
 
 /// An argument of a switching function or of a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Argument {
+pub(super) enum Argument {
     Position(usize),
     Velocity(usize),
     Action,
@@ -71,7 +72,7 @@ impl<const N: usize> SwitchGradient<N> {
 }
 
 impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
-    fn failed(&self, cause: StepError) -> SensitivityError {
+    pub(super) fn failed(&self, cause: StepError) -> SensitivityError {
         SensitivityError::Step { step: self.step, cause }
     }
 
@@ -80,7 +81,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     }
 
     /// The parameters, the time and the point, moving along an argument.
-    fn moving(&self, along: Argument) -> (Vec<Along>, Along, VelocityPoint<N, Along>) {
+    pub(super) fn moving(&self, along: Argument) -> (Vec<Along>, Along, VelocityPoint<N, Along>) {
         let unit = |is: bool| f64::from(u8::from(is));
         let x = self.at.point();
         let theta = self.problem.lagrangian.parameters().into_iter().enumerate();
@@ -92,35 +93,13 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     }
 
     /// The derivative of a function of the Lagrangian, the time and the point along an argument, by differences.
-    fn difference(
+    pub(super) fn difference(
         &self,
         along: Argument,
         f: impl Fn(&L, f64, &VelocityPoint<N>) -> Option<Vec<f64>>,
     ) -> Result<Vec<f64>, SensitivityError> {
-        let lagrangian = self.problem.lagrangian;
-        let theta = lagrangian.parameters();
-        let size = match along {
-            Argument::Position(i) => max_or_nan(self.at.state.q[i].abs(), (self.at.v[i] * self.h).abs()),
-            Argument::Velocity(i) => self.at.v[i].abs(),
-            Argument::Action => self.at.state.z.abs(),
-            Argument::Time => self.h.abs(),
-            Argument::Parameter(k) => theta.get(k).map_or(0.0, |x| x.abs()),
-        };
-        let found = ridders::derivative(if size > 0.0 { size } else { 1.0 }, |by| {
-            let (mut t, mut x) = (self.at.t, self.at.point());
-            match along {
-                Argument::Position(i) => x.q[i] += by,
-                Argument::Velocity(i) => x.v[i] += by,
-                Argument::Action => x.z += by,
-                Argument::Time => t += by,
-                Argument::Parameter(k) => {
-                    let mut theta = theta.clone();
-                    *theta.get_mut(k)? += by;
-                    return f(&lagrangian.with_parameters(&theta)?, t, &x);
-                }
-            }
-            f(lagrangian, t, &x)
-        });
+        let (lagrangian, x) = (self.problem.lagrangian, self.at.point());
+        let found = difference(along, (lagrangian, self.at.t, &x), self.h, f);
         found.ok_or_else(|| self.unknown("it cannot be evaluated at nearby states, times and parameters"))
     }
 
@@ -178,8 +157,23 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         Ok(ChartVector { x: SVector::from_fn(|i, _| of[i]), y: SVector::from_fn(|i, _| of[N + i]), z: of[2 * N] })
     }
 
+    /// The derivatives of the change of the state there, if it changes; `next` is the point after it.
+    pub fn passage(
+        &self,
+        passage: Passage,
+        next: &PartPoint<N>,
+    ) -> Result<Option<PassageDerivatives<N>>, SensitivityError> {
+        match passage {
+            Passage::Continuous => Ok(None),
+            Passage::Reset => self.reset().map(|reset| Some(PassageDerivatives::Reset(reset))),
+            Passage::Refraction => self.corner(next, true).map(|corner| Some(PassageDerivatives::Corner(corner))),
+            Passage::Reflection => self.corner(next, false).map(|corner| Some(PassageDerivatives::Corner(corner))),
+            Passage::Accumulation => Err(self.unknown("it is the limit of infinitely many resets")),
+        }
+    }
+
     /// The derivatives of the reset.
-    pub fn reset(&self) -> Result<ResetDerivatives<N>, SensitivityError> {
+    fn reset(&self) -> Result<ResetDerivatives<N>, SensitivityError> {
         let (lagrangian, t) = (self.problem.lagrangian, self.at.t);
         let images = arguments(N, lagrangian.parameter_count()).map(|along| self.state_along(along));
         let images = images.collect::<Result<Vec<_>, _>>()?;
@@ -192,6 +186,39 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         let time = of.at(lagrangian, Quantity::Time, t, &to).gradient.y;
         Ok(ResetDerivatives { images, before, hessian: lagrangian.hessian(t, &to), parameters, time })
     }
+}
+
+/// The derivative of a function of a Lagrangian, the time and the point along an argument, by differences, for a motion
+/// with steps of length h.
+pub(super) fn difference<L: Parametric<N>, const N: usize>(
+    along: Argument,
+    (lagrangian, t, x): (&L, f64, &VelocityPoint<N>),
+    h: f64,
+    f: impl Fn(&L, f64, &VelocityPoint<N>) -> Option<Vec<f64>>,
+) -> Option<Vec<f64>> {
+    let theta = lagrangian.parameters();
+    let size = match along {
+        Argument::Position(i) => max_or_nan(x.q[i].abs(), (x.v[i] * h).abs()),
+        Argument::Velocity(i) => x.v[i].abs(),
+        Argument::Action => x.z.abs(),
+        Argument::Time => h.abs(),
+        Argument::Parameter(k) => theta.get(k).map_or(0.0, |x| x.abs()),
+    };
+    ridders::derivative(if size > 0.0 { size } else { 1.0 }, |by| {
+        let (mut t, mut x) = (t, *x);
+        match along {
+            Argument::Position(i) => x.q[i] += by,
+            Argument::Velocity(i) => x.v[i] += by,
+            Argument::Action => x.z += by,
+            Argument::Time => t += by,
+            Argument::Parameter(k) => {
+                let mut theta = theta.clone();
+                *theta.get_mut(k)? += by;
+                return f(&lagrangian.with_parameters(&theta)?, t, &x);
+            }
+        }
+        f(lagrangian, t, &x)
+    })
 }
 
 /// The state with which a state is replaced, if it is.
@@ -218,6 +245,31 @@ pub(crate) fn terms<const N: usize>(
     sum
 }
 
+/// The derivatives of a change of the state at a switch.
+pub(crate) enum PassageDerivatives<const N: usize> {
+    Reset(ResetDerivatives<N>),
+    Corner(CornerDerivatives<N>),
+}
+
+impl<const N: usize> PassageDerivatives<N> {
+    /// The tangent `(q, p, z)` after the change from that before it, whose time has the derivative `dt`.
+    pub fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
+        match self {
+            PassageDerivatives::Reset(reset) => reset.along(column, dt),
+            PassageDerivatives::Corner(corner) => corner.along(column, dt),
+        }
+    }
+
+    /// The derivatives in the state `(q, p, z)` before the change, in the parameters and in the time, of a number with these
+    /// derivatives in the state after it.
+    pub fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+        match self {
+            PassageDerivatives::Reset(reset) => reset.pull(of),
+            PassageDerivatives::Corner(corner) => corner.pull(of),
+        }
+    }
+}
+
 /// The derivatives of a reset.
 pub(crate) struct ResetDerivatives<const N: usize> {
     /// Those of the `(q, v, z)` after it in each argument.
@@ -230,8 +282,7 @@ pub(crate) struct ResetDerivatives<const N: usize> {
 }
 
 impl<const N: usize> ResetDerivatives<N> {
-    /// The tangent `(q, p, z)` after the reset from that before it, whose time has the derivative `dt`.
-    pub fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
+    fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
         let Column { q, p, z, parameter, .. } = column;
         let v = self.before.along(q, p, *z, *parameter, dt);
         let mut sum = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
@@ -251,9 +302,7 @@ impl<const N: usize> ResetDerivatives<N> {
         ChartVector { y: p, ..sum }
     }
 
-    /// The derivatives in the state `(q, p, z)` before the reset, in the parameters and in the time, of a number with these
-    /// derivatives in the state after it.
-    pub fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+    fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
         let Hessian { qv, vv, vz, .. } = &self.hessian;
         let after = ChartVector { x: of.x + qv * of.y, y: vv * of.y, z: of.z + vz.dot(&of.y) };
         let (mut before, mut explicit) = (EndCovector::<N>::zero(), Vec::new());

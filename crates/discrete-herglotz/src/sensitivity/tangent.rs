@@ -98,7 +98,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
                 let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
                 self.largest = max_or_nan(self.largest, largest);
             }
-            SolvedStep::Parts(parts, end) => self.push_parts(&parts, &end, k)?,
+            SolvedStep::Parts(parts) => self.push_parts(&parts, k)?,
         }
         self.taken = at.k;
         self.row_at_end(at)

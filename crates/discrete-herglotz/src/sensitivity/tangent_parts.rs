@@ -9,18 +9,13 @@ use crate::sensitivity::engine::{Column, Engine};
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::switch::Switch;
 use crate::sensitivity::tangent::{Columns, SwitchTime, row};
-use crate::sensitivity::{EndState, PartEnd, PartPoint, Passage, SensitivityError, SolvedPart};
+use crate::sensitivity::{EndState, PartEnd, PartPoint, SensitivityError, SolvedPart};
+use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{Parametric, PhasePoint};
 
 impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
-    /// Carries the columns over the parts of a step, the k-th of the run, with this state at its end.
-    pub(super) fn push_parts(
-        &mut self,
-        parts: &[SolvedPart<N>],
-        end: &PhasePoint<N>,
-        k: usize,
-    ) -> Result<(), SensitivityError> {
+    /// Carries the columns over the parts of a step, the k-th of the run.
+    pub(super) fn push_parts(&mut self, parts: &[SolvedPart<N>], k: usize) -> Result<(), SensitivityError> {
         // The derivatives of the time at the start of each part.
         let mut times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
         for (i, part) in parts.iter().enumerate() {
@@ -28,7 +23,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         }
         // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.to.rates_after(&self.plan.steps, end);
+            let rates = last.next.rates(&self.plan.steps);
             let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?;
             for (column, dt) in self.columns.iter_mut().zip(&times) {
                 let dh = column.time_after(k + 1) - dt;
@@ -71,7 +66,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
             let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
             self.rows.push(row(problem, state, &fixed, |_| 0.0).map_err(failed)?);
         }
-        let mut reset = None;
+        let mut change = None;
         match part.end {
             PartEnd::Step => {
                 times.iter_mut().zip(&self.columns).for_each(|(dt, column)| *dt = column.time_after(k + 1))
@@ -89,17 +84,12 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
                     *dt = -(gradient.state.dot(&column.state()) + explicit) / rate;
                 }
                 self.switches.push(SwitchTime { t, index, derivatives: times.to_vec() });
-                if let Some(cause) = passage.without_derivative() {
-                    return Err(SensitivityError::Passage { t, index, cause });
-                }
-                if passage == Passage::Reset {
-                    reset = Some(switch.reset()?);
-                }
+                change = switch.passage(passage, &part.next)?;
             }
         }
         for ((column, mut fixed), dt) in self.columns.iter_mut().zip(fixed).zip(&*times) {
             fixed.set_state(&fixed.state().plus(along_length.scale(*dt)));
-            let state = reset.as_ref().map_or_else(|| fixed.state(), |reset| reset.along(&fixed, *dt));
+            let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
             column.set_state(&state);
         }
         Ok(())

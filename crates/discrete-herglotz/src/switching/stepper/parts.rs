@@ -105,7 +105,7 @@ where
                 sigma *= stepper.stepper().sigma();
                 piece.add(&stepper);
                 self.keep(stepper);
-                self.ends.push(EndOfPart { from: at, to, has_stepper: true, end: plain_end(t) });
+                self.ends.push(EndOfPart { from: at, to, next: to, has_stepper: true, end: plain_end(t) });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
@@ -146,7 +146,8 @@ where
                 let Passed { to: next, factor, passage } = self.through(at, index, span, spacing)?;
                 let end = PartEnd::Switch { index, rising, passage };
                 // Further passages at the same point are ends of parts of length zero.
-                self.ends.push(EndOfPart { from: start, to: at, has_stepper: std::mem::take(&mut has_stepper), end });
+                let has_stepper = std::mem::take(&mut has_stepper);
+                self.ends.push(EndOfPart { from: start, to: at, next, has_stepper, end });
                 if self.resets.len() > resets {
                     self.end_piece(&mut piece, &at);
                     piece = OpenPiece { from: next, parts: 0, dense: None };

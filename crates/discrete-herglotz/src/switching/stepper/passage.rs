@@ -47,21 +47,21 @@ where
             let (to, passage) = self.reset(at, index, (to, factor), spacing)?;
             return Ok(Passed { to, factor: factor.unwrap_or(1.0), passage });
         }
-        let p = match corner(lagrangian, &mut self.surfaces, index, &at, max_displacement)? {
+        let (p, passage) = match corner(lagrangian, &mut self.surfaces, index, &at, max_displacement)? {
             Corner::Continuous => {
                 self.surfaces.cross(index);
                 return Ok(Passed { to: at, factor: 1.0, passage: Passage::Continuous });
             }
             Corner::Refracted(p) => {
                 self.surfaces.cross(index);
-                p
+                (p, Passage::Refraction)
             }
-            Corner::Reflected(p) => p,
+            Corner::Reflected(p) => (p, Passage::Reflection),
         };
         let state = PhasePoint { p, ..at.state };
         let v = legendre_inverse(lagrangian, at.t, &state, &at.v)?.v;
         let to = TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at };
-        Ok(Passed { to, factor: 1.0, passage: Passage::Corner })
+        Ok(Passed { to, factor: 1.0, passage })
     }
 
     /// The state after a reset.

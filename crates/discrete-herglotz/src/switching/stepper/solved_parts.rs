@@ -8,9 +8,11 @@ use crate::switching::surfaces::TimedState;
 /// The end of a part of a step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EndOfPart<const N: usize> {
-    /// The point at which the part begins and the point at which it ends, before anything happens there.
+    /// The point at which the part begins, the point at which it ends, before anything happens there, and the point from
+    /// which the motion continues.
     pub from: TimedState<N>,
     pub to: TimedState<N>,
+    pub next: TimedState<N>,
     /// Whether the part has a stepper; otherwise its length is zero.
     pub has_stepper: bool,
     pub end: PartEnd,
@@ -25,7 +27,13 @@ impl<'a, L, S: AsStepper<N>, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
         let part = |of: &EndOfPart<N>| {
             let stages = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
             let known = stages.is_some() || !of.has_stepper;
-            known.then(|| SolvedPart { stages, from: point(&of.from), to: point(&of.to), end: of.end })
+            known.then(|| SolvedPart {
+                stages,
+                from: point(&of.from),
+                to: point(&of.to),
+                next: point(&of.next),
+                end: of.end,
+            })
         };
         // Without the stages of one part there is no derivative of the step.
         self.ends.iter().map(part).collect::<Option<Vec<_>>>().unwrap_or_default()
