@@ -92,8 +92,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let k = at.k.saturating_sub(1);
         match SolvedStep::last_of(at.stepper).ok_or_else(|| no_tangent(self.plan, ""))? {
             SolvedStep::Whole(step) => {
-                let starts: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
-                self.rows_within(&step, at.t, &starts, k)?;
+                self.rows_within(&step, at.t, None, k)?;
                 let failed = |cause| SensitivityError::Step { step: k, cause };
                 let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
                 self.largest = max_or_nan(self.largest, largest);
@@ -105,12 +104,12 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     }
 
     /// The rows before the end of a step or of a part of one, from its start by shortened steps; `starts` are the
-    /// derivatives of the time of the start.
+    /// derivatives of the time of the start of a part.
     pub(super) fn rows_within(
         &mut self,
         step: &SolvedStages<N>,
         end: f64,
-        starts: &[f64],
+        starts: Option<&[f64]>,
         k: usize,
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
@@ -118,8 +117,12 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         while let Some(t) = self.times.next_within((step.t, end)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
             let engine = Engine::of_row(&mut self.row_engine, steps.problem, &short, Direction::Forward);
-            let mut columns: Vec<_> =
-                self.columns.iter().zip(starts).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
+            let start = |i: usize, column: &Column<N>| match starts {
+                Some(starts) => starts[i],
+                None => column.time_after(k),
+            };
+            let columns = self.columns.iter().enumerate();
+            let mut columns: Vec<_> = columns.map(|(i, column)| column.to_fixed_time(start(i, column))).collect();
             engine.push(&short, 0, &mut columns).map_err(failed)?;
             let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
             self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);

@@ -45,7 +45,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let plan = self.plan;
         let (steps, problem) = (&plan.steps, plan.steps.problem);
         if let Some(stages) = &part.stages {
-            self.rows_within(stages, part.to.t, times, k)?;
+            self.rows_within(stages, part.to.t, Some(times), k)?;
         }
         let mut fixed: Vec<Column<N>> =
             self.columns.iter().zip(&*times).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
