@@ -11,9 +11,11 @@ mod gradients {
     mod contact;
     mod flows;
     mod forces;
+    mod impacts;
     mod invalid_input;
     mod losses;
     mod lyapunov;
     mod pendulum;
     mod runs;
+    mod switches;
 }

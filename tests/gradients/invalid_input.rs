@@ -4,7 +4,9 @@ use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::rules::Midpoint;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
-use discrete_herglotz::{CustomMethod, GaussCollocation, InputError, Problem, Status, Steps, TransformedGauss, Until};
+use discrete_herglotz::{
+    CustomMethod, GaussCollocation, InputError, Problem, SplittingScheme, Status, Steps, TransformedGauss, Until,
+};
 
 struct Constant(f64);
 
@@ -42,7 +44,7 @@ fn integrators_without_tangents() {
     assert!(mine.unwrap_err().to_string().contains("choose `GaussCollocation`"));
 }
 
-/// A Lagrangian with a kink.
+/// A Lagrangian with a kink, across which only collocation is differentiated.
 struct Kinked;
 
 impl Lagrangian<1> for Kinked {
@@ -60,10 +62,8 @@ impl Parametric<1> for Kinked {}
 #[test]
 fn switching_functions() {
     let problem = Problem::new(&Kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
-    let found = problem
-        .by(GaussCollocation { stages: 4 })
-        .steps(Steps::Size(0.1))
-        .tangent(&[Variable::Action], Until::Time(2.0));
+    let found =
+        problem.by(SplittingScheme::STRANG).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
     assert!(found.unwrap_err().to_string().contains("switching functions"));
 }
 

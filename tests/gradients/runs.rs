@@ -4,7 +4,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{Parametric, VelocityPoint, legendre};
 use discrete_herglotz::rules::{self, CompositionMethod};
-use discrete_herglotz::sensitivity::{EndCovector, StateDerivative, Variable};
+use discrete_herglotz::sensitivity::{EndCovector, StateDerivative, Tangent, Variable};
 use discrete_herglotz::{GaussCollocation, Outcome, Problem, Run, SplittingScheme, Start, Status, Steps, Until};
 
 /// An integrator whose runs are differentiated.
@@ -123,6 +123,20 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
     /// Compares tangents with gradients, and both with differences, for every variable; the tolerances are relative to
     /// the largest derivative.
     pub fn compare(&self, name: &str, adjoint: f64, difference: f64) {
+        let (variables, tangent, size) = self.agree(name, adjoint);
+        for (variable, column) in variables.iter().zip(&tangent.columns) {
+            let differences = numbers(&self.difference(variable));
+            for (i, (of_column, of_difference)) in numbers(column).into_iter().zip(differences).enumerate() {
+                let what = format!("{name}, component {i} in {variable:?}");
+                let apart = (of_column - of_difference).abs() / size;
+                assert!(apart <= difference, "{what}: {of_column:e}, difference {of_difference:e}, apart {apart:e}");
+            }
+        }
+    }
+
+    /// Compares tangents with gradients for every variable; the tolerance is relative to the largest derivative, which is
+    /// returned with the tangent.
+    pub fn agree(&self, name: &str, adjoint: f64) -> (Vec<Variable>, Tangent<N>, f64) {
         let problem = self.problem();
         let run = || self.method.run(&problem).steps(Steps::Count(self.steps));
         let variables = Variable::all(&problem);
@@ -140,7 +154,6 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
         let gradients = recorded.pullbacks(&units).unwrap();
         let size = tangent.columns.iter().flat_map(numbers).fold(1e-30, |m, x| max_or_nan(m, x.abs()));
         for (k, (variable, column)) in variables.iter().zip(&tangent.columns).enumerate() {
-            let differences = numbers(&self.difference(variable));
             for (i, of_column) in numbers(column).into_iter().enumerate() {
                 let gradient = &gradients[i];
                 let all: Vec<f64> = gradient
@@ -152,14 +165,13 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
                     .chain([&gradient.t0, &gradient.t_end])
                     .copied()
                     .collect();
-                let (of_gradient, of_difference) = (all[k], differences[i]);
+                let of_gradient = all[k];
                 let what = format!("{name}, component {i} in {variable:?}");
                 let apart = (of_column - of_gradient).abs() / size;
                 assert!(apart <= adjoint, "{what}: forward {of_column:e}, backward {of_gradient:e}, apart {apart:e}");
-                let apart = (of_column - of_difference).abs() / size;
-                assert!(apart <= difference, "{what}: {of_column:e}, difference {of_difference:e}, apart {apart:e}");
             }
         }
+        (variables, tangent, size)
     }
 }
 

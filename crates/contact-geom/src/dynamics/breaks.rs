@@ -2,7 +2,7 @@
 
 use crate::dynamics::lagrangian::forward_lagrangian;
 use crate::switching::Control;
-use crate::{GeometryError, Hints, Lagrangian, VelocityPoint};
+use crate::{GeometryError, Hints, Lagrangian, Parametric, Scalar, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// A Lagrangian, or a Lagrangian with a force, that has a kink or a jump in time at each of these times: steps end
@@ -55,5 +55,42 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Breaks<L> {
     }
     fn breaks(&self) -> &[f64] {
         &self.times
+    }
+}
+
+/// The parameters of the Lagrangian; the times are none of them, since a run is not differentiated in its breaks.
+impl<const N: usize, L: Parametric<N>> Parametric<N> for Breaks<L> {
+    fn parameter_names(&self) -> Vec<String> {
+        self.lagrangian.parameter_names()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        self.lagrangian.parameters()
+    }
+    #[inline(always)]
+    fn parameter_count(&self) -> usize {
+        self.lagrangian.parameter_count()
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        Some(Breaks { lagrangian: self.lagrangian.with_parameters(theta)?, times: self.times.clone() })
+    }
+    #[inline(always)]
+    fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.lagrangian.value_at(theta, t, q, v, z)
+    }
+    #[inline(always)]
+    fn force_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        self.lagrangian.force_at(theta, t, x)
+    }
+    fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
+        self.lagrangian.switching_function_at(theta, index, t, x)
+    }
+    fn state_after_switch_at<T: Scalar>(
+        &self,
+        theta: &[T],
+        index: usize,
+        t: T,
+        x: &VelocityPoint<N, T>,
+    ) -> Option<VelocityPoint<N, T>> {
+        self.lagrangian.state_after_switch_at(theta, index, t, x)
     }
 }

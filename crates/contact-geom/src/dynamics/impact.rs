@@ -1,9 +1,10 @@
 //! Impacts on surfaces.
 
 use crate::dynamics::lagrangian::forward_lagrangian;
+use crate::dynamics::law_derivatives::LawDerivatives;
 use crate::number::linear::solve;
 use crate::switching::Control;
-use crate::{ChartVector, Derivatives, Dual, Hints, Lagrangian, Scalar, VelocityPoint};
+use crate::{ChartVector, Dual, Hints, Lagrangian, Scalar, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// The largest number of Newton iterations for the state after an impact. The energy is convex along the normal, so
@@ -21,15 +22,48 @@ pub trait Surface<const N: usize> {
 
     /// The normal `g_q` and the rate `g_t`.
     fn normal<T: Scalar>(&self, t: T, q: &SVector<T, N>) -> (SVector<T, N>, T) {
-        let mut moving = q.map(Dual::<T, ChartVector<N, T>>::constant);
-        let mut time = Dual::<T, ChartVector<N, T>>::constant(t);
-        for i in 0..N {
-            moving[i].d.x[i] = T::one();
-        }
-        time.d.z = T::one();
-        let g = self.value(time, &moving);
-        (g.d.x, g.d.z)
+        normal_of(|time, moving| self.value(time, moving), t, q)
     }
+
+    /// The names of the parameters of the surface; by default there are none. A surface with parameters implements this
+    /// method and the three below.
+    fn parameter_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Their values, in the order of the names.
+    fn parameters(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The same surface with other values of the parameters; `None` where their number is wrong, and by default.
+    fn with_parameters(&self, _theta: &[f64]) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
+    /// The value `g(t, q; theta)`, for as many values as there are names.
+    fn value_at<T: Scalar>(&self, _theta: &[T], t: T, q: &SVector<T, N>) -> T {
+        self.value(t, q)
+    }
+}
+
+/// The gradient of a function of the time and the position: in the position, and in the time.
+pub(super) fn normal_of<T: Scalar, const N: usize>(
+    value: impl Fn(Dual<T, ChartVector<N, T>>, &SVector<Dual<T, ChartVector<N, T>>, N>) -> Dual<T, ChartVector<N, T>>,
+    t: T,
+    q: &SVector<T, N>,
+) -> (SVector<T, N>, T) {
+    let mut moving = q.map(Dual::<T, ChartVector<N, T>>::constant);
+    let mut time = Dual::<T, ChartVector<N, T>>::constant(t);
+    for i in 0..N {
+        moving[i].d.x[i] = T::one();
+    }
+    time.d.z = T::one();
+    let g = value(time, &moving);
+    (g.d.x, g.d.z)
 }
 
 /// The law of an impact on a surface `g(t, q) = 0`.
@@ -73,15 +107,36 @@ impl Impact {
         lagrangian: &impl Lagrangian<N>,
         t: T,
         x: &VelocityPoint<N, T>,
+        normal: (&SVector<T, N>, T),
+    ) -> Option<VelocityPoint<N, T>> {
+        self.after_with(T::from(self.coefficient()), lagrangian, t, x, normal)
+    }
+
+    /// The coefficient of restitution, or the factor of the conformal law; 1 for an elastic impact.
+    pub(super) fn coefficient(self) -> f64 {
+        match self {
+            Impact::Elastic => 1.0,
+            Impact::Restitution(coefficient) | Impact::Conformal(coefficient) => coefficient,
+        }
+    }
+
+    /// The state after an impact with another coefficient, for the derivatives of a Lagrangian.
+    pub(super) fn after_with<T: Scalar, const N: usize>(
+        self,
+        coefficient: T,
+        lagrangian: &impl LawDerivatives<N, T>,
+        t: T,
+        x: &VelocityPoint<N, T>,
         (normal, rate): (&SVector<T, N>, T),
     ) -> Option<VelocityPoint<N, T>> {
+        let one = T::one();
         let (factor, restitution) = match self {
-            Impact::Elastic => (1.0, 1.0),
-            Impact::Restitution(e) => (1.0, e),
-            Impact::Conformal(factor) => (factor, factor.sqrt()),
+            Impact::Elastic => (one, one),
+            Impact::Restitution(_) => (one, coefficient),
+            Impact::Conformal(_) => (coefficient, coefficient.sqrt()),
         };
         let by_energy = !matches!(self, Impact::Restitution(_));
-        let (before, slope) = lagrangian.with_gradient(t, x);
+        let (before, slope) = lagrangian.value_and_gradient(t, x);
         let p = slope.y;
         let energy = x.v.dot(&p) - before;
         let approach = normal.dot(&x.v) + rate;
@@ -91,14 +146,14 @@ impl Impact {
             solve(&mut w, &mut by).ok().map(|_| by)
         };
         // The reflected velocity, for the mass matrix before the impact.
-        let across = divided(&lagrangian.mass_matrix(t, x), normal)?;
+        let across = divided(&lagrangian.mass(t, x), normal)?;
         let mut mu = -approach * (restitution + factor) / normal.dot(&across);
-        let mut y = VelocityPoint { q: x.q, v: x.v * T::from(factor) + across * mu, z };
+        let mut y = VelocityPoint { q: x.q, v: x.v * factor + across * mu, z };
         let (mut converged, mut last) = (0, f64::INFINITY);
         for _ in 0..MAX_ITERATIONS {
-            let (value, slope) = lagrangian.with_gradient(t, &y);
-            let w = lagrangian.mass_matrix(t, &y);
-            let residual = slope.y - p * T::from(factor) - normal * mu;
+            let (value, slope) = lagrangian.value_and_gradient(t, &y);
+            let w = lagrangian.mass(t, &y);
+            let residual = slope.y - p * factor - normal * mu;
             let (along, across) = (divided(&w, &residual)?, divided(&w, normal)?);
             let (of_law, direction, of_mu) = if by_energy {
                 (y.v.dot(&slope.y) - value - energy * factor + mu * rate, w * y.v, rate)

@@ -90,6 +90,32 @@ pub trait Parametric<const N: usize>: Lagrangian<N> {
         self.applied_force(t, x)
     }
 
+    /// The [switching function](Lagrangian::switching_functions) with this index, for any values of the parameters.
+    /// `None`, the default, where it is not written over scalars: it is then differentiated by differences, to about ten
+    /// digits.
+    fn switching_function_at<T: Scalar>(
+        &self,
+        _theta: &[T],
+        _index: usize,
+        _t: T,
+        _x: &VelocityPoint<N, T>,
+    ) -> Option<T> {
+        None
+    }
+
+    /// The state with which the state is replaced at a zero of the switching function with this index
+    /// ([`at_switch`](Lagrangian::at_switch)), for any values of the parameters. `None`, the default, where it is not
+    /// written over scalars: it is then differentiated by differences, to about ten digits.
+    fn state_after_switch_at<T: Scalar>(
+        &self,
+        _theta: &[T],
+        _index: usize,
+        _t: T,
+        _x: &VelocityPoint<N, T>,
+    ) -> Option<VelocityPoint<N, T>> {
+        None
+    }
+
     /// The index of a parameter.
     ///
     /// # Errors
@@ -217,6 +243,18 @@ impl<const N: usize, L: Parametric<N>, F: ParametricForce<N>> Parametric<N> for 
             return force + self.lagrangian.force_at(own, t, x);
         }
         force
+    }
+    fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
+        self.lagrangian.switching_function_at(&theta[..self.lagrangian.parameter_count()], index, t, x)
+    }
+    fn state_after_switch_at<T: Scalar>(
+        &self,
+        theta: &[T],
+        index: usize,
+        t: T,
+        x: &VelocityPoint<N, T>,
+    ) -> Option<VelocityPoint<N, T>> {
+        self.lagrangian.state_after_switch_at(&theta[..self.lagrangian.parameter_count()], index, t, x)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Steppers: a method applied to one motion.
 
 use crate::integration::{Piece, Reset};
-use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep, sensitivity::SolvedStages};
+use crate::sensitivity::{SolvedPart, SolvedStages};
+use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use thiserror::Error;
@@ -51,6 +52,12 @@ pub trait Stepper<const N: usize> {
     /// failed one, and for a method whose tangent is not implemented.
     fn solved_stages(&self) -> Option<SolvedStages<N>> {
         None
+    }
+
+    /// The parts of the last step, for one that ends parts at zeros of switching functions or at breaks; empty for a step
+    /// in one part, and where [`solved_stages`](Self::solved_stages) of a part are not known.
+    fn solved_parts(&self) -> Vec<SolvedPart<N>> {
+        Vec::new()
     }
 
     /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where

@@ -7,7 +7,7 @@ use crate::run::motion::{Motion, NearbyVelocity};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::sensitivity::flows::StepEnds;
-use crate::sensitivity::step_tangent::TakenStep;
+use crate::sensitivity::step_tangent::WholeStep;
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
@@ -140,18 +140,18 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
     /// The step from the start of a step to a time within it, with the state there and its velocity.
     pub fn shortened(
         &self,
-        step: &TakenStep<N>,
+        step: &WholeStep<N>,
         t: f64,
-    ) -> Result<(TakenStep<N>, PhasePoint<N>, SVector<f64, N>), StepError> {
+    ) -> Result<(WholeStep<N>, PhasePoint<N>, SVector<f64, N>), StepError> {
         let (t0, start) = step.start();
         let stepper = self.step_to(&(t0, *start), t, Some(step.velocity()), None)?;
         let end = stepper.state();
         let v = self.velocity(t, &end, stepper.last_velocity())?;
         let short = match step {
-            TakenStep::Collocation(_) => {
-                TakenStep::Collocation(Box::new(stepper.solved_stages().ok_or(StepError::NonFinite)?))
+            WholeStep::Collocation(_) => {
+                WholeStep::Collocation(Box::new(stepper.solved_stages().ok_or(StepError::NonFinite)?))
             }
-            TakenStep::Flow(_) => TakenStep::Flow(StepEnds { t: t0, h: t - t0, start: *start, end }),
+            WholeStep::Flow(_) => WholeStep::Flow(StepEnds { t: t0, h: t - t0, start: *start, end }),
         };
         Ok((short, end, v))
     }

@@ -7,6 +7,7 @@ use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SolvedStages;
+use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
@@ -15,160 +16,9 @@ use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
-use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
+use contact_geom::numbers::max_or_nan;
+use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
 use pulp::{Simd, WithSimd};
-
-/// The tangent `(dq, dp, dz)` of a motion along one variable.
-pub(crate) struct Column<const N: usize> {
-    pub q: SVector<f64, N>,
-    pub p: SVector<f64, N>,
-    pub z: f64,
-    /// The parameter that it is the derivative with respect to, if any.
-    pub parameter: Option<usize>,
-    /// The derivatives of the time at the start of the run and of the step size.
-    pub dt0: f64,
-    pub dh: f64,
-    rates: StageTangent<N>,
-    warm: bool,
-}
-
-impl<const N: usize> Column<N> {
-    pub fn new(q: SVector<f64, N>, p: SVector<f64, N>, z: f64) -> Self {
-        Column { q, p, z, parameter: None, dt0: 0.0, dh: 0.0, rates: StageTangent::ZERO, warm: false }
-    }
-
-    /// The column of a parameter.
-    pub fn of_parameter(self, index: usize) -> Self {
-        Column { parameter: Some(index), ..self }
-    }
-
-    /// The column of a variable on which the time at the start and the step size depend with these derivatives.
-    pub fn of_times(self, dt0: f64, dh: f64) -> Self {
-        Column { dt0, dh, ..self }
-    }
-
-    /// The derivative of the time after this number of steps.
-    pub fn time_after(&self, steps: usize) -> f64 {
-        self.dt0 + steps as f64 * self.dh
-    }
-
-    /// The column for a step from the end of this number of steps to a fixed time.
-    pub fn for_row(&self, steps: usize) -> Self {
-        let dt0 = self.time_after(steps);
-        Self::copied(self).of_times(dt0, -dt0)
-    }
-
-    /// The column at a fixed time, where the state after this number of steps has these rates.
-    pub fn at_fixed_time(&self, steps: usize, rates: &PhasePoint<N>) -> Self {
-        let (mut column, dt) = (Self::copied(self), self.time_after(steps));
-        column.q -= rates.q * dt;
-        column.p -= rates.p * dt;
-        column.z -= rates.z * dt;
-        column
-    }
-
-    /// Adds a multiple of another tangent, with that of its rates.
-    pub fn add_multiple(&mut self, factor: f64, other: &Self) {
-        self.q += other.q * factor;
-        self.p += other.p * factor;
-        self.z += other.z * factor;
-        self.rates.add_multiple(factor, &other.rates);
-    }
-
-    /// Multiplies the tangent by a factor, with its rates.
-    pub fn scale(&mut self, factor: f64) {
-        self.q *= factor;
-        self.p *= factor;
-        self.z *= factor;
-        self.rates.scale(factor);
-    }
-
-    /// The Euclidean product of the components `(q, p, z)` with those of another tangent.
-    pub fn dot(&self, other: &Self) -> f64 {
-        self.q.dot(&other.q) + self.p.dot(&other.p) + self.z * other.z
-    }
-
-    /// The same tangent without an initial guess of its rates.
-    fn copied(&self) -> Self {
-        let Column { q, p, z, parameter, dt0, dh, .. } = *self;
-        Column { parameter, dt0, dh, ..Column::new(q, p, z) }
-    }
-
-    /// The largest component.
-    pub fn size(&self) -> f64 {
-        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
-    }
-}
-
-/// The derivatives `(g_q, g_p, g_z)` of a number in the state, with those in parameters, time and step size so far.
-pub(crate) struct Covector<const N: usize> {
-    pub q: SVector<f64, N>,
-    pub p: SVector<f64, N>,
-    pub z: f64,
-    pub parameters: Vec<f64>,
-    /// The derivatives in the time of the start of the run, for fixed steps, and in the step size.
-    pub time: f64,
-    pub step: f64,
-    /// The largest component so far.
-    pub largest: f64,
-    rates: StageTangent<N>,
-    warm: bool,
-}
-
-impl<const N: usize> Covector<N> {
-    pub fn new(of_state: &ChartVector<N>, parameters: Vec<f64>) -> Self {
-        let largest = max_or_nan(of_state.max_abs_or_nan(), 0.0);
-        Covector {
-            largest,
-            q: of_state.x,
-            p: of_state.y,
-            z: of_state.z,
-            parameters,
-            time: 0.0,
-            step: 0.0,
-            rates: StageTangent::ZERO,
-            warm: false,
-        }
-    }
-
-    /// Adds a covector at the start of a shortened step from the state after this number of steps to a fixed time.
-    pub fn add_row(&mut self, row: &Self, steps: usize) {
-        self.add_state(&ChartVector { x: row.q, y: row.p, z: row.z }, &row.parameters);
-        // The length of the step decreases as its start moves.
-        self.add_time(row.time - row.step, steps);
-    }
-
-    /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
-    pub fn add_at_fixed_time(
-        &mut self,
-        of_state: &ChartVector<N>,
-        parameters: &[f64],
-        rates: &PhasePoint<N>,
-        steps: usize,
-    ) {
-        self.add_state(of_state, parameters);
-        self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
-    }
-
-    fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
-        self.q += of_state.x;
-        self.p += of_state.y;
-        self.z += of_state.z;
-        self.parameters.iter_mut().zip(parameters).for_each(|(sum, of)| *sum += of);
-    }
-
-    /// Adds a derivative in the time after this number of steps.
-    fn add_time(&mut self, of_time: f64, steps: usize) {
-        self.time += of_time;
-        self.step += steps as f64 * of_time;
-    }
-
-    /// The largest component.
-    pub fn size(&self) -> f64 {
-        max_abs_or_nan(self.q.iter().chain(&self.p).copied().chain([self.z]))
-    }
-}
 
 /// The tangent of steps of one length in one direction, with its workspace.
 pub(crate) struct Engine<'a, L, const N: usize> {

@@ -16,10 +16,7 @@ pub enum SensitivityError {
     #[error(transparent)]
     Parameter(#[from] UnknownParameter),
     /// The integrator has no tangent.
-    #[error(
-        "derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`, and a Lagrangian \
-         without switching functions"
-    )]
+    #[error("derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`")]
     NoTangent {
         /// The name of the method.
         method: Cow<'static, str>,
@@ -49,6 +46,29 @@ pub enum SensitivityError {
     Loss {
         /// The value of the loss.
         value: f64,
+    },
+    /// The motion meets a surface tangentially, up to round-off: the time at which it does has no derivative.
+    #[error(
+        "the motion meets a surface tangentially at t = {t}: the rate {rate} of the function there is round-off, and the \
+         time has no derivative; differentiate a run that ends before, or with another start"
+    )]
+    Grazing {
+        /// The time.
+        t: f64,
+        /// The time derivative of the function whose zero is the surface.
+        rate: f64,
+    },
+    /// The passage of the motion through the zero of a switching function has no derivative.
+    #[error(
+        "the derivative of the passage through the zero of switching function {index} at t = {t} is not known: {cause}"
+    )]
+    Passage {
+        /// The time.
+        t: f64,
+        /// The index of the function.
+        index: usize,
+        /// The cause.
+        cause: &'static str,
     },
     /// The tangent of a step cannot be computed.
     #[error("the derivative of step {step} cannot be computed: {cause}")]

@@ -2,15 +2,16 @@
 
 use crate::run::discretization::Discretization;
 use crate::run::{Motion, Outcome, Plan, Row, Rows, Run, Until};
-use crate::sensitivity::SensitivityError;
+use crate::sensitivity::columns::Covector;
 use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
-use crate::sensitivity::engine::Covector;
+use crate::sensitivity::gradient_parts::PartCovectors;
 use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::row_times::{check_times, is_same_time};
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep, WholeStep};
 use crate::sensitivity::tangent::no_tangent;
+use crate::sensitivity::{PartPoint, SensitivityError};
 use crate::{InputError, Problem, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
@@ -235,8 +236,9 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             all.push(Covector::new(&of_state, parameters));
         }
         let mut engine = StepTangent::new(steps, Direction::Backward)?;
-        let mut rows = RowCovectors { steps, times, of_rows, engine: RowTangent::new() };
+        let mut rows = RowCovectors { steps, times, of_rows, tangent: RowTangent::new() };
         let mut stepper = self.plan.stepper()?;
+        let mut of_parts = PartCovectors { steps, tangent: RowTangent::new() };
         let mut block: Vec<TakenStep<N>> = Vec::with_capacity(BLOCK);
         let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
             block.clear();
@@ -246,9 +248,14 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
                 block.push(engine.taken(&*stepper, steps.h, before).ok_or_else(|| no_tangent(&self.plan, ""))?);
             }
             for (k, step) in range.zip(&block).rev() {
-                engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
-                if let Some(first) = all.first_mut() {
-                    rows.add(&mut engine, step, k, first).map_err(|cause| failed(k, cause))?;
+                match step {
+                    TakenStep::Whole(step) => {
+                        engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
+                        if let Some(first) = all.first_mut() {
+                            rows.add(&mut engine, step, k, first).map_err(|cause| failed(k, cause))?;
+                        }
+                    }
+                    TakenStep::Parts(parts) => of_parts.pull(&mut engine, (parts, k), &mut all, &mut rows)?,
                 }
             }
             Ok(())
@@ -263,11 +270,11 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
 }
 
 /// The covectors of rows that are not yet added, from the last to the first.
-struct RowCovectors<'r, 'p, L, const N: usize> {
+pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
     steps: &'r Discretization<'p, L, N>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
-    engine: RowTangent<'p, L, N>,
+    tangent: RowTangent<'p, L, N>,
 }
 
 impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
@@ -276,33 +283,69 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     fn add(
         &mut self,
         engine: &mut StepTangent<'p, L, N>,
-        step: &TakenStep<N>,
+        step: &WholeStep<N>,
         k: usize,
         to: &mut Covector<N>,
     ) -> Result<(), StepError> {
+        let of_start = self.add_within(engine, step, to)?;
+        to.add_time(of_start, k);
+        let (t, state) = step.start();
+        self.add_at_start(&PartPoint { t, state: *state, v: step.velocity() }, k, to)
+    }
+
+    /// Adds the covectors of the rows after the start of a step, or of a part of one, to that at its start. Returns the
+    /// derivative in the time of this start.
+    pub fn add_within(
+        &mut self,
+        engine: &mut StepTangent<'p, L, N>,
+        step: &WholeStep<N>,
+        to: &mut Covector<N>,
+    ) -> Result<f64, StepError> {
         let problem = self.steps.problem;
-        let (t0, start) = step.start();
-        while let (Some((t, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) {
-            let passed = if step.length() < 0.0 { *t <= t0 } else { *t >= t0 };
-            if is_same_time(*t, t0) {
-                let v = self.steps.velocity(t0, start, Some(step.velocity()))?;
-                let x = VelocityPoint { q: start.q, v, z: start.z };
-                let (of_state, parameters, _) = VelocityDependence::at(problem, t0, &x)?.pull(covector);
-                let rates = self.steps.rates(t0, start, Some(v))?;
-                to.add_at_fixed_time(&of_state, &parameters, &rates, k);
-            } else if passed {
-                let (short, state, v) = self.steps.shortened(step, *t)?;
-                let x = VelocityPoint { q: state.q, v, z: state.z };
-                let (of_state, parameters, _) = VelocityDependence::at(problem, *t, &x)?.pull(covector);
-                let mut row = Covector::new(&of_state, parameters);
-                self.engine.pull(engine, problem, &short, std::slice::from_mut(&mut row))?;
-                to.add_row(&row, k);
-            } else {
+        let (start, _) = step.start();
+        let mut of_start = 0.0;
+        while let Some(t) = self.times.last().copied() {
+            let passed = if step.length() < 0.0 { t <= start } else { t >= start };
+            if is_same_time(t, start) || !passed {
                 break;
             }
-            (self.times, self.of_rows) = (times, of_rows);
+            let (short, state, v) = self.steps.shortened(step, t)?;
+            let Some(mut row) = self.take(&PartPoint { t, state, v })? else { break };
+            self.tangent.pull(engine, problem, &short, std::slice::from_mut(&mut row))?;
+            let [of_its_start, of_length] = row.take_times();
+            to.add_multiple(1.0, &row);
+            // The length of the step decreases as its start moves.
+            of_start += of_its_start - of_length;
         }
+        Ok(of_start)
+    }
+
+    /// Adds the covector of a row at the start of a step, the k-th of the run.
+    pub fn add_at_start(&mut self, at: &PartPoint<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+        if !self.times.last().is_some_and(|t| is_same_time(*t, at.t)) {
+            return Ok(());
+        }
+        let v = self.steps.velocity(at.t, &at.state, Some(at.v))?;
+        let at = PartPoint { v, ..*at };
+        let Some(row) = self.take(&at)? else { return Ok(()) };
+        let rates = self.steps.rates(at.t, &at.state, Some(v))?;
+        to.add_at_fixed_time(&row.state(), &row.parameters, &rates, k);
         Ok(())
+    }
+
+    /// The covector of a row at a point, if there is one at its time.
+    pub fn take_at(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
+        if self.times.last().is_some_and(|t| is_same_time(*t, at.t)) { self.take(at) } else { Ok(None) }
+    }
+
+    /// The covector of the last row, at its point.
+    fn take(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
+        let (Some((_, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) else {
+            return Ok(None);
+        };
+        (self.times, self.of_rows) = (times, of_rows);
+        let (of_state, parameters, _) = VelocityDependence::at(self.steps.problem, at.t, &at.point())?.pull(covector);
+        Ok(Some(Covector::new(&of_state, parameters)))
     }
 }
 

@@ -3,7 +3,9 @@
 use crate::StepError;
 use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Until};
 use crate::sensitivity::SensitivityError;
-use crate::sensitivity::engine::Column;
+use crate::sensitivity::carried_columns::CarriedColumns;
+use crate::sensitivity::columns::Column;
+use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::tangent::no_tangent;
@@ -32,8 +34,7 @@ pub struct LyapunovExponents<const N: usize> {
 /// A frame of tangents that is carried along a run, and made orthonormal after each step.
 struct Frame<'r, 'p, L, const N: usize> {
     plan: &'r Plan<'p, L, N>,
-    engine: StepTangent<'p, L, N>,
-    columns: Vec<Column<N>>,
+    carried: CarriedColumns<'r, 'p, L, N>,
     /// The logarithms of the factors by which the frame was stretched.
     logarithms: Vec<f64>,
     /// The time and the logarithms in the middle of the run.
@@ -81,11 +82,12 @@ impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
     fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state));
-        let step = self.engine.taken(at.stepper, self.plan.step_size(), before);
+        let step = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
         let step = step.ok_or_else(|| no_tangent(self.plan, ""))?;
         let failed = |cause| SensitivityError::Step { step: k, cause };
-        self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
-        orthonormalise(&mut self.columns, &mut self.logarithms).map_err(failed)?;
+        self.carried.push(&step, at.t, k)?;
+        self.carried.switches.clear();
+        orthonormalise(&mut self.carried.columns, &mut self.logarithms).map_err(failed)?;
         self.taken = at.k;
         if 2 * at.k >= self.plan.count() && self.middle.is_none() {
             self.middle = Some((at.t, self.logarithms.clone()));
@@ -141,13 +143,13 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents<N>, SensitivityError> {
         let run = self.differentiable()?.with_conformal_factor();
         let plan = run.plan(until)?;
+        let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
         let columns = initial_frame();
         let (t0, state) = (plan.steps.problem.t0, plan.steps.problem.state);
         let mut frame = Frame {
             plan: &plan,
-            engine: StepTangent::new(&plan.steps, Direction::Forward)?,
             logarithms: vec![0.0; columns.len()],
-            columns,
+            carried: CarriedColumns::new(&plan.steps, engine, columns, RowTimes::new(&[])),
             middle: None,
             before: (t0, state),
             taken: 0,

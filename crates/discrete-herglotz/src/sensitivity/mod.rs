@@ -11,27 +11,38 @@
 //! Splittings, quadrature rules and their compositions are differentiated sub-flow by sub-flow. [Lyapunov
 //! exponents](crate::Run::lyapunov_exponents) are the growth rates of the tangent.
 
+mod carried_columns;
+mod columns;
+mod corner_derivatives;
 mod end_state;
 mod engine;
 mod error;
+mod event_time;
 pub(crate) mod flows;
 mod gradient;
+mod gradient_parts;
 mod kept_states;
 mod linear_stages;
 mod lyapunov;
 mod parameter_derivatives;
+mod ridders;
 mod row_times;
+mod solved_part;
 mod solved_stages;
 mod stage_derivatives;
 mod step_maps;
 pub(crate) mod step_tangent;
+mod switch;
 mod tangent;
+mod tangent_parts;
 mod variable;
 
 pub use end_state::{EndCovector, EndState, Loss};
 pub use error::SensitivityError;
 pub use gradient::{Gradient, LossGradient, RecordedRun};
 pub use lyapunov::LyapunovExponents;
+pub(crate) use solved_part::PartPoint;
+pub use solved_part::{PartEnd, Passage, SolvedPart};
 pub use solved_stages::SolvedStages;
-pub use tangent::{StateDerivative, Tangent, TangentRow};
+pub use tangent::{StateDerivative, SwitchTime, Tangent, TangentRow};
 pub use variable::Variable;

@@ -1,44 +1,54 @@
-//! The tangent of the steps of a run, for every integrator that has one.
+//! The tangent of the steps of a run, for every integrator that has one. Steps with several parts are those of
+//! [`tangent_parts`](crate::sensitivity::tangent_parts) and [`gradient_parts`](crate::sensitivity::gradient_parts).
 
 use crate::run::discretization::Discretization;
-use crate::sensitivity::engine::{Column, Covector, Engine};
+use crate::sensitivity::columns::{Column, Covector};
+use crate::sensitivity::engine::Engine;
 use crate::sensitivity::flows::{FlowEngine, StepEnds};
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::{SensitivityError, SolvedStages};
+use crate::sensitivity::{SensitivityError, SolvedPart, SolvedStages};
 use crate::{Problem, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Parametric, PhasePoint};
 
 /// A step that was taken, with what its tangent needs.
 pub(crate) enum TakenStep<const N: usize> {
+    Whole(WholeStep<N>),
+    /// The parts of a step that ends parts at zeros of switching functions and at breaks.
+    Parts(Vec<SolvedPart<N>>),
+}
+
+/// A step, or a part of one, that nothing interrupts.
+#[derive(Clone, Debug)]
+pub(crate) enum WholeStep<const N: usize> {
     /// The stages of a collocation step.
     Collocation(Box<SolvedStages<N>>),
     /// The ends of a step that consists of sub-flows.
     Flow(StepEnds<N>),
 }
 
-impl<const N: usize> TakenStep<N> {
+impl<const N: usize> WholeStep<N> {
     /// The time and the state at the start.
     pub fn start(&self) -> (f64, &PhasePoint<N>) {
         match self {
-            TakenStep::Collocation(step) => (step.t, &step.start),
-            TakenStep::Flow(step) => (step.t, &step.start),
+            WholeStep::Collocation(step) => (step.t, &step.start),
+            WholeStep::Flow(step) => (step.t, &step.start),
         }
     }
 
     /// The length.
     pub fn length(&self) -> f64 {
         match self {
-            TakenStep::Collocation(step) => step.h,
-            TakenStep::Flow(step) => step.h,
+            WholeStep::Collocation(step) => step.h,
+            WholeStep::Flow(step) => step.h,
         }
     }
 
     /// A velocity within the step.
     pub fn velocity(&self) -> SVector<f64, N> {
         match self {
-            TakenStep::Collocation(step) => SVector::from_fn(|d, _| step.v[d].0[0]),
-            TakenStep::Flow(step) => (step.end.q - step.start.q) / step.h,
+            WholeStep::Collocation(step) => SVector::from_fn(|d, _| step.v[d].0[0]),
+            WholeStep::Flow(step) => (step.end.q - step.start.q) / step.h,
         }
     }
 }
@@ -59,14 +69,15 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
     pub fn new(steps: &Discretization<'a, L, N>, direction: Direction) -> Result<Self, SensitivityError> {
         let info = &steps.info;
         let refused = |case| Err(SensitivityError::NoTangent { method: info.name.clone(), case });
-        if steps.switches {
-            return refused(" for Lagrangians with switching functions");
-        }
         if info.in_transformed_time || info.divides {
             return refused("");
         }
         if info.collocation.is_some() {
             return Ok(Self::collocation(steps.problem, steps.stages(), steps.h, direction));
+        }
+        // Its steps near a surface would be those of another method.
+        if steps.switches {
+            return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
             Some(formula) => Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula)?))),
@@ -78,11 +89,16 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
         StepTangent::Collocation(Box::new(Engine::new(problem, stages, h, direction)))
     }
 
-    /// The last step of a stepper, which started at the given time and state.
+    /// The last step of a stepper, which started at the given time and state; `None` where its stages are not known.
     pub fn taken(&self, stepper: &dyn Stepper<N>, h: f64, (t, start): (f64, PhasePoint<N>)) -> Option<TakenStep<N>> {
         match self {
-            StepTangent::Collocation(_) => Some(TakenStep::Collocation(Box::new(stepper.solved_stages()?))),
-            StepTangent::Flow(_) => Some(TakenStep::Flow(StepEnds { t, h, start, end: stepper.state() })),
+            StepTangent::Collocation(_) => match stepper.solved_stages() {
+                Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(Box::new(stages)))),
+                None => Some(stepper.solved_parts()).filter(|parts| !parts.is_empty()).map(TakenStep::Parts),
+            },
+            StepTangent::Flow(_) => {
+                Some(TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() })))
+            }
         }
     }
 
@@ -98,10 +114,10 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
     ///
     /// # Errors
     /// [`StepError`] where the equations of the tangent cannot be solved.
-    pub fn push(&mut self, step: &TakenStep<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+    pub fn push(&mut self, step: &WholeStep<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
         match (self, step) {
-            (StepTangent::Collocation(engine), TakenStep::Collocation(step)) => engine.push(step, k, columns),
-            (StepTangent::Flow(engine), TakenStep::Flow(step)) => engine.push(step, k, columns),
+            (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.push(step, k, columns),
+            (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.push(step, k, columns),
             _ => Err(StepError::NonFinite),
         }
     }
@@ -110,16 +126,16 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &TakenStep<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+    pub fn pull(&mut self, step: &WholeStep<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
         match (self, step) {
-            (StepTangent::Collocation(engine), TakenStep::Collocation(step)) => engine.pull(step, k, covectors),
-            (StepTangent::Flow(engine), TakenStep::Flow(step)) => engine.pull(step, k, covectors),
+            (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.pull(step, k, covectors),
+            (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.pull(step, k, covectors),
             _ => Err(StepError::NonFinite),
         }
     }
 }
 
-/// The tangent of shortened steps, which is kept from one to the next.
+/// The tangent of shortened steps and of parts of steps, which is kept from one to the next.
 pub(crate) struct RowTangent<'a, L, const N: usize> {
     collocation: Option<Engine<'a, L, N>>,
 }
@@ -129,7 +145,7 @@ impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
         RowTangent { collocation: None }
     }
 
-    /// Carries columns over a shortened step from its start; `steps` is the tangent of whole steps.
+    /// Carries columns over a shortened step or a part from its start; `steps` is the tangent of whole steps.
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
@@ -137,19 +153,19 @@ impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
         &mut self,
         steps: &mut StepTangent<'a, L, N>,
         problem: &Problem<'a, L, N>,
-        step: &TakenStep<N>,
+        step: &WholeStep<N>,
         columns: &mut [Column<N>],
     ) -> Result<(), StepError> {
         match step {
-            TakenStep::Collocation(step) => {
+            WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Forward);
                 engine.push(step, 0, columns).map(|_| ())
             }
-            TakenStep::Flow(_) => steps.push(step, 0, columns).map(|_| ()),
+            WholeStep::Flow(_) => steps.push(step, 0, columns).map(|_| ()),
         }
     }
 
-    /// Carries covectors back over a shortened step; `steps` is the tangent of whole steps.
+    /// Carries covectors back over a shortened step or a part; `steps` is the tangent of whole steps.
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
@@ -157,15 +173,15 @@ impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
         &mut self,
         steps: &mut StepTangent<'a, L, N>,
         problem: &Problem<'a, L, N>,
-        step: &TakenStep<N>,
+        step: &WholeStep<N>,
         covectors: &mut [Covector<N>],
     ) -> Result<(), StepError> {
         match step {
-            TakenStep::Collocation(step) => {
+            WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Backward);
                 engine.pull(step, 0, covectors)
             }
-            TakenStep::Flow(_) => steps.pull(step, 0, covectors),
+            WholeStep::Flow(_) => steps.pull(step, 0, covectors),
         }
     }
 }

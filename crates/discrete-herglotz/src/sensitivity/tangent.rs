@@ -1,13 +1,14 @@
 //! Forward derivatives of a run.
 
 use crate::run::{Motion, Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
+use crate::sensitivity::carried_columns::CarriedColumns;
+use crate::sensitivity::columns::Column;
 use crate::sensitivity::end_state::VelocityDependence;
-use crate::sensitivity::engine::Column;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
+use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::variable::Variable;
-use crate::sensitivity::{EndState, SensitivityError};
+use crate::sensitivity::{EndCovector, EndState, SensitivityError};
 use crate::{InputError, Problem, Status, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
@@ -24,9 +25,22 @@ pub struct Tangent<const N: usize> {
     pub columns: Vec<StateDerivative<N>>,
     /// The states at the requested times, each with its derivatives.
     pub rows: Vec<TangentRow<N>>,
+    /// The zeros of switching functions that the motion has met, in the order of the run.
+    pub switches: Vec<SwitchTime>,
     /// The largest derivative along the run divided by the largest one at its end, at least one: round-off of the
     /// derivatives is amplified by it.
     pub growth: f64,
+}
+
+/// A zero of a switching function along a run, with the derivatives of its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SwitchTime {
+    /// The time.
+    pub t: f64,
+    /// The index of the function.
+    pub index: usize,
+    /// The derivatives of the time, in the order of the variables.
+    pub derivatives: Vec<f64>,
 }
 
 /// The state at a time with its derivatives, one column for each variable. The time is fixed, unless it is the end of the
@@ -55,51 +69,36 @@ pub struct StateDerivative<const N: usize> {
 /// Carries columns along a run.
 struct Columns<'r, 'p, L, const N: usize> {
     plan: &'r Plan<'p, L, N>,
-    engine: StepTangent<'p, L, N>,
-    /// For the shortened steps to rows.
-    row_engine: RowTangent<'p, L, N>,
+    carried: CarriedColumns<'r, 'p, L, N>,
     /// The time and the state at the start of the next step.
     before: (f64, PhasePoint<N>),
-    columns: Vec<Column<N>>,
-    times: RowTimes,
-    rows: Vec<TangentRow<N>>,
     largest: f64,
     taken: usize,
     failure: Option<SensitivityError>,
+}
+
+impl<const N: usize> StateDerivative<N> {
+    /// The derivative of a number with these partial derivatives in the state, for a fixed time.
+    pub fn dot(&self, of: &EndCovector<N>) -> f64 {
+        self.q.dot(&of.q) + self.v.dot(&of.v) + self.p.dot(&of.p) + self.z * of.z
+    }
 }
 
 impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state));
-        let taken = self.engine.taken(at.stepper, self.plan.step_size(), before);
+        let taken = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
         let step = taken.ok_or_else(|| no_tangent(self.plan, ""))?;
-        self.rows_within(&step, at)?;
-        let failed = |cause| SensitivityError::Step { step: k, cause };
-        let largest = self.engine.push(&step, k, &mut self.columns).map_err(failed)?;
+        let largest = self.carried.push(&step, at.t, k)?;
         self.largest = max_or_nan(self.largest, largest);
         self.taken = at.k;
         self.row_at_end(at)
     }
 
-    /// The rows between the ends of the last step, from its start by shortened steps.
-    fn rows_within(&mut self, step: &TakenStep<N>, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
-        let k = at.k.saturating_sub(1);
-        let failed = |cause| SensitivityError::Step { step: k, cause };
-        let steps = &self.plan.steps;
-        while let Some(t) = self.times.next_within((step.start().0, at.t)) {
-            let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
-            let mut columns: Vec<_> = self.columns.iter().map(|column| column.for_row(k)).collect();
-            self.row_engine.push(&mut self.engine, steps.problem, &short, &mut columns).map_err(failed)?;
-            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
-            self.rows.push(row(steps.problem, state, &columns, |_| 0.0).map_err(failed)?);
-        }
-        Ok(())
-    }
-
     /// The row at the end of the last step, if its time is requested.
     fn row_at_end(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
-        if self.times.next_at(at.t, at.last).is_none() {
+        if self.carried.times.next_at(at.t, at.last).is_none() {
             return Ok(());
         }
         let failed = |cause| SensitivityError::Step { step: at.k, cause };
@@ -107,13 +106,14 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let PhasePoint { q, p, z } = at.state;
         let state = EndState { t: at.t, q, v, p, z };
         let problem = self.plan.steps.problem;
-        self.rows.push(
+        self.carried.rows.push(
             if at.last && at.k > 0 {
-                row(problem, state, &self.columns, |column| column.time_after(at.k))
+                row(problem, state, &self.carried.columns, |column| column.time_after(at.k))
             } else {
                 // The end of the step moves with the times of the run, but not the row.
                 let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
-                let columns: Vec<_> = self.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
+                let columns: Vec<_> =
+                    self.carried.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
                 row(problem, state, &columns, |_| 0.0)
             }
             .map_err(failed)?,
@@ -128,7 +128,7 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
     }
 
     fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
-        self.times.check(info)
+        self.carried.times.check(info)
     }
 
     fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
@@ -160,7 +160,7 @@ impl<L, const N: usize> Columns<'_, '_, L, N> {
 }
 
 /// A row with the derivatives of its velocity; `dt` are the derivatives of its time.
-fn row<L: Parametric<N>, const N: usize>(
+pub(super) fn row<L: Parametric<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     state: EndState<N>,
     columns: &[Column<N>],
@@ -219,22 +219,18 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         if let Some(case) = columns.iter().find_map(|column| engine.obstacle(column.parameter?)) {
             return Err(no_tangent(&plan, case));
         }
-        let mut carried = Columns {
+        let mut observer = Columns {
             plan: &plan,
-            engine,
-            row_engine: RowTangent::new(),
+            carried: CarriedColumns::new(&plan.steps, engine, columns, RowTimes::new(times)),
             before: (problem.t0, problem.state),
-            columns,
-            times: RowTimes::new(times),
-            rows: Vec::with_capacity(times.len()),
             largest: 0.0,
             taken: 0,
             failure: None,
         };
-        let outcome = run.observed(&plan, &mut carried)?;
-        let Columns { columns, rows, largest, failure, .. } = carried;
+        let outcome = run.observed(&plan, &mut observer)?;
+        let Columns { carried: CarriedColumns { columns, rows, switches, .. }, largest, failure, .. } = observer;
         match failure {
-            None => Ok(tangent(problem, outcome, &columns, rows, largest)),
+            None => Ok(Tangent { switches, ..tangent(problem, outcome, &columns, rows, largest) }),
             Some(failure) => Err(failure),
         }
     }
@@ -258,6 +254,7 @@ fn tangent<L: Parametric<N>, const N: usize>(
         outcome,
         columns: last.map_or_else(|| columns.iter().map(of_state).collect(), |row| row.columns),
         rows,
+        switches: Vec::new(),
         growth: if largest > size { largest / size } else { 1.0 },
     }
 }

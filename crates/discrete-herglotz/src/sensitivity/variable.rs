@@ -2,7 +2,7 @@
 
 use crate::Problem;
 use crate::sensitivity::SensitivityError;
-use crate::sensitivity::engine::Column;
+use crate::sensitivity::columns::Column;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric};

@@ -18,7 +18,7 @@ mod velocity_drag;
 
 use crate::integration::StepFormula;
 use crate::sensitivity::SensitivityError;
-use crate::sensitivity::engine::{Column, Covector};
+use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::{Problem, StepError};
 use contact_geom::numbers::max_or_nan;

@@ -1,7 +1,7 @@
 //! A linearised sub-flow of a step.
 
 use super::tangent_matrix::TangentMatrix;
-use crate::sensitivity::engine::{Column, Covector};
+use crate::sensitivity::columns::{Column, Covector};
 use contact_geom::ChartVector;
 
 /// A sub-flow of a step, linearised at the state where it acts: an exact flow of a splitting, or a step of a quadrature

@@ -5,7 +5,9 @@ pub(crate) mod as_stepper;
 pub(crate) mod evaluation_range;
 pub(crate) mod of_integrator;
 mod parts;
+mod passage;
 mod run;
+mod solved_parts;
 
 use crate::error::step_error;
 use crate::gauss::StepStart;
@@ -14,6 +16,7 @@ use crate::status::first;
 use crate::switching::stepper::accumulation::Accumulation;
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::stepper::solved_parts::EndOfPart;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
 use crate::{InputError, Problem, StepError, UnresolvedStep, theory::legendre_inverse};
 use contact_geom::{Lagrangian, VelocityPoint};
@@ -44,6 +47,8 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     unresolved: Option<UnresolvedStep>,
     /// The steppers of the parts of the last step that had parts, if they are kept.
     parts: Option<Vec<S>>,
+    /// The ends of these parts.
+    ends: Vec<EndOfPart<N>>,
     switched: bool,
     /// The resets in the last steps, and the pieces of the last step between them.
     resets: Vec<Reset<N>>,
@@ -76,7 +81,8 @@ where
             sigma: 1.0,
             spent: 0,
             unresolved: None,
-            parts: None,
+            parts: Some(Vec::new()),
+            ends: Vec::new(),
             switched: false,
             resets: Vec::new(),
             pieces: Vec::new(),
@@ -90,9 +96,9 @@ where
         SwitchingStepper { parts: Some(Vec::new()), ..self }
     }
 
-    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it.
+    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it, whose steppers are not kept.
     pub fn dividing(self, max_defect: f64) -> Self {
-        SwitchingStepper { max_defect, ..self }
+        SwitchingStepper { max_defect, parts: None, ..self }
     }
 
     /// Whether a step is to be divided.
@@ -172,6 +178,7 @@ where
         let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
         self.switched = false;
         self.pieces.clear();
+        self.ends.clear();
         if !self.has_break_near(from.t, t)
             && self.base.stepper_mut().advance(1).is_ok()
             && let Ok(to) = self.reached(&self.base, t, &from)
@@ -206,6 +213,7 @@ where
                 (self.surfaces, self.accumulation) = sides;
                 self.resets.truncate(resets);
                 self.pieces.clear();
+                self.ends.clear();
                 // The state is that before the step.
                 if let Ok(base) = self.stepper_at(&from, self.h, false) {
                     (self.base, self.origin, self.before) = (base, from, self.k);

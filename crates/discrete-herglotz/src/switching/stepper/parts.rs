@@ -1,19 +1,15 @@
 //! The parts of a step that end on the zeros of switching functions, or whose defect is within a bound.
 
-use crate::gauss::StepStart;
-use crate::integration::{Piece, Reset};
+use crate::integration::Piece;
+use crate::sensitivity::PartEnd;
 use crate::solve::roots::bracketed_root;
-use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::stepper::accumulation::{Accumulation, Resolution};
 use crate::switching::stepper::as_stepper::AsStepper;
-use crate::switching::surfaces::{Departure, SignChange, StepCurve, TimedState};
-use crate::{DenseStep, InputError, Problem, StepError, theory::legendre_inverse};
-use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint,
-    numbers::{max_abs_or_nan, max_or_nan},
-    switching::Control,
-};
+use crate::switching::stepper::passage::Passed;
+use crate::switching::stepper::solved_parts::EndOfPart;
+use crate::switching::surfaces::{SignChange, StepCurve, TimedState};
+use crate::{DenseStep, InputError, Problem, StepError};
+use contact_geom::{Lagrangian, numbers::max_or_nan};
 
 /// The largest number of parts of a step; a step with more fails with [`StepError::Switching`] or
 /// [`StepError::Undivided`]. Each costs as much as a step, so that a failure takes a second at most.
@@ -81,6 +77,11 @@ where
                 return Ok((at, sigma));
             }
             let until = self.next_end(at.t, t_end, spacing);
+            let plain_end = |t: f64| match t {
+                _ if t != until => PartEnd::Division { fraction: (t - from.t) / span },
+                _ if until == t_end => PartEnd::Step,
+                _ => PartEnd::Break,
+            };
             let t = if (until - at.t).abs() <= longest { until } else { at.t + longest.copysign(span) };
             if longest <= spacing {
                 return Err(if too_long { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } });
@@ -104,6 +105,7 @@ where
                 sigma *= stepper.stepper().sigma();
                 piece.add(&stepper);
                 self.keep(stepper);
+                self.ends.push(EndOfPart { from: at, to, next: to, has_stepper: true, end: plain_end(t) });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
@@ -112,6 +114,7 @@ where
                 longest = 0.5 * (t - at.t).abs();
                 continue;
             };
+            let mut has_stepper = stepper.is_some();
             match stepper {
                 Some(stepper) if self.is_too_long(&stepper) => {
                     too_long = true;
@@ -130,7 +133,7 @@ where
                 return Err(StepError::Switching { t: at.t });
             }
             let together = self.surfaces.simultaneous(self.problem.lagrangian, &curve, &change, &to, self.h);
-            at = to;
+            let mut start = std::mem::replace(&mut at, to);
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
                 if index != change.index
@@ -139,12 +142,17 @@ where
                     continue;
                 }
                 let resets = self.resets.len();
-                let (next, factor) = self.through(at, index, span, spacing)?;
+                let rising = self.surfaces.side(index) < 0.0;
+                let Passed { to: next, factor, passage } = self.through(at, index, span, spacing)?;
+                let end = PartEnd::Switch { index, rising, passage };
+                // Further passages at the same point are ends of parts of length zero.
+                let has_stepper = std::mem::take(&mut has_stepper);
+                self.ends.push(EndOfPart { from: start, to: at, next, has_stepper, end });
                 if self.resets.len() > resets {
                     self.end_piece(&mut piece, &at);
                     piece = OpenPiece { from: next, parts: 0, dense: None };
                 }
-                (at, sigma) = (next, sigma * factor);
+                (at, start, sigma) = (next, next, sigma * factor);
             }
             // The curve of a part that is much longer than the next flight would round it away.
             longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
@@ -166,84 +174,6 @@ where
             let dense = piece.dense.filter(|_| piece.parts == 1);
             self.pieces.push(Piece { from: (piece.from.t, piece.from.state), to: (to.t, to.state), dense });
         }
-    }
-
-    /// The state after a zero, on the side where the motion continues, and the conformal factor of the passage.
-    fn through(
-        &mut self,
-        at: TimedState<N>,
-        index: usize,
-        span: f64,
-        spacing: f64,
-    ) -> Result<(TimedState<N>, f64), StepError> {
-        let max_displacement = max_abs_or_nan(at.v.iter().map(|v| v * span));
-        let lagrangian = self.problem.lagrangian;
-        let to = match lagrangian.at_switch(index, at.t, &at.point(), self.surfaces.side(index) < 0.0) {
-            Control::Replace(to) => Some((to, None)),
-            Control::Conformal { to, factor } => Some((to, Some(factor))),
-            _ => None,
-        };
-        if let Some((to, factor)) = to {
-            return self.reset(at, index, (to, factor), spacing).map(|at| (at, factor.unwrap_or(1.0)));
-        }
-        let p = match corner(lagrangian, &mut self.surfaces, index, &at, max_displacement)? {
-            Corner::Continuous => {
-                self.surfaces.cross(index);
-                return Ok((at, 1.0));
-            }
-            Corner::Refracted(p) => {
-                self.surfaces.cross(index);
-                p
-            }
-            Corner::Reflected(p) => p,
-        };
-        let state = PhasePoint { p, ..at.state };
-        let v = legendre_inverse(lagrangian, at.t, &state, &at.v)?.v;
-        Ok((TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at }, 1.0))
-    }
-
-    /// The state after a reset.
-    fn reset(
-        &mut self,
-        at: TimedState<N>,
-        index: usize,
-        (mut to, factor): (VelocityPoint<N>, Option<f64>),
-        spacing: f64,
-    ) -> Result<TimedState<N>, StepError> {
-        let (lagrangian, side, mut t) = (self.problem.lagrangian, self.surfaces.side(index), at.t);
-        let from = at.point();
-        let tolerance = self.surfaces.rounding(lagrangian, index, (t, &from), self.h);
-        let mut departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h, tolerance);
-        let rate = departure.map_or(0.0, |departure| departure.rate);
-        let resolution = Resolution { h: self.h, spacing, rate, rounding: tolerance };
-        let mut limit = self.accumulation.add(index, t, &resolution);
-        // A state that is stopped on the surface and pushed through it is the limit of impacts too.
-        if departure.is_some_and(|Departure { side: next, with_rate, .. }| !with_rate && next * side < 0.0) {
-            limit = Some(t);
-        }
-        if let Some(limit) = limit {
-            match lagrangian.at_accumulation(index, limit, &to) {
-                Control::Replace(rest) => {
-                    (to, t) = (rest, limit);
-                    departure = self.surfaces.departure(lagrangian, index, (t, &to), self.h, tolerance);
-                }
-                _ => return Err(StepError::Accumulation { t: limit }),
-            }
-            self.accumulation = Accumulation::default();
-        }
-        let p = lagrangian.gradient(t, &to).y;
-        let state = PhasePoint { q: to.q, p, z: to.z };
-        if state.check().is_err() || to.v.iter().any(|v| !v.is_finite()) {
-            return Err(StepError::ResetUndefined { t });
-        }
-        let value = self.surfaces.value(lagrangian, index, (t, &to));
-        if side * value < -max_or_nan(tolerance, self.surfaces.rounding(lagrangian, index, (t, &to), self.h)) {
-            return Err(StepError::ResetBeyond { t });
-        }
-        self.surfaces.reset(lagrangian, (index, departure), t, [&from, &to], self.h);
-        self.changed_energy |= factor.is_none();
-        self.resets.push(Reset { t, index, before: at.state, after: state });
-        Ok(TimedState { t, state, v: to.v, rests: StepStart::ZERO })
     }
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.

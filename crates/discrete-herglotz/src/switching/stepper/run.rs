@@ -1,6 +1,7 @@
 //! The stepper as seen by a run: its steps, its state, and its words for a resumed run.
 
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::sensitivity::{SolvedPart, SolvedStages};
 use crate::status::first;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::as_stepper::AsStepper;
@@ -49,6 +50,14 @@ where
 
     fn dense(&self) -> Option<DenseStep<N>> {
         if self.switched { None } else { self.base.stepper().dense() }
+    }
+
+    fn solved_stages(&self) -> Option<SolvedStages<N>> {
+        if self.switched { None } else { self.base.stepper().solved_stages() }
+    }
+
+    fn solved_parts(&self) -> Vec<SolvedPart<N>> {
+        self.parts_with_stages()
     }
 
     fn resets(&self) -> &[Reset<N>] {

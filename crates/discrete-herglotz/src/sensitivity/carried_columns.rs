@@ -1,0 +1,71 @@
+//! Columns that are carried along the steps of a run.
+
+use crate::run::discretization::Discretization;
+use crate::sensitivity::columns::Column;
+use crate::sensitivity::row_times::RowTimes;
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep, WholeStep};
+use crate::sensitivity::tangent::{SwitchTime, TangentRow, row};
+use crate::sensitivity::{EndState, SensitivityError};
+use contact_geom::Parametric;
+
+/// Columns, with the rows and the zeros of switching functions on their way.
+pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
+    pub steps: &'r Discretization<'p, L, N>,
+    pub engine: StepTangent<'p, L, N>,
+    /// For shortened steps and parts of steps.
+    pub row_engine: RowTangent<'p, L, N>,
+    pub columns: Vec<Column<N>>,
+    pub times: RowTimes,
+    pub rows: Vec<TangentRow<N>>,
+    pub switches: Vec<SwitchTime>,
+}
+
+impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
+    pub fn new(
+        steps: &'r Discretization<'p, L, N>,
+        engine: StepTangent<'p, L, N>,
+        columns: Vec<Column<N>>,
+        times: RowTimes,
+    ) -> Self {
+        let (rows, switches) = (Vec::new(), Vec::new());
+        CarriedColumns { steps, engine, row_engine: RowTangent::new(), columns, times, rows, switches }
+    }
+
+    /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.
+    pub fn push(&mut self, step: &TakenStep<N>, end: f64, k: usize) -> Result<f64, SensitivityError> {
+        match step {
+            TakenStep::Whole(step) => {
+                self.rows_within(step, end, None, k)?;
+                let failed = |cause| SensitivityError::Step { step: k, cause };
+                self.engine.push(step, k, &mut self.columns).map_err(failed)
+            }
+            TakenStep::Parts(parts) => self.push_parts(parts, k),
+        }
+    }
+
+    /// The rows before the end of a step or of a part of one, from its start by shortened steps; `starts` are the
+    /// derivatives of the time of the start of a part.
+    pub fn rows_within(
+        &mut self,
+        step: &WholeStep<N>,
+        end: f64,
+        starts: Option<&[f64]>,
+        k: usize,
+    ) -> Result<(), SensitivityError> {
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        let (steps, problem) = (self.steps, self.steps.problem);
+        while let Some(t) = self.times.next_within((step.start().0, end)) {
+            let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
+            let start = |i: usize, column: &Column<N>| match starts {
+                Some(starts) => starts[i],
+                None => column.time_after(k),
+            };
+            let columns = self.columns.iter().enumerate();
+            let mut columns: Vec<_> = columns.map(|(i, column)| column.to_fixed_time(start(i, column))).collect();
+            self.row_engine.push(&mut self.engine, problem, &short, &mut columns).map_err(failed)?;
+            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
+            self.rows.push(row(problem, state, &columns, |_| 0.0).map_err(failed)?);
+        }
+        Ok(())
+    }
+}

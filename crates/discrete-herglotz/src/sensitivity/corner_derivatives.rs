@@ -1,0 +1,155 @@
+//! The derivatives of a refraction or a reflection at a jump of L across a surface `g(t, q) = 0`.
+//!
+//! The corner conditions are `p+ = p- + lambda g_q`, `E+ = E- - lambda g_t`, with the energies of L on both sides. As
+//! `dE = v . dp - L_q . dq - L_z dz - L_t dt - L_theta dtheta`, the derivative of lambda is
+//! `((v- - v+) . dp- + [L_q] . dq + [L_z] dz + [L_t] dt + [L_theta] dtheta - lambda (v+ . dg_q + dg_t)) / (v+ . g_q + g_t)`
+//! with the jumps [] from before to after, each at its own velocity.
+
+use crate::StepError;
+use crate::sensitivity::columns::Column;
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::switch::{Argument, Switch, difference};
+use crate::sensitivity::{PartPoint, SensitivityError};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
+use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
+
+/// The distance from the surface of the first of three points from which one-sided limits are extrapolated, relative to
+/// the position and to its change in a step.
+const SURFACE_DISTANCE: f64 = 1e-9;
+
+/// The weights of the extrapolation from the distances 1, 2, 3 to 0.
+const WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
+
+/// The derivatives of the factor lambda and of the normal.
+pub(crate) struct CornerDerivatives<const N: usize> {
+    lambda: f64,
+    normal: SVector<f64, N>,
+    /// Of lambda in `(q, p-, z)`, in the time and in the parameters.
+    of_state: ChartVector<N>,
+    of_time: f64,
+    of_parameters: Vec<f64>,
+    /// Of the normal in q, in the time and in the parameters.
+    normal_q: SMatrix<f64, N, N>,
+    normal_t: SVector<f64, N>,
+    normal_parameters: Vec<SVector<f64, N>>,
+}
+
+/// The first derivatives of L on one side.
+struct OneSided<const N: usize> {
+    gradient: ChartVector<N>,
+    time: f64,
+    parameters: Vec<f64>,
+}
+
+impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
+    /// The derivatives of L at a velocity, as limits from the side where `g` has the sign of `toward`, times its normal.
+    fn one_sided(&self, v: &SVector<f64, N>, toward: &SVector<f64, N>) -> OneSided<N> {
+        let lagrangian = self.problem.lagrangian;
+        let mut of = ParameterDerivatives::new(lagrangian);
+        let zero = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
+        let mut sum = OneSided { gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
+        for (weight, k) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
+            let (t, x) = (self.at.t, VelocityPoint { q: self.at.state.q + toward * k, v: *v, z: self.at.state.z });
+            sum.gradient = sum.gradient.plus(lagrangian.gradient(t, &x).scale(weight));
+            sum.time += weight * of.at(lagrangian, Quantity::Time, t, &x).l;
+            for (index, parameter) in sum.parameters.iter_mut().enumerate() {
+                *parameter += weight * of.at(lagrangian, Quantity::Parameter(index), t, &x).l;
+            }
+        }
+        sum
+    }
+
+    /// The normal `g_q` and the rate `g_t` of the surface, at a point that is moved, by differences.
+    fn normal(&self, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Vec<f64>> {
+        let value = |lagrangian: &L, t: f64, x: &VelocityPoint<N>| {
+            let mut values = Vec::new();
+            lagrangian.switching_functions(t, x, &mut values);
+            values.get(self.index).map(|g| vec![*g])
+        };
+        let arguments = (0..N).map(Argument::Position).chain([Argument::Time]);
+        let normal = arguments.map(|along| difference(along, (lagrangian, t, x), self.h, value));
+        normal.map(|of| of?.first().copied()).collect()
+    }
+
+    /// The derivatives of the corner at the switch, after which the motion is at `next`, on the other side if it is
+    /// refracted. The second derivatives of the surface are found by differences.
+    pub(super) fn corner(
+        &self,
+        next: &PartPoint<N>,
+        is_refracted: bool,
+    ) -> Result<CornerDerivatives<N>, SensitivityError> {
+        let undefined = || self.failed(StepError::NonFinite);
+        let (lagrangian, count) = (self.problem.lagrangian, self.problem.lagrangian.parameter_count());
+        let gradient = self.normal(lagrangian, self.at.t, &self.at.point()).ok_or_else(undefined)?;
+        let (normal, rate) = (SVector::<f64, N>::from_fn(|i, _| gradient[i]), gradient[N]);
+        let second = |along: Argument| self.difference(along, |l, t, x| self.normal(l, t, x));
+        let mut normal_q = SMatrix::<f64, N, N>::zeros();
+        for j in 0..N {
+            let of = second(Argument::Position(j))?;
+            (0..N).for_each(|i| normal_q[(i, j)] = of[i]);
+        }
+        let of_normal = |of: &[f64]| SVector::<f64, N>::from_fn(|i, _| of[i]);
+        let in_time = second(Argument::Time)?;
+        let in_parameters = (0..count).map(|k| second(Argument::Parameter(k))).collect::<Result<Vec<_>, _>>()?;
+
+        let (v_before, v_after) = (self.at.v, next.v);
+        let size = max_abs_or_nan(self.at.state.q.iter().copied());
+        let moved = max_abs_or_nan(v_before.iter().map(|v| v * self.h));
+        let length = SURFACE_DISTANCE * if max_or_nan(size, moved) > 0.0 { max_or_nan(size, moved) } else { 1.0 };
+        let side = if self.rising { -1.0 } else { 1.0 };
+        let toward = normal * (side * length / normal.norm());
+        let before = self.one_sided(&v_before, &toward);
+        let after = self.one_sided(&v_after, &if is_refracted { -toward } else { toward });
+
+        let lambda = (next.state.p - self.at.state.p).dot(&normal) / normal.dot(&normal);
+        let divisor = v_after.dot(&normal) + rate;
+        if !(divisor.abs() > 0.0 && lambda.is_finite()) {
+            return Err(undefined());
+        }
+        let jump = after.gradient.minus(before.gradient);
+        let normal_t = of_normal(&in_time);
+        let explicit = |of: &[f64]| lambda * (v_after.dot(&of_normal(of)) + of[N]);
+        let parameters = in_parameters.iter().enumerate();
+        let of_parameters =
+            parameters.map(|(k, of)| (after.parameters[k] - before.parameters[k] - explicit(of)) / divisor).collect();
+        Ok(CornerDerivatives {
+            lambda,
+            normal,
+            of_state: ChartVector {
+                x: (jump.x - (normal_q.transpose() * v_after + normal_t) * lambda) / divisor,
+                y: (v_before - v_after) / divisor,
+                z: jump.z / divisor,
+            },
+            of_time: (after.time - before.time - explicit(&in_time)) / divisor,
+            of_parameters,
+            normal_q,
+            normal_t,
+            normal_parameters: in_parameters.iter().map(|of| of_normal(of)).collect(),
+        })
+    }
+}
+
+impl<const N: usize> CornerDerivatives<N> {
+    /// The tangent `(q, p, z)` after the corner.
+    pub(super) fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
+        let ChartVector { x: q, y: p, z } = column.state();
+        let of_parameter = column.parameter.and_then(|k| self.of_parameters.get(k)).copied().unwrap_or(0.0);
+        let lambda = self.of_state.dot(&column.state()) + self.of_time * dt + of_parameter;
+        let explicit =
+            column.parameter.and_then(|k| self.normal_parameters.get(k)).copied().unwrap_or_else(SVector::zeros);
+        let normal = self.normal_q * q + self.normal_t * dt + explicit;
+        ChartVector { x: q, y: p + self.normal * lambda + normal * self.lambda, z }
+    }
+
+    /// The derivatives in the state before the corner, in the parameters and in the time.
+    pub(super) fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+        let of_lambda = of.y.dot(&self.normal);
+        let of_normal = of.y * self.lambda;
+        let mut state = of.plus(self.of_state.scale(of_lambda));
+        state.x += self.normal_q.transpose() * of_normal;
+        let parameters = self.of_parameters.iter().zip(&self.normal_parameters);
+        let parameters = parameters.map(|(a, normal)| a * of_lambda + normal.dot(&of_normal)).collect();
+        (state, parameters, self.of_time * of_lambda + self.normal_t.dot(&of_normal))
+    }
+}

@@ -1,0 +1,148 @@
+//! The adjoint of a step with parts: the transpose of its tangent, from its last part to its first.
+//!
+//! A covector at the end of a part has, in addition to its derivatives in the state, one in the time of this end. It is
+//! carried back for a fixed time of the end; its derivative in the length of the part and that in the time are together
+//! the derivative in the time of the end, which is passed on: to the times of the run, or at the zero of a switching
+//! function to the function, as a multiple of its own derivatives carried back over the same part.
+
+use crate::StepError;
+use crate::run::discretization::Discretization;
+use crate::sensitivity::columns::Covector;
+use crate::sensitivity::gradient::RowCovectors;
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent};
+use crate::sensitivity::switch::Switch;
+use crate::sensitivity::{PartEnd, SensitivityError, SolvedPart};
+use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::max_or_nan;
+use contact_geom::{ChartVector, Parametric};
+
+/// Carries covectors over the parts of steps.
+pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
+    pub steps: &'r Discretization<'p, L, N>,
+    pub tangent: RowTangent<'p, L, N>,
+}
+
+impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
+    /// Carries covectors from the end of a step, the k-th of the run, to its start, and adds those of its rows to the
+    /// first of them; `engine` is the tangent of whole steps.
+    pub fn pull(
+        &mut self,
+        engine: &mut StepTangent<'p, L, N>,
+        (parts, k): (&[SolvedPart<N>], usize),
+        all: &mut [Covector<N>],
+        rows: &mut RowCovectors<'_, 'p, L, N>,
+    ) -> Result<(), SensitivityError> {
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        // The derivatives in the time of the end of a part.
+        let mut times = vec![0.0; all.len()];
+        if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
+            let rates = last.next.rates(self.steps).map_err(failed)?;
+            for (covector, time) in all.iter_mut().zip(&mut times) {
+                let along = covector.state().dot(&rates);
+                covector.add_time(along, k + 1);
+                *time = -along;
+            }
+        }
+        for (i, part) in parts.iter().enumerate().rev() {
+            // A row at the end of a part is one before the passage there, at a fixed time.
+            let row = if i + 1 < parts.len() { rows.take_at(&part.to).map_err(failed)? } else { None };
+            self.pull_part(engine, (part, k), all, &mut times)?;
+            let (Some(first), Some(time)) = (all.first_mut(), times.first_mut()) else { continue };
+            if let Some(mut row) = row {
+                self.pull_over(engine, part, std::slice::from_mut(&mut row)).map_err(failed)?;
+                let [of_start, of_length] = row.take_times();
+                first.add_multiple(1.0, &row);
+                *time += of_start - of_length;
+            }
+            if let Some(step) = &part.step {
+                *time += rows.add_within(engine, step, first).map_err(failed)?;
+            }
+        }
+        for (covector, time) in all.iter_mut().zip(&times) {
+            covector.add_time(*time, k);
+        }
+        if let (Some(part), Some(first)) = (parts.first(), all.first_mut()) {
+            rows.add_at_start(&part.from, k, first).map_err(failed)?;
+        }
+        Ok(())
+    }
+
+    /// Carries covectors over a part; `times` are their derivatives in the time of its end, and then of its start.
+    fn pull_part(
+        &mut self,
+        engine: &mut StepTangent<'p, L, N>,
+        (part, k): (&SolvedPart<N>, usize),
+        all: &mut [Covector<N>],
+        times: &mut [f64],
+    ) -> Result<(), SensitivityError> {
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        let (problem, t, h) = (self.steps.problem, part.to.t, self.steps.h);
+        let mut gradient = None;
+        if let PartEnd::Switch { index, rising, passage } = part.end {
+            let switch = Switch { problem, index, rising, at: &part.to, step: k, h };
+            if let Some(change) = switch.passage(passage, &part.next)? {
+                for (covector, time) in all.iter_mut().zip(&mut *times) {
+                    let (state, parameters, of_time) = change.pull(&covector.state());
+                    covector.set_state(&ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+                    covector.add_state(&state, &parameters);
+                    *time += of_time;
+                }
+            }
+            gradient = Some(switch.gradient()?);
+        }
+        let of_run: Vec<[f64; 2]> = all.iter_mut().map(Covector::take_times).collect();
+        self.pull_over(engine, part, all).map_err(failed)?;
+        let mut of_function = None;
+        if let Some(gradient) = gradient {
+            let mut covector = Covector::new(&gradient.state, gradient.parameters.clone());
+            self.pull_over(engine, part, std::slice::from_mut(&mut covector)).map_err(failed)?;
+            let [of_start, of_length] = covector.take_times();
+            let rate = gradient.rate(of_length, t)?;
+            of_function = Some((covector, of_start - of_length, rate));
+        }
+        for ((covector, time), of_run) in all.iter_mut().zip(times).zip(of_run) {
+            let [of_start, of_length] = covector.take_times();
+            [covector.time, covector.step] = of_run;
+            let of_end = *time + of_length;
+            *time = of_start - of_length;
+            match part.end {
+                PartEnd::Step => covector.add_time(of_end, k + 1),
+                PartEnd::Break => {}
+                PartEnd::Division { fraction } => {
+                    covector.add_time((1.0 - fraction) * of_end, k);
+                    covector.add_time(fraction * of_end, k + 1);
+                }
+                PartEnd::Switch { .. } => {
+                    if let Some((function, of_its_start, rate)) = &of_function {
+                        let factor = -of_end / rate;
+                        covector.add_multiple(factor, function);
+                        *time += factor * of_its_start;
+                    }
+                }
+            }
+            covector.largest = max_or_nan(covector.largest, covector.size());
+        }
+        Ok(())
+    }
+
+    /// Carries covectors over a part for a fixed time of its end.
+    fn pull_over(
+        &mut self,
+        engine: &mut StepTangent<'p, L, N>,
+        part: &SolvedPart<N>,
+        all: &mut [Covector<N>],
+    ) -> Result<(), StepError> {
+        match &part.step {
+            Some(step) => {
+                // The rates of the step after it are those of another length.
+                all.iter_mut().for_each(|covector| covector.set_state(&covector.state()));
+                self.tangent.pull(engine, self.steps.problem, step, all)
+            }
+            None => {
+                let rates = part.from.rates(self.steps)?;
+                all.iter_mut().for_each(|covector| covector.pull_at_once(&rates));
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! The parts of a step that ends parts at zeros of switching functions and at breaks.
+
+use crate::StepError;
+use crate::run::Motion;
+use crate::sensitivity::step_tangent::WholeStep;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint};
+
+/// A part of a step with its solved stages, and what happened at its end: all that its tangent needs. See
+/// [`Stepper::solved_parts`](crate::Stepper::solved_parts).
+#[derive(Clone, Debug)]
+pub struct SolvedPart<const N: usize> {
+    /// `None` for a part of length zero, between two passages at one point.
+    pub(crate) step: Option<WholeStep<N>>,
+    pub(crate) from: PartPoint<N>,
+    /// The end, before anything happens there.
+    pub(crate) to: PartPoint<N>,
+    /// The point from which the motion continues.
+    pub(crate) next: PartPoint<N>,
+    pub(crate) end: PartEnd,
+}
+
+impl<const N: usize> SolvedPart<N> {
+    /// The times of the start and of the end.
+    pub fn span(&self) -> (f64, f64) {
+        (self.from.t, self.to.t)
+    }
+
+    /// The reason why the part ends.
+    pub fn end(&self) -> PartEnd {
+        self.end
+    }
+}
+
+/// The reason why a part of a step ends, which determines how its end depends on the variables of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PartEnd {
+    /// It is the end of the step.
+    Step,
+    /// A named time of a kink or a jump ([`breaks`](contact_geom::Lagrangian::breaks)), which is fixed.
+    Break,
+    /// The step is divided there. The end stays at this fraction of the step: which parts are taken is not
+    /// differentiated, as the choice of steps is not.
+    Division {
+        /// The fraction of the step before the end.
+        fraction: f64,
+    },
+    /// A zero of a [switching function](contact_geom::Lagrangian::switching_functions), whose time depends on the motion.
+    Switch {
+        /// The index of the function.
+        index: usize,
+        /// Whether it increases.
+        rising: bool,
+        /// What happens to the motion.
+        passage: Passage,
+    },
+}
+
+/// What happens to a motion at a zero of a switching function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Passage {
+    /// Its state is continuous.
+    Continuous,
+    /// Its state is replaced.
+    Reset,
+    /// It crosses a jump of L with another momentum.
+    Refraction,
+    /// It is reflected at a jump of L.
+    Reflection,
+    /// Its state is replaced at the limit of a sequence of resets.
+    Accumulation,
+}
+
+/// A time, a state and its velocity.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PartPoint<const N: usize> {
+    pub t: f64,
+    pub state: PhasePoint<N>,
+    pub v: SVector<f64, N>,
+}
+
+impl<const N: usize> PartPoint<N> {
+    pub fn point(&self) -> VelocityPoint<N> {
+        VelocityPoint { q: self.state.q, v: self.v, z: self.state.z }
+    }
+
+    /// The time derivatives of the state, as a vector.
+    pub fn rates(&self, motion: &impl Motion<N>) -> Result<ChartVector<N>, StepError> {
+        let PhasePoint { q, p, z } = motion.rates(self.t, &self.state, Some(self.v))?;
+        Ok(ChartVector { x: q, y: p, z })
+    }
+}

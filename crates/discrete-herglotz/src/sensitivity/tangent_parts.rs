@@ -1,0 +1,91 @@
+//! The tangent of a step with parts.
+//!
+//! A part ends at a time that may itself depend on the variables, so that its tangent is taken to a fixed time first, with
+//! the derivative in its length as one more column. At the zero of a switching function g the time has the derivative
+//! `dt = -dg / g'`, where dg is the derivative of g for a fixed time and g' its rate in the length of the part: that of
+//! the discrete motion. Then the reset follows, and the next part starts at this time.
+
+use crate::sensitivity::carried_columns::CarriedColumns;
+use crate::sensitivity::columns::Column;
+use crate::sensitivity::switch::Switch;
+use crate::sensitivity::tangent::{SwitchTime, row};
+use crate::sensitivity::{EndState, PartEnd, PartPoint, SensitivityError, SolvedPart};
+use contact_geom::Parametric;
+use contact_geom::numbers::max_or_nan;
+
+impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
+    /// Carries the columns over the parts of a step, the k-th of the run; returns their largest component.
+    pub(super) fn push_parts(&mut self, parts: &[SolvedPart<N>], k: usize) -> Result<f64, SensitivityError> {
+        // The derivatives of the time at the start of each part.
+        let mut times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
+        for (i, part) in parts.iter().enumerate() {
+            self.push_part(part, (k, i + 1 == parts.len()), &mut times)?;
+        }
+        // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
+        if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
+            let rates = last.next.rates(self.steps);
+            let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?;
+            for (column, dt) in self.columns.iter_mut().zip(&times) {
+                let dh = column.time_after(k + 1) - dt;
+                column.set_state(&column.state().plus(rates.scale(dh)));
+            }
+        }
+        Ok(self.columns.iter().fold(0.0, |m, column| max_or_nan(m, column.size())))
+    }
+
+    fn push_part(
+        &mut self,
+        part: &SolvedPart<N>,
+        (k, is_last): (usize, bool),
+        times: &mut [f64],
+    ) -> Result<(), SensitivityError> {
+        let failed = |cause| SensitivityError::Step { step: k, cause };
+        let (steps, problem) = (self.steps, self.steps.problem);
+        if let Some(step) = &part.step {
+            self.rows_within(step, part.to.t, Some(times), k)?;
+        }
+        let mut fixed: Vec<Column<N>> =
+            self.columns.iter().zip(&*times).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
+        fixed.push(Column::of_length());
+        match &part.step {
+            Some(step) => self.row_engine.push(&mut self.engine, problem, step, &mut fixed).map_err(failed)?,
+            None => {
+                let rates = part.from.rates(steps).map_err(failed)?;
+                fixed.iter_mut().for_each(|column| column.push_at_once(&rates));
+            }
+        }
+        let Some(along_length) = fixed.pop().map(|column| column.state()) else { return Ok(()) };
+        let PartPoint { t, state, v } = part.to;
+        if !is_last && self.times.next_at(t, false).is_some() {
+            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
+            self.rows.push(row(problem, state, &fixed, |_| 0.0).map_err(failed)?);
+        }
+        let mut change = None;
+        match part.end {
+            PartEnd::Step => {
+                times.iter_mut().zip(&self.columns).for_each(|(dt, column)| *dt = column.time_after(k + 1))
+            }
+            PartEnd::Break => times.fill(0.0),
+            PartEnd::Division { fraction } => times.iter_mut().zip(&self.columns).for_each(|(dt, column)| {
+                *dt = (1.0 - fraction) * column.time_after(k) + fraction * column.time_after(k + 1);
+            }),
+            PartEnd::Switch { index, rising, passage } => {
+                let switch = Switch { problem, index, rising, at: &part.to, step: k, h: steps.h };
+                let gradient = switch.gradient()?;
+                let rate = gradient.rate(gradient.state.dot(&along_length), t)?;
+                for (dt, column) in times.iter_mut().zip(&fixed) {
+                    let explicit = column.parameter.and_then(|k| gradient.parameters.get(k)).copied().unwrap_or(0.0);
+                    *dt = -(gradient.state.dot(&column.state()) + explicit) / rate;
+                }
+                self.switches.push(SwitchTime { t, index, derivatives: times.to_vec() });
+                change = switch.passage(passage, &part.next)?;
+            }
+        }
+        for ((column, mut fixed), dt) in self.columns.iter_mut().zip(fixed).zip(&*times) {
+            fixed.set_state(&fixed.state().plus(along_length.scale(*dt)));
+            let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
+            column.set_state(&state);
+        }
+        Ok(())
+    }
+}

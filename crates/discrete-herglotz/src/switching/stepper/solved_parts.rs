@@ -1,0 +1,43 @@
+//! The parts of the last step with their stages and with what happened at their ends, for derivatives.
+
+use crate::sensitivity::step_tangent::WholeStep;
+use crate::sensitivity::{PartEnd, PartPoint, SolvedPart};
+use crate::switching::stepper::SwitchingStepper;
+use crate::switching::stepper::as_stepper::AsStepper;
+use crate::switching::surfaces::TimedState;
+
+/// The end of a part of a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EndOfPart<const N: usize> {
+    /// The point at which the part begins, the point at which it ends, before anything happens there, and the point from
+    /// which the motion continues.
+    pub from: TimedState<N>,
+    pub to: TimedState<N>,
+    pub next: TimedState<N>,
+    /// Whether the part has a stepper; otherwise its length is zero.
+    pub has_stepper: bool,
+    pub end: PartEnd,
+}
+
+impl<'a, L, S: AsStepper<N>, M, const N: usize> SwitchingStepper<'a, L, S, M, N> {
+    /// The parts of the last step, if it had parts and their steppers are kept.
+    pub(super) fn parts_with_stages(&self) -> Vec<SolvedPart<N>> {
+        let (true, Some(steppers)) = (self.switched, &self.parts) else { return Vec::new() };
+        let mut steppers = steppers.iter();
+        let point = |at: &TimedState<N>| PartPoint { t: at.t, state: at.state, v: at.v };
+        let part = |of: &EndOfPart<N>| {
+            let stages = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
+            let step = stages.map(|stages| WholeStep::Collocation(Box::new(stages)));
+            let known = step.is_some() || !of.has_stepper;
+            known.then(|| SolvedPart {
+                step,
+                from: point(&of.from),
+                to: point(&of.to),
+                next: point(&of.next),
+                end: of.end,
+            })
+        };
+        // Without the stages of one part there is no derivative of the step.
+        self.ends.iter().map(part).collect::<Option<Vec<_>>>().unwrap_or_default()
+    }
+}
