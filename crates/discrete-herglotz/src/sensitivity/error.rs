@@ -17,8 +17,8 @@ pub enum SensitivityError {
     Parameter(#[from] UnknownParameter),
     /// The integrator has no tangent.
     #[error(
-        "derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`, and a Lagrangian \
-         without switching functions"
+        "derivatives of runs by `{method}`{case} are not implemented; `GaussCollocation` has those in all variables, \
+         splittings, quadrature rules and their compositions in most, all for Lagrangians without switching functions"
     )]
     NoTangent {
         /// The name of the method.
