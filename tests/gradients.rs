@@ -9,6 +9,7 @@
 mod gradients {
     mod agreement;
     mod contact;
+    mod ensembles;
     mod flows;
     mod forces;
     mod impacts;

@@ -5,10 +5,12 @@ use contact_geom::VelocityPoint;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::systems::{
     Chain, CoupledInZ, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
-    visit_catalogue,
+    UniformField, visit_catalogue,
 };
 use discrete_herglotz::sensitivity::{LyapunovExponents, SensitivityError};
-use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Steps, TransformedGauss, Until, rules};
+use discrete_herglotz::{
+    GaussCollocation, InputError, Problem, SplittingScheme, Steps, TransformedGauss, Until, rules,
+};
 
 fn exponents<const N: usize, S: System<N>, M: Method>(
     system: &S,
@@ -52,6 +54,7 @@ fn the_exponents_are_paired() {
             let found = exponents(system, system.initial(), method, (h, steps));
             let name = format!("{}, {name}, {steps} steps", system.name());
             let tolerance = 1e-13 / h;
+            assert!(found.pairing_defect() <= tolerance, "{name}: {:?}", found.pairs);
             let mut others = found.exponents.clone();
             let apart = |x: &f64| (x - found.rate).abs();
             let nearest = (0..others.len()).min_by(|i, j| apart(&others[*i]).total_cmp(&apart(&others[*j]))).unwrap();
@@ -117,6 +120,32 @@ fn a_chaotic_motion() {
         gauss.exponents,
         splitting.exponents
     );
+}
+
+/// Coordinates at rest that act on nothing can be left out: the others have the exponents that they have alone.
+#[test]
+fn some_of_the_coordinates() {
+    let (one, two) =
+        (UniformField::<1> { field: [-1.0], gamma: -0.3 }, UniformField::<2> { field: [-1.0, 0.0], gamma: -0.3 });
+    let until = Until::Time(4.0);
+    let alone = exponents(&one, VelocityPoint::new([1.0], [0.3], 0.2), GaussCollocation { stages: 4 }, (0.1, 40));
+    let problem = Problem::new(&two, 0.0, VelocityPoint::new([1.0, 0.5], [0.3, 0.0], 0.2)).unwrap();
+    let within = |n| {
+        let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(40));
+        run.lyapunov_exponents_within(n, until)
+    };
+    let found = within(1).unwrap();
+    assert_eq!((found.exponents.len(), found.pairs.len()), (3, 1));
+    for (a, b) in found.exponents.iter().zip(&alone.exponents) {
+        assert!((a - b).abs() <= 1e-13 / 0.1, "{a} and {b}");
+    }
+    // The exponents of all are those of the parts: the pair of the second coordinate is 0 and the rate, but for the
+    // directions with which the frame starts.
+    let all = within(2).unwrap();
+    assert_eq!(all.pairs.len(), 2);
+    assert!(all.pairing_defect() <= 1e-12 && all.volume_defect() <= 1e-12, "{all:?}");
+    assert!(matches!(within(3), Err(SensitivityError::Coordinate { index: 2, count: 2 })));
+    assert!(matches!(within(0), Err(SensitivityError::Input(InputError::Count { least: 1, found: 0, .. }))));
 }
 
 #[test]

@@ -51,6 +51,14 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Stepper::resets", "takes no number; tests/resets"),
     ("Stepper::pieces", "takes no number; tests/resets"),
     ("Stepper::has_changed_energy", "takes no number; tests/resets"),
+    ("Ensemble::gradient", "the members' runs and gradients; tests/gradients/ensembles"),
+    ("Ensemble::gradient_of", "tests/gradients/ensembles"),
+    ("Ensemble::gradient_at", "tests/gradients/ensembles"),
+    ("Ensemble::tangent_at", "tests/gradients/ensembles"),
+    ("BatchGradient::*", "takes no number"),
+    ("LyapunovExponents::*", "takes no number"),
+    ("Run::lyapunov_exponents", "takes no number"),
+    ("Run::lyapunov_exponents_within", "tests/gradients/lyapunov"),
     ("Observer::*", "the implementor's; observers with odd requests are in the test of Run::observe"),
 ];
 

@@ -239,6 +239,31 @@ fn plans_and_checks_say_what_holds() {
     assert!(succeed(&["check", &scene("pendulum")]).starts_with("contact: "));
 }
 
+/// Pairs of exponents have the sum of the rate of the conformal factor, to round-off; without constant `L_z` only the sum
+/// of all is known; a motion with impacts is refused.
+#[test]
+fn checks_have_lyapunov_exponents() {
+    let of = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&succeed(&["check", &scene(name), "--places", "1", "--lyapunov", "--json"])).unwrap()
+    };
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let told = &of("double_pendulum")["lyapunov"];
+    assert_eq!((told["exponents"].as_array().unwrap().len(), told["pairs"].as_array().unwrap().len()), (5, 2));
+    let rate = number(&told["rate"]);
+    for pair in told["pairs"].as_array().unwrap() {
+        assert!((number(&pair[0]) + number(&pair[1]) - rate).abs() <= 1e-11, "{told}");
+    }
+    assert!(number(&told["pairing_defect"]) <= 1e-11 && number(&told["volume_defect"]) <= 1e-11, "{told}");
+    let told = &of("nonlinear")["lyapunov"];
+    assert!(told["pairing_defect"].is_null() && number(&told["volume_defect"]) <= 1e-10, "{told}");
+    let said = succeed(&["check", &scene("duffing"), "--places", "1", "--lyapunov"]);
+    for part in ["Lyapunov exponents of ", "of the second half", "the sums of the pairs are ln(sigma_d)/h to "] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let (code, said) = fail(&["check", &scene("kinks"), "--places", "1", "--lyapunov"]);
+    assert!(code == Some(2) && said.contains("are not implemented; Gauss methods"), "{said}");
+}
+
 #[test]
 fn lists_templates_and_completions_are_complete() {
     let systems: serde_json::Value = serde_json::from_str(&succeed(&["list", "systems", "--json"])).unwrap();

@@ -8,7 +8,7 @@ use crate::signals::with_signals;
 use crate::system::System;
 use herglotz::runtime::{
     Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
-    Start, Status, Tally, Varied, in_words,
+    Start, Status, StepControl, Tally, Varied, in_words,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -133,13 +133,99 @@ pub struct EnsembleRecord {
     interrupted: Option<Py<PyAny>>,
 }
 
+/// The positions, the velocities or the momenta, whether these are momenta, and the actions.
+pub type GivenStarts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, PyAny>);
+
+/// The members of an ensemble, from the arguments of `ensemble`.
+pub struct Members {
+    pub count: usize,
+    n: usize,
+    q: Vec<f64>,
+    velocity: Vec<f64>,
+    is_momentum: bool,
+    z: Vec<f64>,
+    names: Vec<String>,
+    /// The values of each of these parameters, one for each member.
+    varied: Vec<Vec<f64>>,
+    t0: f64,
+    end: f64,
+    step_control: StepControl,
+    threads: Option<usize>,
+}
+
+impl Members {
+    pub fn new(
+        system: &System,
+        (q, velocity, is_momentum, z): GivenStarts<'_>,
+        times: &[f64],
+        step_control: &GivenStepControl<'_>,
+        names: Vec<String>,
+        values: &[Bound<'_, PyAny>],
+        threads: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let n = system.inner.dimension();
+        let (count, q) = table("q0", &q, n)?;
+        let argument = if is_momentum { "p0" } else { "v0" };
+        let (velocity_count, velocity) = table(argument, &velocity, n)?;
+        if velocity_count != count {
+            return Err(value_error(format!("`{argument}` has {velocity_count} rows, where `q0` has {count}")));
+        }
+        let members = |name: &str, of: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
+            let found = numbers(name, of)?;
+            match found.len() {
+                1 if of.len().is_err() => Ok(vec![number(name, of)?; count]),
+                length if length == count => Ok(found),
+                length => Err(value_error(format!("`{name}` has {length} numbers, but there are {count} members"))),
+            }
+        };
+        let z = members("z0", &z)?;
+        let mut varied = Vec::with_capacity(names.len());
+        for (name, value) in names.iter().zip(values) {
+            varied.push(members(&format!("parameters[{name:?}]"), value)?);
+        }
+        let step_control = motion::step_control(step_control)?;
+        let threads = threads.map(|threads| whole("threads", &threads, 1)).transpose()?;
+        let (Some(&t0), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
+        Ok(Members { count, n, q, velocity, is_momentum, z, names, varied, t0, end, step_control, threads })
+    }
+
+    /// Calls a function with the ensemble, without rows and events.
+    pub fn ensemble<R>(&self, then: impl FnOnce(Ensemble<'_>) -> R) -> R {
+        let Members { count, n, t0, end, step_control, threads, .. } = *self;
+        let start = |i: usize| {
+            let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
+            let velocity = if self.is_momentum {
+                InitialVelocity::Momentum(part(&self.velocity))
+            } else {
+                InitialVelocity::Velocity(part(&self.velocity))
+            };
+            Start { t: t0, q: part(&self.q), velocity, z: self.z.get(i).copied().unwrap_or(f64::NAN) }
+        };
+        let values = |i: usize| self.varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
+        let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
+        let varied = (!names.is_empty()).then_some(Varied { names: &names, values: &values });
+        then(Ensemble {
+            count,
+            start: &start,
+            t0,
+            varied,
+            end,
+            step_control,
+            rows: None,
+            columns: &[],
+            events: &[],
+            threads,
+        })
+    }
+}
+
 /// Runs an ensemble with the interpreter lock released.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are those of `ensemble`, which names them")]
 pub fn run_ensemble(
     py: Python<'_>,
     system: &System,
-    start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
+    start: GivenStarts<'_>,
     t: Bound<'_, PyAny>,
     step_control: GivenStepControl<'_>,
     names: Vec<String>,
@@ -148,31 +234,9 @@ pub fn run_ensemble(
     observed: Vec<String>,
     threads: Option<Bound<'_, PyAny>>,
 ) -> PyResult<EnsembleRecord> {
-    let n = system.inner.dimension();
-    let (q, velocity, is_momentum, z) = start;
-    let (count, q) = table("q0", &q, n)?;
-    let argument = if is_momentum { "p0" } else { "v0" };
-    let (velocity_count, velocity) = table(argument, &velocity, n)?;
-    if velocity_count != count {
-        return Err(value_error(format!("`{argument}` has {velocity_count} rows, where `q0` has {count}")));
-    }
-    let members = |name: &str, of: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
-        let found = numbers(name, of)?;
-        match found.len() {
-            1 if of.len().is_err() => Ok(vec![number(name, of)?; count]),
-            length if length == count => Ok(found),
-            length => Err(value_error(format!("`{name}` has {length} numbers, but there are {count} members"))),
-        }
-    };
-    let z = members("z0", &z)?;
-    let mut varied = Vec::with_capacity(names.len());
-    for (name, value) in names.iter().zip(&values) {
-        varied.push(members(&format!("parameters[{name:?}]"), value)?);
-    }
-    let step_control = motion::step_control(&step_control)?;
-    let threads = threads.map(|threads| whole("threads", &threads, 1)).transpose()?;
-    let times = motion::times(&t)?;
-    let (Some(&t0), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
+    let (n, times) = (system.inner.dimension(), motion::times(&t)?);
+    let members = Members::new(system, start, &times, &step_control, names, &values, threads)?;
+    let count = members.count;
     let rows = (times.len() > 2).then(|| times.clone());
     let mut columns: Vec<Column> = (0..n).map(Column::Position).collect();
     columns.extend((0..n).map(Column::Velocity));
@@ -194,32 +258,12 @@ pub fn run_ensemble(
         crossings: Vec::new(),
         ended: Arc::new(AtomicBool::new(false)),
     };
-    let start = |i: usize| {
-        let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
-        let velocity = if is_momentum {
-            InitialVelocity::Momentum(part(&velocity))
-        } else {
-            InitialVelocity::Velocity(part(&velocity))
-        };
-        Start { t: t0, q: part(&q), velocity, z: z.get(i).copied().unwrap_or(f64::NAN) }
-    };
-    let of_member = |i: usize| varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let run = |ended: &Arc<AtomicBool>| {
         kept.ended = ended.clone();
-        let ensemble = Ensemble {
-            count,
-            start: &start,
-            t0,
-            varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
-            end,
-            step_control,
-            rows: rows.clone().map(OutputTimes::At),
-            columns: &columns,
-            events: &events,
-            threads,
-        };
-        with_resets.ensemble(&ensemble, &mut kept)
+        members.ensemble(|ensemble| {
+            let rows = rows.clone().map(OutputTimes::At);
+            with_resets.ensemble(&Ensemble { rows, columns: &columns, events: &events, ..ensemble }, &mut kept)
+        })
     };
     let (tally, raised) = with_signals(py, run)?;
     let tally = match tally {

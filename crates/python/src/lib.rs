@@ -9,6 +9,7 @@ mod dense;
 mod ensemble;
 mod events;
 mod exact;
+mod member_derivatives;
 mod motion;
 mod operators;
 mod path;
@@ -40,6 +41,8 @@ mod _core {
     #[pymodule_export]
     use crate::exact::{exact_lagrangian, exponential, retract};
     #[pymodule_export]
+    use crate::member_derivatives::{ensemble_pullback, ensemble_sensitivity, ensemble_value_and_gradient};
+    #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]
     use crate::operators::symbols;
@@ -48,7 +51,7 @@ mod _core {
     #[pymodule_export]
     use crate::run::{Record, resume, run};
     #[pymodule_export]
-    use crate::sensitivity::{pullback, sensitivity, value_and_gradient};
+    use crate::sensitivity::{lyapunov_exponents, pullback, sensitivity, value_and_gradient};
     #[pymodule_export]
     use crate::sparse::{run_bodies, run_lattice};
     #[pymodule_export]

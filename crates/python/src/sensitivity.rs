@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::{Motion, named};
 use crate::signals::Signals;
-use herglotz::runtime::{LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
+use herglotz::runtime::{Expression, LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -92,7 +92,14 @@ pub fn pullback(
 /// The value and the gradient of an expression of the final state.
 #[pyfunction]
 pub fn value_and_gradient(py: Python<'_>, motion: &Motion, loss: &str) -> PyResult<(f64, Slopes)> {
-    let expression = motion.system.formula().named_expression(loss).map_err(Into::into);
+    let expression = loss_of(&motion.system, loss)?;
+    let found = detached(py, motion, |monitor| motion.system.end_gradient(&motion.motion, &expression, monitor))?;
+    slopes(py, found)
+}
+
+/// A loss as an expression of the final state.
+pub fn loss_of(system: &herglotz::runtime::System, loss: &str) -> PyResult<Expression> {
+    let expression = system.formula().named_expression(loss).map_err(Into::into);
     let expression = named("the loss", loss, expression)?;
     if expression.has_conformal_factor() {
         return Err(value_error(format!(
@@ -100,6 +107,21 @@ pub fn value_and_gradient(py: Python<'_>, motion: &Motion, loss: &str) -> PyResu
              terms of the state"
         )));
     }
-    let found = detached(py, motion, |monitor| motion.system.end_gradient(&motion.motion, &expression, monitor))?;
-    slopes(py, found)
+    Ok(expression)
+}
+
+/// The exponents, those of the second half, the pairs, the rate, and the defects of the sums of the pairs and of the sum of
+/// all.
+type Exponents = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>, f64, Option<f64>, Option<f64>);
+
+/// The Lyapunov exponents of a motion.
+#[pyfunction]
+pub fn lyapunov_exponents(py: Python<'_>, motion: &Motion) -> PyResult<Exponents> {
+    let found = detached(py, motion, |monitor| motion.system.lyapunov_exponents(&motion.motion, monitor))?;
+    if found.status != Status::Completed {
+        return Err(value_error(format!("the motion has no exponents, since it was not completed: {}", found.status)));
+    }
+    let pairs = matrix(py, found.pairs.into_iter().flatten().collect(), 2)?;
+    let (exponents, second) = (vector(py, found.exponents), vector(py, found.of_second_half));
+    Ok((exponents, second, pairs, found.rate, found.pairing_defect, found.volume_defect))
 }

@@ -5,7 +5,8 @@ use crate::ensemble::step_control::StepControl;
 use crate::run::Interruption;
 use crate::{
     InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper, StepperOptions,
-    Until, integration::BatchKernel,
+    Until,
+    integration::{BatchKernel, StepFormula},
 };
 use contact_geom::Lagrangian;
 
@@ -41,6 +42,10 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
     fn batch_kernel(&self) -> Option<BatchKernel> {
         self.integrator.batch_kernel()
     }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        self.integrator.step_formula()
+    }
 }
 
 /// The settings that all members have in common.
@@ -63,14 +68,14 @@ impl<L, const N: usize> Copy for Common<L, N> {}
 
 impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
     /// Calls a function with the run of a member.
-    pub fn with<'a, R>(
+    pub fn with<'a, R, E: From<InputError>>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
         start: Start<N>,
         interrupt: Option<Interrupt<'a>>,
-        then: impl FnOnce(Run<'_, '_, L, N>) -> Result<R, InputError>,
-    ) -> Result<R, InputError> {
+        then: impl FnOnce(Run<'_, '_, L, N>) -> Result<R, E>,
+    ) -> Result<R, E> {
         let problem = Problem { interrupt, ..Problem::new(lagrangian, self.t0, start)? };
         let run = self.length.of(problem.by(OfMember { integrator, lagrangian }));
         then(if self.action { run } else { run.without_action() })

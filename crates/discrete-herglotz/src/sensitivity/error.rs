@@ -16,7 +16,10 @@ pub enum SensitivityError {
     #[error(transparent)]
     Parameter(#[from] UnknownParameter),
     /// The integrator has no tangent.
-    #[error("derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`")]
+    #[error(
+        "derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation`, or for Lagrangians \
+         without switching functions a splitting, a quadrature rule or a composition of them"
+    )]
     NoTangent {
         /// The name of the method.
         method: Cow<'static, str>,

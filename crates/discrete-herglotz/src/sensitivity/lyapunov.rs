@@ -1,6 +1,5 @@
 //! Lyapunov exponents of a run.
 
-use crate::StepError;
 use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Until};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::carried_columns::CarriedColumns;
@@ -9,7 +8,9 @@ use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::tangent::no_tangent;
+use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::{Parametric, PhasePoint};
 use std::ops::ControlFlow;
 
@@ -27,8 +28,24 @@ pub struct LyapunovExponents<const N: usize> {
     /// The same of the second half of the run, in the same order: its difference is an estimate of the error of a run
     /// of finite length, and it does not depend on the initial directions.
     pub of_second_half: Vec<f64>,
+    /// The exponents of the n pairs of directions `q_i` and `p_i` with which the frame starts. If `L_z` is constant and no
+    /// force is applied, the sum of each pair is the rate, to round-off.
+    pub pairs: Vec<[f64; 2]>,
     /// The mean rate `ln sigma_d / h` of the conformal factor.
     pub rate: f64,
+}
+
+impl<const N: usize> LyapunovExponents<N> {
+    /// The largest distance of the sum of a pair from the rate.
+    pub fn pairing_defect(&self) -> f64 {
+        max_abs_or_nan(self.pairs.iter().map(|[a, b]| a + b - self.rate))
+    }
+
+    /// The distance of the sum of all exponents from `n + 1` times the rate, which is that of the logarithm of the volume.
+    pub fn volume_defect(&self) -> f64 {
+        let sum: f64 = self.exponents.iter().sum();
+        (sum - (self.pairs.len() as f64 + 1.0) * self.rate).abs()
+    }
 }
 
 /// A frame of tangents that is carried along a run, and made orthonormal after each step.
@@ -44,16 +61,16 @@ struct Frame<'r, 'p, L, const N: usize> {
     failure: Option<SensitivityError>,
 }
 
-/// The directions z, then all q, then all p in the reverse order.
+/// The directions z, then the first n of q, then those of p in the reverse order.
 ///
 /// For constant `L_z` the direction z is invariant, and the spans of the first k of the others are, in `(q, p)`, isotropic
 /// and their symplectic complements the spans of the first 2n - k, which steps preserve. So the stretching factors of
 /// paired directions have the product `sigma_d` in each step.
-fn initial_frame<const N: usize>() -> Vec<Column<N>> {
+fn initial_frame<const N: usize>(n: usize) -> Vec<Column<N>> {
     let zero = SVector::<f64, N>::zeros();
     let unit = |i: usize| SVector::<f64, N>::from_fn(|j, _| f64::from(u8::from(i == j)));
-    let positions = (0..N).map(|i| Column::new(unit(i), zero, 0.0));
-    let momenta = (0..N).rev().map(|i| Column::new(zero, unit(i), 0.0));
+    let positions = (0..n).map(|i| Column::new(unit(i), zero, 0.0));
+    let momenta = (0..n).rev().map(|i| Column::new(zero, unit(i), 0.0));
     std::iter::once(Column::new(zero, zero, 1.0)).chain(positions).chain(momenta).collect()
 }
 
@@ -141,10 +158,29 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     /// Those of [`run`](Self::run), [`SensitivityError::NoTangent`], and [`SensitivityError::Step`] where the tangent of a
     /// step cannot be computed. A run that ends early is reported as the status of the outcome.
     pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents<N>, SensitivityError> {
+        self.lyapunov_exponents_within(N, until)
+    }
+
+    /// The same for the first n coordinates of a motion in which the others are at rest and act on nothing, as where the
+    /// type of a system has more coordinates than its formula: `2n + 1` exponents.
+    ///
+    /// # Errors
+    /// Those of [`lyapunov_exponents`](Self::lyapunov_exponents), [`SensitivityError::Coordinate`] for more than `N`
+    /// coordinates, and [`InputError::Count`] for none.
+    pub fn lyapunov_exponents_within(
+        self,
+        coordinates: usize,
+        until: Until,
+    ) -> Result<LyapunovExponents<N>, SensitivityError> {
+        match coordinates {
+            0 => return Err(InputError::Count { what: "the number of coordinates", least: 1, found: 0 }.into()),
+            n if n > N => return Err(SensitivityError::Coordinate { index: n - 1, count: N }),
+            _ => {}
+        }
         let run = self.differentiable()?.with_conformal_factor();
         let plan = run.plan(until)?;
         let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
-        let columns = initial_frame();
+        let columns = initial_frame(coordinates);
         let (t0, state) = (plan.steps.problem.t0, plan.steps.problem.state);
         let mut frame = Frame {
             plan: &plan,
@@ -161,14 +197,17 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
             return Err(failure);
         }
         let (t_middle, until_middle) = middle.unwrap_or((t0, vec![0.0; logarithms.len()]));
-        let mut pairs: Vec<[f64; 2]> = logarithms
+        let mut all: Vec<[f64; 2]> = logarithms
             .iter()
             .zip(&until_middle)
             .map(|(whole, first)| [whole / (t - t0), (whole - first) / (t - t_middle)])
             .collect();
-        pairs.sort_by(|a, b| b[0].total_cmp(&a[0]));
+        // The frame has the pair of a direction of q in the reverse order, after that of z.
+        let paired = all.iter().skip(1).zip(all.iter().rev()).take(coordinates);
+        let pairs = paired.map(|(of_q, of_p)| [of_q[0], of_p[0]]).collect();
+        all.sort_by(|a, b| b[0].total_cmp(&a[0]));
         let rate = outcome.log_factor.map_or(f64::NAN, |factor| factor / (t - t0));
-        let [exponents, of_second_half] = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect());
-        Ok(LyapunovExponents { outcome, exponents, of_second_half, rate })
+        let [exponents, of_second_half] = [0, 1].map(|i| all.iter().map(|pair| pair[i]).collect());
+        Ok(LyapunovExponents { outcome, exponents, of_second_half, pairs, rate })
     }
 }

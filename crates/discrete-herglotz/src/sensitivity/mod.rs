@@ -9,13 +9,15 @@
 //! of `docs/theory.md`.
 //!
 //! Splittings, quadrature rules and their compositions are differentiated sub-flow by sub-flow. [Lyapunov
-//! exponents](crate::Run::lyapunov_exponents) are the growth rates of the tangent.
+//! exponents](crate::Run::lyapunov_exponents) are the growth rates of the tangent. An [`Ensemble`](crate::Ensemble) has the
+//! gradients of all its members.
 
 mod carried_columns;
 mod columns;
 mod corner_derivatives;
 mod end_state;
 mod engine;
+mod ensemble;
 mod error;
 mod event_time;
 pub(crate) mod flows;
@@ -38,6 +40,7 @@ mod tangent_parts;
 mod variable;
 
 pub use end_state::{EndCovector, EndState, Loss};
+pub use ensemble::BatchGradient;
 pub use error::SensitivityError;
 pub use gradient::{Gradient, LossGradient, RecordedRun};
 pub use lyapunov::LyapunovExponents;

@@ -5,7 +5,7 @@ use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
-use herglotz::runtime::{MAX_CONTACT_DEFECT, NotContact};
+use herglotz::runtime::{MAX_CONTACT_DEFECT, NotContact, Status};
 
 #[derive(Args)]
 pub(crate) struct Check {
@@ -15,6 +15,10 @@ pub(crate) struct Check {
     #[arg(long = "places", value_name = "PLACES")]
     #[arg(default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     samples: u16,
+    /// Also compute the Lyapunov exponents of the motion, and compare the sums of pairs with the rate ln(sigma_d)/h of the
+    /// conformal factor.
+    #[arg(long)]
+    lyapunov: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -25,12 +29,23 @@ impl Check {
         let scene = self.scene.read()?;
         let checked = scene.system.check(&scene.bare_motion(), self.samples.into());
         let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let lyapunov =
+            self.lyapunov.then(|| scene.system.lyapunov_exponents(&scene.bare_motion(), &mut ())).transpose();
+        let lyapunov = lyapunov.map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let momenta: Vec<String> =
             scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
-            print_json(&of_json(&check, &momenta))?;
+            let mut value = of_json(&check, &momenta);
+            if let Some(found) = &lyapunov {
+                value["lyapunov"] = super::lyapunov::of_json(found);
+            }
+            print_json(&value)?;
         } else {
-            print(&in_words(&check, &momenta))?;
+            let exponents = lyapunov.as_ref().map(|found| format!("\n\n{}", super::lyapunov::in_words(found)));
+            print(&(in_words(&check, &momenta) + exponents.as_deref().unwrap_or_default()))?;
+        }
+        if let Some(found) = lyapunov.filter(|found| found.status != Status::Completed) {
+            return Err(Failure::Run(format!("the motion was not completed: {}", found.status)));
         }
         match check.not_contact {
             _ if check.is_as_expected() => Ok(()),

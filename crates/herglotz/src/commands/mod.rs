@@ -6,6 +6,7 @@ mod compare;
 mod ends;
 mod lattice;
 mod list;
+mod lyapunov;
 mod new;
 mod plan;
 mod run;

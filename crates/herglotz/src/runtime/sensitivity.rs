@@ -1,9 +1,10 @@
 //! Derivatives of motions.
 
+use crate::runtime::member_derivatives::of_expression;
 use crate::runtime::{Motion, RunMonitor, RuntimeError, System, velocity_name};
 use discrete_herglotz::Status;
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
-use formula_lagrangian::{Expression, ExpressionGradient, nearest_name};
+use formula_lagrangian::{Expression, nearest_name};
 
 /// A state of a motion, or the derivative of one.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,12 +169,8 @@ impl System {
         let mut explicit = Vec::new();
         let mut of_end = |states: &[MotionState]| {
             let Some(end) = states.last() else { return (f64::NAN, Vec::new()) };
-            let ExpressionGradient { value, t, q, v, z, parameters, .. } =
-                loss.gradient_at(end.t, &end.q, &end.v, end.z);
+            let (value, covector, parameters) = of_expression(loss, end);
             explicit = parameters;
-            let zero = StateCovector::zero(self.dimension());
-            // An expression of a conformal factor has no value here; it is reported as a loss that is not finite.
-            let covector = if value.is_nan() { zero } else { StateCovector { t, q, v, z, ..zero } };
             (value, vec![covector])
         };
         let mut found = self.gradient(motion, &[motion.end], &mut of_end, monitor)?;
@@ -184,7 +181,7 @@ impl System {
     }
 
     /// The variable with a name.
-    fn variable(&self, name: &str) -> Result<Variable, RuntimeError> {
+    pub(crate) fn variable(&self, name: &str) -> Result<Variable, RuntimeError> {
         let coordinates = self.formula().coordinates();
         let velocities: Vec<String> = coordinates.iter().map(|name| velocity_name(name)).collect();
         let momenta: Vec<String> = coordinates.iter().map(|name| format!("p_{name}")).collect();
@@ -229,7 +226,7 @@ impl System {
 }
 
 /// Rejects motions whose end is a time that depends on the variables.
-fn check_events(motion: &Motion) -> Result<(), RuntimeError> {
+pub(crate) fn check_events(motion: &Motion) -> Result<(), RuntimeError> {
     if motion.events.iter().any(|event| event.terminal) {
         let why = "has a terminal event, and derivatives of motions that end at an event are not implemented; remove the \
                    event, or differentiate a motion to a fixed time";
@@ -243,8 +240,9 @@ pub(crate) fn in_words(error: &SensitivityError) -> String {
     match error {
         SensitivityError::Input(error) => crate::runtime::in_words(error),
         SensitivityError::NoTangent { method, case } => format!(
-            "derivatives of motions by {method}{case} are not implemented; choose a Gauss method such as \"gauss_8\", and \
-             a Lagrangian without kinks, jumps and resets along the motion"
+            "derivatives of motions by {method}{case} are not implemented; Gauss methods such as \"gauss_8\" have those in all \
+             variables, splittings and quadrature rules such as \"strang\" and \"midpoint\" in most, all for a Lagrangian \
+             without kinks, jumps and resets along the motion"
         ),
         error => error.to_string(),
     }

@@ -174,6 +174,7 @@ class Solution:
         p: ArrayLike | None = None,
         z: ArrayLike | None = None,
     ) -> Gradient: ...
+    def lyapunov_exponents(self) -> LyapunovExponents: ...
     def to_xarray(self) -> Any: ...
     def to_pandas(self) -> Any: ...
     def plot(self, *names: str, ax: Any = None) -> Any: ...
@@ -194,6 +195,33 @@ class Gradient(NamedTuple):
     t0: float
     t_end: float
     growth: float
+
+class LyapunovExponents(NamedTuple):
+    exponents: Vector
+    of_second_half: Vector
+    pairs: Vector
+    rate: float
+    pairing_defect: float | None
+    volume_defect: float | None
+
+class EnsembleSensitivity(NamedTuple):
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    growth: Vector
+    troubles: dict[int, str]
+
+class EnsembleGradient(NamedTuple):
+    q0: Vector
+    v0: Vector | None
+    p0: Vector | None
+    z0: Vector
+    parameters: dict[str, Vector]
+    t0: Vector
+    t_end: Vector
+    growth: Vector
+    troubles: dict[int, str]
 
 class Path:
     system: System
@@ -252,6 +280,14 @@ class Ensemble:
     batch_kernel: int
     def __len__(self) -> int: ...
     def __getitem__(self, name: str) -> Vector: ...
+    def sensitivity(self, variables: str | Sequence[str]) -> EnsembleSensitivity: ...
+    def pullback(
+        self,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        p: ArrayLike | None = None,
+        z: ArrayLike | None = None,
+    ) -> EnsembleGradient: ...
 
 class Geometry(NamedTuple):
     lagrangian: float
@@ -429,6 +465,7 @@ def geometry(
     parameters: Mapping[str, float] | None = None,
 ) -> Geometry: ...
 def value_and_grad(loss: Expression) -> Callable[..., tuple[float, Gradient]]: ...
+def ensemble_value_and_grad(loss: Expression) -> Callable[..., tuple[Vector, EnsembleGradient]]: ...
 def path(
     L: Lagrangian,
     q0: ArrayLike,

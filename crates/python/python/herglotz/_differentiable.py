@@ -1,8 +1,12 @@
 """Motions as differentiable functions of their start and parameters, for libraries of automatic differentiation."""
 
+import inspect
+
 import numpy as np
 
 from . import _core
+from ._ensemble import ensemble, request_of
+from ._ensemble_derivatives import pullback_of, sensitivity_of
 from ._solve import solve
 from ._system import check_parameters, system
 
@@ -12,6 +16,7 @@ class DifferentiableMotion:
 
     def __init__(self, L, t, n, names, options):
         options = dict(options)
+        self.threads = options.pop("threads", None)
         named = {name: options.pop(name) for name in ("coordinates", "force", "rayleigh", "tables", "breaks") if name in options}
         if refused := {"q0", "v0", "p0", "z0", "events", "observe", "every"} & set(options):
             raise ValueError(f"`{min(refused)}` cannot be given here: a differentiable motion is one from q0, v0 and z0 with rows at `t`")
@@ -38,6 +43,119 @@ class DifferentiableMotion:
         return found.q0, found.v0, found.z0, np.array([found.parameters[name] for name in self.names])
 
 
+    def batch_of_rows(self, *start):
+        """q, v and z of the rows of motions from arrays with axes of a batch in front, along which they are broadcast."""
+        batch, members = self._members(start)
+        if batch is None:
+            found = [self._rows_of(*(x[i] for x in members)) for i in range(len(members[0]))]
+            q, v, z = (np.stack(x) for x in zip(*found))
+        else:
+            q, v, z = self._rows_of_ensemble(members)
+        shape = np.broadcast_shapes(*self._batches(start))
+        return tuple(x.reshape(*shape, *x.shape[1:]) for x in (q, v, z))
+
+    def batch_of_tangents(self, *start_and_tangents):
+        """The derivatives of these rows along tangents of the start."""
+        start, tangents = start_and_tangents[:4], start_and_tangents[4:]
+        tangent = self._tangent(tangents)
+        # A variable costs a column of the tangent of the steps.
+        moved = np.flatnonzero(np.any(tangent.reshape(-1, tangent.shape[-1]) != 0.0, axis=0))
+        shape = np.broadcast_shapes(*self._batches(start), tangent.shape[:-1])
+        if not len(moved):
+            return tuple(np.zeros((*shape, *x)) for x in ((self.rows, self.n), (self.rows, self.n), (self.rows,)))
+        variables = [*(f"q[{i}]" for i in range(self.n)), *(f"v[{i}]" for i in range(self.n)), "z", *self.names]
+        variables = [variables[i] for i in moved]
+        alone, members = self._members(start)
+        if alone is None:
+            found = [self.run(*(x[i] for x in members)).sensitivity(variables) for i in range(len(members[0]))]
+            q, v, z = (np.stack([getattr(x, name) for x in found]) for name in "qvz")
+        else:
+            found = _completed(sensitivity_of(*self._request(members), variables))
+            q, v, z = found.q, found.v, found.z
+        of = np.broadcast_shapes(*self._batches(start))
+        q, v, z = (x.reshape(*of, *x.shape[1:]) for x in (q, v, z))
+        q, v = (np.einsum("...kiv,...v->...ki", x, tangent[..., moved]) for x in (q, v))
+        return q, v, np.einsum("...kv,...v->...k", z, tangent[..., moved])
+
+    def batch_of_gradients(self, *start_and_covectors):
+        """The gradients in the start of numbers with these partial derivatives in the rows."""
+        start, covectors = start_and_covectors[:4], start_and_covectors[4:]
+        batches = [*self._batches(start), *(x.shape[: x.ndim - axes] for x, axes in zip(covectors, (2, 2, 1)))]
+        shape = np.broadcast_shapes(*batches)
+        wide = lambda x, own: np.broadcast_to(x, (*shape, *own)).reshape(-1, *own)
+        q, v, z = (wide(numbers(x), own) for x, own in zip(covectors, ((self.rows, self.n),) * 2 + ((self.rows,),)))
+        alone, members = self._members(start, shape)
+        if alone is None:
+            found = []
+            for i in range(len(q)):
+                found.append(self.gradient(self.run(*(x[i] for x in members)), q[i], v[i], z[i]))
+            found = [np.stack(x) for x in zip(*found)]
+        else:
+            of = _completed(pullback_of(*self._request(members), q=q, v=v, z=z))
+            values = [of.parameters[name] for name in self.names]
+            found = of.q0, of.v0, of.z0, np.stack(values, axis=-1) if values else np.zeros((len(q), 0))
+        return tuple(x.reshape(*shape, *x.shape[1:]) for x in found)
+
+    def _batches(self, start):
+        return [x.shape[: x.ndim - axes] for x, axes in zip(start, (1, 1, 0, 1))]
+
+    def _tangent(self, parts):
+        """The tangents of q0, v0, z0 and the values as one vector for each member."""
+        parts = [numbers(x) if i != 2 else numbers(x)[..., None] for i, x in enumerate(parts)]
+        batch = np.broadcast_shapes(*(x.shape[:-1] for x in parts))
+        return np.concatenate([np.broadcast_to(x, (*batch, x.shape[-1])) for x in parts], axis=-1)
+
+    def _members(self, start, batch=None):
+        """The starts of the members of a batch, and its shape if they are run as an ensemble, which has no scales."""
+        batch = np.broadcast_shapes(*self._batches(start)) if batch is None else batch
+        own = (self.n,), (self.n,), (), (len(self.names),)
+        members = [np.broadcast_to(numbers(x), (*batch, *shape)).reshape(-1, *shape) for x, shape in zip(start, own)]
+        return (None if len(members[0]) == 1 or "scales" in self.options else batch), members
+
+    def _rows_of(self, *start):
+        sol = self.run(*start)
+        return sol.q, sol.v, sol.z
+
+    def _arguments(self, members, t):
+        """The arguments of `ensemble`."""
+        q0, v0, z0, values = members
+        options = {name: value for name, value in self.options.items() if name not in ("conformal_factor", "estimate")}
+        parameters = {name: values[:, i].copy() for i, name in enumerate(self.names)} or None
+        return (self.system, q0, v0, t), dict(z0=z0, parameters=parameters, threads=self.threads, **options)
+
+    def _request(self, members):
+        given, named = self._arguments(members, self.t)
+        bound = _ENSEMBLE.bind(*given, **named)
+        bound.apply_defaults()
+        return request_of(**bound.arguments)[:2]
+
+    def _ensemble(self, members, t):
+        given, named = self._arguments(members, t)
+        many = ensemble(*given, **named)
+        if not many.success.all():
+            index = int(np.argmin(many.success))
+            raise ValueError(f"motion {index} of the batch was not completed: {many.troubles[index]}")
+        return many
+
+    def _rows_of_ensemble(self, members):
+        t = np.array([0.0, self.t]) if self.t.ndim == 0 else self.t
+        if len(t) > 2:
+            many = self._ensemble(members, self.t)
+            return many.q, many.v, many.z
+        # With a row between, each member is run by itself, with steps that are chosen for it, as for its derivatives.
+        many = self._ensemble(members, np.array([t[0], 0.5 * (t[0] + t[1]), t[1]]))
+        return many.q[:, ::2], many.v[:, ::2], many.z[:, ::2]
+
+
+_ENSEMBLE = inspect.signature(ensemble)
+
+
+def _completed(found):
+    for index, trouble in found.troubles.items():
+        raise ValueError(f"motion {index} of the batch has no derivatives: {trouble}")
+    return found
+
+
 # Motions by their arguments: for a motion that is made anew in each iteration, JAX would compile its callback again.
 _KNOWN = {}
 _MOST = 128
@@ -47,7 +165,7 @@ def differentiable(L, t, n, names, options):
     """The differentiable motion of these arguments; the same object for the same ones."""
     of = DifferentiableMotion(L, t, n, names, options)
     try:
-        key = of.system, of.t.shape, of.t.tobytes(), of.names, frozenset(of.options.items())
+        key = of.system, of.t.shape, of.t.tobytes(), of.names, of.threads, frozenset(of.options.items())
         if len(_KNOWN) >= _MOST and key not in _KNOWN:
             _KNOWN.clear()
         return _KNOWN.setdefault(key, of)

@@ -9,7 +9,7 @@ from ._additions import breaks_of
 from ._events import events_of, has_reset, texts_of_events
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
-from ._system import check_parameters, with_tables
+from ._system import check_parameters, copied, with_tables
 
 
 def ensemble(
@@ -68,6 +68,43 @@ def ensemble(
     Interrupted
         A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
+    system, request, given, columns = request_of(
+        L, q0, v0, t, p0, z0, accuracy, integrator, step, steps, events, observe, coordinates, parameters, threads, force,
+        rayleigh, tables, breaks,
+    )  # fmt: skip
+    start, t, way, varied, values, threads = request
+    record = _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads)
+    event_names = tuple(events) if isinstance(events, dict) else len(given)
+    found = Ensemble(system, record, event_names, tuple(observe or ()), given, request)
+    if record.interrupted is not None:
+        if isinstance(record.interrupted, KeyboardInterrupt):
+            raise Interrupted(found)
+        raise record.interrupted
+    return found
+
+
+def request_of(
+    L,
+    q0,
+    v0,
+    t,
+    p0,
+    z0,
+    accuracy,
+    integrator,
+    step,
+    steps,
+    events,
+    observe,
+    coordinates,
+    parameters,
+    threads,
+    force,
+    rayleigh,
+    tables,
+    breaks,
+):
+    """The system and the request for the arguments of `ensemble`, the events and the columns."""
     if parameters is not None and not hasattr(parameters, "items"):
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     parameters = dict(parameters or {})
@@ -94,24 +131,9 @@ def ensemble(
     if parameters:
         functions = (L, *functions_of(force, rayleigh))
         check_parameters(system, parameters, functions, [*texts_of_events(given), *columns])
-    record = _core.run_ensemble(
-        system,
-        (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
-        t,
-        (accuracy, integrator, step, steps),
-        list(varied),
-        list(varied.values()),
-        given,
-        columns,
-        threads,
-    )
-    event_names = tuple(events) if isinstance(events, dict) else len(given)
-    found = Ensemble(system, record, event_names, tuple(observe or ()), list(map(has_reset, given)))
-    if record.interrupted is not None:
-        if isinstance(record.interrupted, KeyboardInterrupt):
-            raise Interrupted(found)
-        raise record.interrupted
-    return found
+    start = (copied(q0), copied(v0), False, copied(z0)) if p0 is None else (copied(q0), copied(p0), True, copied(z0))
+    request = start, copied(t), (accuracy, integrator, step, steps), list(varied), list(map(copied, varied.values())), threads
+    return system, request, given, columns
 
 
 class MemberCrossings(NamedTuple):
@@ -161,15 +183,16 @@ class Ensemble:
         The number of members that were advanced together in SIMD lanes.
     """
 
-    def __init__(self, system, record, event_names, observed, resets):
-        self.system = system
+    def __init__(self, system, record, event_names, observed, events, request):
+        self.system, self._request = system, request
+        self._changed_by_events = any(event[2] or has_reset(event) for event in events)
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
         count, n = len(record.t), system.dimension
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
         self.z = record.z.reshape(count, *many)
-        kinds = [MemberResets if reset else MemberCrossings for reset in resets]
+        kinds = [MemberResets if has_reset(event) else MemberCrossings for event in events]
         self.events = crossings(kinds, record.crossings, event_names, n) if event_names else []
         self._observed = {name: record.columns[:, i].reshape(count, *many) for i, name in enumerate(observed)}
 
@@ -179,6 +202,45 @@ class Ensemble:
     def __getitem__(self, name):
         """A column of `observe`, of shape (M,) or (M, k)."""
         return self._observed[name]
+
+    def sensitivity(self, variables):
+        """The derivatives of the rows of all members with respect to variables, as `Solution.sensitivity` has them.
+
+        Each member is run once more, by itself, on several threads; for an accuracy the steps are chosen for each. The
+        result does not depend on the number of threads. With two times or a single one there are two rows: the start
+        and the end.
+
+        Parameters
+        ----------
+        variables : str or list of str
+            As in `Solution.sensitivity`.
+
+        Returns
+        -------
+        EnsembleSensitivity
+        """
+        from ._ensemble_derivatives import sensitivity
+
+        return sensitivity(self, variables)
+
+    def pullback(self, q=None, v=None, p=None, z=None):
+        """The gradients of numbers with these partial derivatives in the rows of each member, by the adjoint.
+
+        Otherwise as `sensitivity`.
+
+        Parameters
+        ----------
+        q, v, p : arrays of shape (M, k, n), or (M, n) for the last rows only
+            The partial derivatives in position, velocity and momentum; those in v and p are added.
+        z : array of shape (M, k), or (M,) for the last rows only
+
+        Returns
+        -------
+        EnsembleGradient
+        """
+        from ._ensemble_derivatives import pullback
+
+        return pullback(self, q, v, p, z)
 
     def __repr__(self):
         return f"<Ensemble: {len(self)} members, {int(np.sum(~self.success))} without success>"

@@ -42,12 +42,41 @@ class Gradient(NamedTuple):
     growth: float
 
 
-def sensitivity(sol, variables):
-    """See `Solution.sensitivity`."""
+class LyapunovExponents(NamedTuple):
+    """The Lyapunov exponents of a motion: the mean growth rates of its tangent in (q, p, z), those of the discrete motion.
+
+    ``pairs`` has those of the directions of the position and the momentum of each coordinate; with ``rate``, the mean of
+    ln(sigma_d)/h, they are all exponents where L_z is constant. ``pairing_defect`` is the largest distance of the sum of a
+    pair from the rate, or None where L_z is not constant or a force acts; ``volume_defect`` is that of the sum of all from
+    n + 1 times the rate, or None where a force acts. Both are round-off.
+    """
+
+    exponents: np.ndarray  # (2n + 1,), in descending order
+    of_second_half: np.ndarray  # (2n + 1,), in the same order
+    pairs: np.ndarray  # (n, 2)
+    rate: float
+    pairing_defect: float | None
+    volume_defect: float | None
+
+
+def lyapunov_exponents(sol):
+    """See `Solution.lyapunov_exponents`."""
+    _check(sol)
+    return LyapunovExponents(*_core.lyapunov_exponents(_core.Motion(sol.system, *sol._request)))
+
+
+def names_of_variables(variables):
+    """The names of an argument `variables`, and whether it is a single one."""
     is_one = isinstance(variables, str)
     names = [variables] if is_one else list(variables)
     if not all(isinstance(name, str) for name in names):
         raise ValueError(f"`variables` is {variables!r}; it must be a name, such as \"gamma\", or a list of names")
+    return names, is_one
+
+
+def sensitivity(sol, variables):
+    """See `Solution.sensitivity`."""
+    names, is_one = names_of_variables(variables)
     _check(sol)
     (q, v, p), z, growth = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, sol.t.tolist())
     shape = len(sol.t), len(names), sol.system.dimension
@@ -61,28 +90,28 @@ def sensitivity(sol, variables):
 def pullback(sol, q=None, v=None, p=None, z=None):
     """See `Solution.pullback`."""
     k, n = len(sol.t), sol.system.dimension
-
-    def rows(name, x, whole):
-        found = np.zeros(whole)
-        if x is None:
-            return found.ravel().tolist()
-        given = np.asarray(x, dtype=float)
-        if given.shape == whole[1:]:
-            found[-1] = given
-        elif given.shape == whole:
-            found[:] = given
-        else:
-            raise ValueError(
-                f"`{name}` has the shape {given.shape}; it must be {whole}, that of the rows, or {whole[1:]} for the last row"
-            )
-        if not np.isfinite(found).all():
-            raise ValueError(f"`{name}` is not finite; give finite partial derivatives")
-        return found.ravel().tolist()
-
     _check(sol)
-    parts = [rows(name, x, (k, n)) for name, x in (("q", q), ("v", v), ("p", p))]
+    parts = [partials(name, x, (k, n), 0).tolist() for name, x in (("q", q), ("v", v), ("p", p))]
     motion = _core.Motion(sol.system, *sol._request)
-    return _gradient(sol.system, sol._request, _core.pullback(motion, sol.t.tolist(), parts, rows("z", z, (k,))))
+    return _gradient(sol.system, sol._request, _core.pullback(motion, sol.t.tolist(), parts, partials("z", z, (k,), 0).tolist()))
+
+
+def partials(name, x, whole, axis):
+    """Partial derivatives in rows, which are along an axis, as a vector; those in the last row only where it is not given."""
+    found = np.zeros(whole)
+    if x is None:
+        return found.ravel()
+    given = np.asarray(x, dtype=float)
+    last = whole[:axis] + whole[axis + 1 :]
+    if given.shape == last:
+        found[(slice(None),) * axis + (-1,)] = given
+    elif given.shape == whole:
+        found[:] = given
+    else:
+        raise ValueError(f"`{name}` has the shape {given.shape}; it must be {whole}, that of the rows, or {last} for the last row")
+    if not np.isfinite(found).all():
+        raise ValueError(f"`{name}` is not finite; give finite partial derivatives")
+    return found.ravel()
 
 
 def value_and_grad(loss):

@@ -214,8 +214,8 @@ class Solution:
         """The derivatives of the rows with respect to variables, forward, by the tangents of the steps.
 
         They are those of the discrete motion, to round-off: of the steps that were given, or chosen for the accuracy,
-        whose number is fixed. The motion is run once more. It must be one by a Gauss method, without kinks, jumps and
-        resets along it.
+        whose number is fixed. The motion is run once more. Gauss methods have derivatives in all variables, splittings
+        and quadrature rules in most, for motions without kinks, jumps and resets.
 
         Parameters
         ----------
@@ -251,6 +251,27 @@ class Solution:
         from ._sensitivity import pullback
 
         return pullback(self, q, v, p, z)
+
+    def lyapunov_exponents(self):
+        """The Lyapunov exponents of the motion, by its tangent, made orthonormal after each step.
+
+        The motion is run once more; otherwise as `sensitivity`.
+
+        Returns
+        -------
+        LyapunovExponents
+
+        Examples
+        --------
+        >>> import herglotz as hz
+        >>> sol = hz.solve("pendulum", [1.0], [0.0], 100.0, integrator="gauss_8", step=0.25)
+        >>> found = sol.lyapunov_exponents()
+        >>> found.exponents.shape, bool(abs(found.pairs[0].sum() - found.rate) < 1e-12)
+        ((3,), True)
+        """
+        from ._sensitivity import lyapunov_exponents
+
+        return lyapunov_exponents(self)
 
     @property
     def momenta(self):

@@ -265,13 +265,13 @@ fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec
 }
 
 /// An invalid start, which every run refuses.
-fn invalid_start<const N: usize>() -> Start<N> {
+pub(super) fn invalid_start<const N: usize>() -> Start<N> {
     let none = SVector::repeat(f64::NAN);
     VelocityPoint { q: none, v: none, z: f64::NAN }.into()
 }
 
 impl<const N: usize> Sized<N> {
-    fn start_of_member(&self, start: &crate::runtime::Start) -> Start<N> {
+    pub(super) fn start_of_member(&self, start: &crate::runtime::Start) -> Start<N> {
         self.start(start).unwrap_or_else(|_| invalid_start())
     }
 }

@@ -3,6 +3,7 @@
 mod check;
 mod ensemble;
 mod geometry;
+mod member_derivatives;
 mod observed;
 pub(crate) mod path;
 mod recorder;
@@ -13,8 +14,8 @@ mod theorems;
 mod work_thread;
 
 use crate::runtime::{
-    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Loss, LossGradient, Motion, Outcome, Plan, RunMonitor,
-    RuntimeError, Sensitivity, Start,
+    BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Interrupt, Loss, LossGradient,
+    LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
 use contact_geom::{Lagrangian, Structure, Symmetry};
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
@@ -58,6 +59,25 @@ pub(crate) trait Kernel: Send + Sync {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError>;
+    fn lyapunov_exponents(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError>;
+    fn ensemble_gradient(
+        &self,
+        ensemble: &Ensemble<'_>,
+        times: &[f64],
+        loss: &BatchLoss<'_>,
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError>;
+    fn ensemble_sensitivity(
+        &self,
+        ensemble: &Ensemble<'_>,
+        variables: &[Variable],
+        times: &[f64],
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError>;
 }
 
 /// The kernel of a formula.
@@ -145,6 +165,7 @@ impl<const N: usize> Kernel for Sized<N> {
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
         on_large_stack(|| check::check(self, motion, samples))
     }
+
     fn sensitivity(
         &self,
         motion: &Motion,
@@ -163,5 +184,33 @@ impl<const N: usize> Kernel for Sized<N> {
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
         sensitivity::gradient(self, motion, times, loss, monitor)
+    }
+
+    fn lyapunov_exponents(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        sensitivity::lyapunov_exponents(self, motion, monitor)
+    }
+
+    fn ensemble_gradient(
+        &self,
+        ensemble: &Ensemble<'_>,
+        times: &[f64],
+        loss: &BatchLoss<'_>,
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        member_derivatives::gradients(self, ensemble, times, loss, interrupt)
+    }
+
+    fn ensemble_sensitivity(
+        &self,
+        ensemble: &Ensemble<'_>,
+        variables: &[Variable],
+        times: &[f64],
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+        member_derivatives::sensitivities(self, ensemble, variables, times, interrupt)
     }
 }
