@@ -123,6 +123,9 @@ fn invalid_nodes() {
         assert!(error.to_string().contains("must ascend strictly between the start and the last observation, 0 and 5"));
     }
     let shooting = problem.multiple_shooting(&[1.0, 2.0]).unwrap();
-    let error = shooting.start_from(&[start]).map(|_| ()).unwrap_err();
+    let error = shooting.start_from(&[vec![1.0, 0.0, 0.0]]).map(|_| ()).unwrap_err();
     assert_eq!(error.to_string(), "states at nodes: there are 1, but there must be 2");
+    let shooting = problem.multiple_shooting(&[1.0]).unwrap();
+    let error = shooting.start_from(&[vec![1.0, 0.0]]).map(|_| ()).unwrap_err();
+    assert_eq!(error.to_string(), "numbers of a state at a node: there are 2, but there must be 3");
 }
