@@ -9,6 +9,7 @@ mod dense;
 mod ensemble;
 mod events;
 mod exact;
+mod fit;
 mod motion;
 mod operators;
 mod path;
@@ -39,6 +40,8 @@ mod _core {
     use crate::ensemble::{EnsembleRecord, run_ensemble};
     #[pymodule_export]
     use crate::exact::{exact_lagrangian, exponential, retract};
+    #[pymodule_export]
+    use crate::fit::{FitRecord, fit_motion};
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]

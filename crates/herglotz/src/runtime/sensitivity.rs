@@ -1,7 +1,7 @@
 //! Derivatives of motions.
 
 use crate::runtime::{Motion, RunMonitor, RuntimeError, System, velocity_name};
-use discrete_herglotz::Status;
+use discrete_herglotz::{Status, UnresolvedStep};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
 use formula_lagrangian::{Expression, ExpressionGradient, nearest_name};
 
@@ -48,6 +48,8 @@ impl StateCovector {
 pub struct Sensitivity {
     /// How the motion ended. Where it was not completed there are rows up to its end only.
     pub status: Status,
+    /// The first step that was found not to resolve the motion.
+    pub unresolved: Option<UnresolvedStep>,
     /// The state at each time that was reached.
     pub states: Vec<MotionState>,
     /// The derivatives of each of these states, in the order of the variables.
@@ -184,7 +186,7 @@ impl System {
     }
 
     /// The variable with a name.
-    fn variable(&self, name: &str) -> Result<Variable, RuntimeError> {
+    pub(crate) fn variable(&self, name: &str) -> Result<Variable, RuntimeError> {
         let coordinates = self.formula().coordinates();
         let velocities: Vec<String> = coordinates.iter().map(|name| velocity_name(name)).collect();
         let momenta: Vec<String> = coordinates.iter().map(|name| format!("p_{name}")).collect();

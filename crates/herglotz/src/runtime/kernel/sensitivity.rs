@@ -38,6 +38,7 @@ pub(super) fn tangent<const N: usize>(
     let found = run.tangent_at(variables, times, Until::Time(motion.end))?;
     Ok(Sensitivity {
         status: found.outcome.status,
+        unresolved: found.outcome.unresolved,
         states: found.rows.iter().map(|row| state(&row.state, n)).collect(),
         rows: found.rows.iter().map(|row| row.columns.iter().map(|column| derivative(column, n)).collect()).collect(),
         growth: found.growth,
