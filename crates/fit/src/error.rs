@@ -153,6 +153,12 @@ pub enum FitError {
         /// The time of the start.
         t0: f64,
     },
+    /// No value was observed after the start.
+    #[error("no value was observed after the start, at t0 = {t0}; give values at later times")]
+    NoTimes {
+        /// The time of the start.
+        t0: f64,
+    },
     /// Nodes of multiple shooting are not in order between the start and the last observation.
     #[error(
         "the node {index} is at {t}; nodes must ascend strictly between the start and the last observation, {t0} and {t_end}"

@@ -75,6 +75,8 @@ pub use model::{Model, ModelFailure};
 pub use motion::motion_model::MotionModel;
 pub use motion::multiple_shooting::{MultipleShooting, ShootingFit};
 pub use motion::observed::{Observable, Observed};
+pub use motion::piecewise::{Observation, Piece, PieceValues, PiecewiseModel};
 pub use multi_start::MultiStart;
+pub use nalgebra::DMatrix;
 pub use null_space::{NullDirection, NullSpace};
 pub use status::{Criterion, FitStatus};

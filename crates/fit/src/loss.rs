@@ -84,8 +84,15 @@ impl Loss {
                 // The square overflows for very large residuals, and vanishes for very small ones.
                 let rho = if a < 1e100 { (a * a).ln_1p() } else { 2.0 * a.ln() };
                 let factor = if a < 1e-100 { 1.0 } else { rho.sqrt() / a };
-                let slope = (1.0 + a * a).recip();
-                (factor, slope, slope * (1.0 - a * a * slope * 2.0))
+                // rho' = 1/(1 + a^2), and a^2 rho'.
+                let (slope, rest) = if a <= 1.0 {
+                    let slope = (1.0 + a * a).recip();
+                    (slope, a * a * slope)
+                } else {
+                    let inverse = a.recip();
+                    (inverse / (a + inverse), (1.0 + inverse * inverse).recip())
+                };
+                (factor, slope, slope * (1.0 - 2.0 * rest))
             }
         };
         LossTerm { root: r * factor, root_slope: slope / factor, influence: slope * r, influence_slope }

@@ -226,5 +226,5 @@ fn invalid_input() {
     let model = MotionModel::new(&spring, 0.0, at_rest(1.0), &[parameter("k")], 40.0).unwrap().with_stages(1);
     let model = model.observe(Observed::Position(0), &[400.0]).unwrap();
     let error = LeastSquares::new(&model, &[0.5]).unwrap().solve(&[1.0]).unwrap_err();
-    assert!(error.to_string().contains("take smaller steps"), "{error}");
+    assert!(error.to_string().contains("take a smaller step"), "{error}");
 }

@@ -5,6 +5,7 @@ mod failure;
 mod output;
 mod peer;
 mod plot;
+mod plot_fit;
 
 use clap::Parser;
 use commands::Program;

@@ -121,19 +121,23 @@ fn single(count: usize) -> Line {
 }
 
 /// Panels in a grid; a single panel has no letter.
-fn grid(panels: &[Panel]) -> String {
+pub(crate) fn grid(panels: &[Panel]) -> String {
     match panels {
         [one] => draw(one),
         several => draw_grid(several, if several.len() == 4 { 2 } else { several.len().min(PANELS_IN_A_ROW) }),
     }
 }
 
-/// One curve with axes that fit it; angles are reduced to -pi to pi.
-fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
-    let label = |name: &str| match name.char_indices().nth(MAX_LABEL_LENGTH) {
+/// The label of an axis.
+pub(crate) fn label(name: &str) -> String {
+    match name.char_indices().nth(MAX_LABEL_LENGTH) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_owned(),
-    };
+    }
+}
+
+/// One curve with axes that fit it; angles are reduced to -pi to pi.
+fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
     let (x_label, y_label, kinds) = (label(x.name), label(y.name), (x.coordinate, y.coordinate));
     let axis_of = |kind: Coordinate, of: fn(&(f64, f64)) -> f64| {
         let fitted = axis(points.iter().map(of))?;
@@ -156,7 +160,7 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
 }
 
 /// A linear axis that contains the numbers and extends from tick to tick; `None` without numbers.
-fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
+pub(crate) fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if low > high {
         return None;

@@ -4,6 +4,8 @@
 
 #[path = "program/ends.rs"]
 mod ends;
+#[path = "program/fit.rs"]
+mod fit;
 #[path = "program/events.rs"]
 mod events;
 #[path = "program/support.rs"]

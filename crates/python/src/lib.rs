@@ -9,6 +9,7 @@ mod dense;
 mod ensemble;
 mod events;
 mod exact;
+mod fit;
 mod member_derivatives;
 mod motion;
 mod operators;
@@ -40,6 +41,8 @@ mod _core {
     use crate::ensemble::{EnsembleRecord, run_ensemble};
     #[pymodule_export]
     use crate::exact::{exact_lagrangian, exponential, retract};
+    #[pymodule_export]
+    use crate::fit::{FitRecord, fit_motion};
     #[pymodule_export]
     use crate::member_derivatives::{ensemble_pullback, ensemble_sensitivity, ensemble_value_and_gradient};
     #[pymodule_export]

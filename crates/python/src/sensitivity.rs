@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::ops::ControlFlow;
 
 /// Ends a run at a signal.
-struct SignalMonitor(Signals);
+pub struct SignalMonitor(Signals);
 
 impl RunMonitor for SignalMonitor {
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
@@ -18,7 +18,7 @@ impl RunMonitor for SignalMonitor {
 }
 
 /// Performs a computation with the interpreter lock released. An exception of a signal handler is raised.
-fn detached<T: Send>(
+pub fn detached<T: Send>(
     py: Python<'_>,
     motion: &Motion,
     work: impl FnOnce(&mut SignalMonitor) -> Result<T, RuntimeError> + Send,

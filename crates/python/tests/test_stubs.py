@@ -33,6 +33,8 @@ def test_classes_have_what_their_stubs_have():
     made["Ensemble"] = hz.ensemble("pendulum", [[1.0]], [[0.0]], 1.0)
     made["Geometry"] = hz.geometry("pendulum", 0.0, [1.0], [0.0])
     made["Contact"] = hz.is_contact(lambda q, p, z: (q, p, z), ([1.0], [0.0], 0.0))
+    times = [0.0, 1.0, 2.0]
+    made["Fit"] = hz.fit("pendulum", t=times, data={"theta": [1.0, 0.6, -0.3]}, unknowns=["gamma"])
     for node in STUBS.body:
         if isinstance(node, ast.ClassDef) and node.name in made:
             for member in node.body:

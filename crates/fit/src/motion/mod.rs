@@ -3,5 +3,6 @@
 pub(crate) mod motion_model;
 pub(crate) mod multiple_shooting;
 pub(crate) mod observed;
+pub(crate) mod piecewise;
 mod shooting_model;
 pub(crate) mod tangent_rows;

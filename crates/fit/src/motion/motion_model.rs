@@ -1,9 +1,10 @@
 //! The model of observed quantities of a motion.
 
 use crate::motion::observed::Observed;
-use crate::motion::tangent_rows::{StepChoice, tangent_rows};
+use crate::motion::piecewise::{Observation, Piece, PieceValues, PiecewiseModel};
+use crate::motion::tangent_rows::{StepChoice, state_variables, tangent_rows};
 use crate::{FitError, Model, ModelFailure};
-use contact_geom::nalgebra::DMatrix;
+use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{Parametric, VelocityPoint};
 use discrete_herglotz::sensitivity::{TangentRow, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Until};
@@ -30,27 +31,27 @@ use discrete_herglotz::{GaussCollocation, Problem, Until};
 /// # Ok::<(), herglotz_fit::FitError>(())
 /// ```
 pub struct MotionModel<'a, L, const N: usize> {
-    pub(crate) lagrangian: &'a L,
-    pub(crate) t0: f64,
-    pub(crate) initial: VelocityPoint<N>,
-    pub(crate) unknowns: Vec<Variable>,
+    lagrangian: &'a L,
+    t0: f64,
+    initial: VelocityPoint<N>,
+    unknowns: Vec<Variable>,
     /// The index of each unknown among the parameters, for those that are one.
     indices: Vec<Option<usize>>,
-    pub(crate) names: Vec<String>,
-    pub(crate) steps: StepChoice,
+    names: Vec<String>,
+    steps: StepChoice,
     /// The times of all observations, in order and without repetition.
-    pub(crate) times: Vec<f64>,
+    times: Vec<f64>,
     /// What is observed, and when, for each value.
-    pub(crate) values: Vec<Observation>,
-    pub(crate) observed: Vec<Observed<'a, N>>,
+    values: Vec<ObservedValue>,
+    observed: Vec<Observed<'a, N>>,
 }
 
 /// An observed value: the index of its time, and of its quantity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Observation {
-    pub t: f64,
-    pub time: usize,
-    pub quantity: usize,
+struct ObservedValue {
+    t: f64,
+    time: usize,
+    quantity: usize,
 }
 
 impl<'a, L: Parametric<N>, const N: usize> MotionModel<'a, L, N> {
@@ -119,7 +120,7 @@ impl<'a, L: Parametric<N>, const N: usize> MotionModel<'a, L, N> {
         self.times.sort_by(f64::total_cmp);
         self.times.dedup();
         let quantity = self.observed.len();
-        self.values.extend(times.iter().map(|t| Observation { t: *t, time: 0, quantity }));
+        self.values.extend(times.iter().map(|t| ObservedValue { t: *t, time: 0, quantity }));
         for value in &mut self.values {
             value.time = self.times.partition_point(|t| *t < value.t);
         }
@@ -187,7 +188,7 @@ impl<'a, L: Parametric<N>, const N: usize> MotionModel<'a, L, N> {
     }
 
     /// The rows of a motion at times, with the derivatives with respect to variables.
-    pub(crate) fn rows(
+    fn rows(
         &self,
         theta: &[f64],
         start: (f64, VelocityPoint<N>),
@@ -231,4 +232,90 @@ impl<L: Parametric<N>, const N: usize> Model for MotionModel<'_, L, N> {
         }
         Ok(())
     }
+}
+
+/// The numbers of a state are q, v and z, in this order.
+impl<L: Parametric<N>, const N: usize> PiecewiseModel for MotionModel<'_, L, N> {
+    fn state_names(&self) -> Vec<String> {
+        let vectors = ["q", "v"].into_iter().flat_map(|letter| (0..N).map(move |i| format!("{letter}[{i}]")));
+        vectors.chain(["z".to_owned()]).collect()
+    }
+
+    fn start_time(&self) -> f64 {
+        self.t0
+    }
+
+    fn start_state(&self, theta: &[f64]) -> Vec<f64> {
+        let x = self.state_at(theta);
+        numbers(&x.q, &x.v, x.z).collect()
+    }
+
+    fn observations(&self) -> Vec<Observation> {
+        let of = |value: &ObservedValue| {
+            let (number, rate) = match self.observed[value.quantity] {
+                Observed::Position(i) => (Some(i), Some(N + i)),
+                Observed::Velocity(i) => (Some(N + i), None),
+                Observed::Action => (Some(2 * N), None),
+                _ => (None, None),
+            };
+            Observation { t: value.t, number, rate }
+        };
+        self.values.iter().map(of).collect()
+    }
+
+    fn piece(&self, theta: &[f64], piece: &Piece<'_>) -> Result<PieceValues, ModelFailure> {
+        let count = self.unknowns.len();
+        let unknowns = self.unknowns.iter().cloned().zip(0..);
+        // The variables of the piece, and their places among the unknowns and the numbers of the state after them.
+        let (start, (variables, places)): (_, (Vec<Variable>, Vec<usize>)) = match piece.from {
+            None => ((self.t0, self.state_at(theta)), unknowns.unzip()),
+            Some((t, state)) => {
+                let parameters = unknowns.filter(|(unknown, _)| matches!(unknown, Variable::Parameter(_)));
+                ((t, state_of(state)), state_variables::<N>().zip(count..).chain(parameters).unzip())
+            }
+        };
+        let mut times: Vec<f64> = piece.values.iter().map(|i| self.values[*i].t).chain(piece.to).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let variables: &[Variable] = if piece.is_differentiated { &variables } else { &[] };
+        let rows = self.rows(theta, start, &times, variables)?;
+        let mut found = PieceValues::new(self, piece);
+        let mut derivatives = Vec::with_capacity(variables.len());
+        for (row, i) in piece.values.iter().enumerate() {
+            let value = self.values[*i];
+            let TangentRow { state, columns } = &rows[times.partition_point(|t| *t < value.t)];
+            found.values[row] = self.observed[value.quantity].at(state, columns, &mut derivatives);
+            for (place, derivative) in places.iter().zip(&derivatives) {
+                found.derivatives[(row, *place)] = *derivative;
+            }
+        }
+        if let (Some(_), Some(TangentRow { state, columns })) = (piece.to, rows.last()) {
+            let row = piece.values.len();
+            for (i, number) in numbers(&state.q, &state.v, state.z).enumerate() {
+                found.values[row + i] = number;
+            }
+            for (place, column) in places.iter().zip(columns) {
+                for (i, number) in numbers(&column.q, &column.v, column.z).enumerate() {
+                    found.derivatives[(row + i, *place)] = number;
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// The numbers of a state, in the order q, v, z.
+fn numbers<'s, const N: usize>(
+    q: &'s SVector<f64, N>,
+    v: &'s SVector<f64, N>,
+    z: f64,
+) -> impl Iterator<Item = f64> + 's {
+    q.iter().chain(v.iter()).copied().chain([z])
+}
+
+/// The state with these numbers.
+fn state_of<const N: usize>(numbers: &[f64]) -> VelocityPoint<N> {
+    let number = |i: usize| numbers.get(i).copied().unwrap_or(f64::NAN);
+    let q = SVector::from_fn(|i, _| number(i));
+    VelocityPoint { q, v: SVector::from_fn(|i, _| number(N + i)), z: number(2 * N) }
 }

@@ -36,7 +36,7 @@ pub(crate) fn tangent_rows<L: Parametric<N>, const N: usize>(
         return Err(undefined(tangent.outcome.status));
     }
     match tangent.outcome.unresolved {
-        Some(unresolved) => Err(undefined(format!("{unresolved}; take smaller steps"))),
+        Some(unresolved) => Err(undefined(unresolved)),
         None => Ok(tangent.rows),
     }
 }

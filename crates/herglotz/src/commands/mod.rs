@@ -4,6 +4,7 @@ mod check;
 mod checkpoint;
 mod compare;
 mod ends;
+mod fit;
 mod lattice;
 mod list;
 mod lyapunov;
@@ -18,7 +19,7 @@ use crate::output::{print, print_json};
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 
-/// Contact mechanics from scene files: runs, plans, checks, comparisons and parameter sweeps of solutions of Herglotz'
+/// Contact mechanics from scene files: runs, plans, checks, comparisons, parameter sweeps and fits of solutions of Herglotz'
 /// equation.
 ///
 /// Begin with `herglotz new pendulum > pendulum.toml` and `herglotz run pendulum.toml`.
@@ -52,6 +53,9 @@ pub(crate) enum Command {
     Compare(compare::Compare),
     /// Run all members of a sweep on several threads: writes sweep.csv.
     Sweep(sweep::Sweep),
+    /// Fit parameters and the initial state to data: writes fit.csv and residuals.csv, and prints the fitted values with
+    /// their standard errors and correlations.
+    Fit(fit::Fit),
     /// List the systems of the catalogue, or the integrators.
     List(list::List),
     /// Print a commented scene as a starting point.
@@ -74,6 +78,7 @@ impl Command {
             Command::Check(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Sweep(command) => command.run(),
+            Command::Fit(command) => command.run(),
             Command::List(command) => command.run(),
             Command::New(command) => command.run(),
             Command::Completions { shell } => {

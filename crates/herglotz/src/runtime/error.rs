@@ -92,6 +92,10 @@ pub enum RuntimeError {
     /// A motion that cannot be differentiated.
     #[error("{}", crate::runtime::sensitivity::in_words(.0))]
     Sensitivity(SensitivityError),
+    /// The data, the unknowns or the options of a fit, or a motion that cannot be computed.
+    #[cfg(feature = "fits")]
+    #[error(transparent)]
+    Fit(#[from] herglotz_fit::FitError),
     /// A name that is not that of a variable with respect to which a motion can be differentiated.
     #[error("there is no variable `{name}`{}", match nearest {
         Some(nearest) => format!("; did you mean `{nearest}`?"),

@@ -25,6 +25,8 @@ mod column;
 mod compare;
 mod ensemble;
 mod error;
+#[cfg(feature = "fits")]
+mod fit;
 mod geometry;
 mod interrupt;
 mod kernel;
@@ -46,6 +48,8 @@ pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
 pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
 pub use error::{RuntimeError, in_words};
+#[cfg(feature = "fits")]
+pub use fit::{FittedMotion, FittedSeries, MotionFit, Series, Unknown};
 pub use geometry::Geometry;
 pub use interrupt::Interrupt;
 pub use lyapunov::LyapunovExponents;
@@ -67,5 +71,7 @@ pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
     Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
 };
+#[cfg(feature = "fits")]
+pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};
 pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

@@ -2,7 +2,7 @@
 
 use crate::runtime::member_derivatives::of_expression;
 use crate::runtime::{Motion, RunMonitor, RuntimeError, System, velocity_name};
-use discrete_herglotz::Status;
+use discrete_herglotz::{Status, UnresolvedStep};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
 use formula_lagrangian::{Expression, nearest_name};
 
@@ -49,6 +49,8 @@ impl StateCovector {
 pub struct Sensitivity {
     /// How the motion ended. Where it was not completed there are rows up to its end only.
     pub status: Status,
+    /// The first step that was found not to resolve the motion.
+    pub unresolved: Option<UnresolvedStep>,
     /// The state at each time that was reached.
     pub states: Vec<MotionState>,
     /// The derivatives of each of these states, in the order of the variables.

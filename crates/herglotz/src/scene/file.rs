@@ -1,11 +1,12 @@
 //! The scene file format. The documentation of these types is that of the JSON schema, which editors show.
 
+use super::fit_table::FitTable;
 use super::location::{Location, Named, Numbers, Span};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use super::quantities::Quantities;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Formatter;
 
@@ -50,7 +51,10 @@ pub(crate) struct File {
     /// Parameters, or values of the initial state such as `start.theta`, over whose values `herglotz sweep` runs. With
     /// several of them all combinations are run; the last one varies fastest.
     #[serde(default)]
-    pub sweep: Swept,
+    pub sweep: Quantities<Values>,
+    /// Data to which `herglotz fit` fits parameters and the initial state.
+    #[serde(default)]
+    pub fit: Option<Location<FitTable>>,
 }
 
 /// The Lagrangian.
@@ -277,63 +281,5 @@ impl<'de> Deserialize<'de> for Values {
             }
         }
         deserializer.deserialize_any(ListOrRange)
-    }
-}
-
-/// Parameters and values of the initial state, with the values that a sweep gives them.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Swept(pub Vec<(Location<String>, Location<Values>)>);
-
-/// The key of the nested table with values of the initial state.
-const START: &str = "start";
-
-impl<'de> Deserialize<'de> for Swept {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Table;
-        impl<'de> Visitor<'de> for Table {
-            type Value = Swept;
-
-            fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a table")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Swept, A::Error> {
-                let mut all = Vec::new();
-                while let Some(key) = map.next_key::<Location<String>>()? {
-                    if *key == START {
-                        let of_start: Named<Values> = map.next_value()?;
-                        let named = |(key, values): (Location<String>, _)| {
-                            (Location::new(format!("{START}.{}", *key), key.span()), values)
-                        };
-                        all.extend(of_start.0.into_iter().map(named));
-                    } else {
-                        all.push((key, map.next_value()?));
-                    }
-                }
-                // The TOML reader sorts tables by name; this restores the order of the file.
-                all.sort_by_key(|(key, _)| key.span());
-                Ok(Swept(all))
-            }
-        }
-        deserializer.deserialize_map(Table)
-    }
-}
-
-impl JsonSchema for Swept {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Swept".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let values = Values::json_schema(generator);
-        json_schema!({
-            "type": "object",
-            "properties": { START: { "type": "object", "additionalProperties": values.clone() } },
-            "additionalProperties": values,
-        })
     }
 }

@@ -1,9 +1,12 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
 mod checked;
+mod csv_file;
 mod ends;
 mod error;
 mod file;
+mod fit;
+mod fit_table;
 mod forces;
 mod lattice;
 mod location;
@@ -11,6 +14,7 @@ mod members;
 mod motion;
 mod output;
 mod overrides;
+mod quantities;
 mod resets;
 mod start;
 mod step_control;

@@ -2,6 +2,7 @@
 
 use super::checked::{check_version, finite};
 use super::file::{self, EventTable, File};
+use super::fit::{self, SceneFit};
 use super::forces::with_forces;
 use super::location::{Location, Named, Span};
 use super::members::Members;
@@ -12,7 +13,7 @@ use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
 use super::{SceneError, overrides, start, tables};
 use crate::runtime::{
-    AfterReset, Column, Crossing, Event, InputError, Motion, RuntimeError, SelectionFailure, Start, StepControl,
+    AfterReset, Column, Crossing, Event, InputError, Motion, MotionFit, RuntimeError, SelectionFailure, Start, StepControl,
     StepError, System, Table, in_words, velocity_name,
 };
 use std::path::Path;
@@ -32,6 +33,7 @@ pub struct Scene {
     expressions: Vec<String>,
     /// The swept quantities with their values.
     pub swept: Vec<SweptQuantity>,
+    fit: Option<SceneFit>,
     /// The text of the formula.
     lagrangian: String,
     start: Start,
@@ -160,6 +162,10 @@ impl Scene {
             events: events.events,
             event_columns: events.columns,
             swept: sweep::read(text, &formula, &start, &file.sweep)?,
+            fit: match &file.fit {
+                Some(table) => Some(fit::Reader { text, folder, formula: &formula, start: &start, end }.read(table)?),
+                None => None,
+            },
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
             expressions: expressions(&file).cloned().collect(),
@@ -210,6 +216,11 @@ impl Scene {
     /// The motion with no output but its end.
     pub fn bare_motion(&self) -> Motion {
         Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.step_control) }
+    }
+
+    /// The fit of its motion to data, if it has one.
+    pub fn motion_fit(&self) -> Option<MotionFit> {
+        self.fit.as_ref().map(|fit| fit.of(self.bare_motion()))
     }
 
     /// The columns of events.csv after the name of the event: the state there, the columns of the events, and with
@@ -312,6 +323,8 @@ impl Scene {
                 _ => spans.run,
             },
             RuntimeError::ForceUndefined { .. } => spans.force,
+            RuntimeError::Sensitivity(_) => spans.integrator,
+            RuntimeError::Fit(error) => self.fit.as_ref().map_or(spans.run, |fit| fit.span_of(error)),
             RuntimeError::Length { what: "scales", .. } => spans.scales,
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => spans.start,
             _ => spans.run,

@@ -2,8 +2,9 @@
 
 use super::SceneError;
 use super::checked::finite;
-use super::file::{RangeTable, Spacing, Swept, Values};
+use super::file::{RangeTable, Spacing, Values};
 use super::location::Location;
+use super::quantities::Quantities;
 use super::start::{Part, entry_of, single_names};
 use crate::runtime::{Formula, InitialVelocity, Start};
 
@@ -13,7 +14,22 @@ const MAX_MEMBERS: usize = 100_000_000;
 /// The maximal number of values of one swept quantity, all of which are stored.
 const MAX_VALUES: usize = 10_000_000;
 
-/// The kind of a swept quantity.
+/// The words for a table of parameters and values of the initial state.
+pub(super) struct Purpose {
+    /// The table.
+    pub table: &'static str,
+    /// What is done with the quantities.
+    pub done: &'static str,
+    /// What to do.
+    pub act: &'static str,
+    /// Why the initial time is not among them.
+    pub not_time: &'static str,
+}
+
+const SWEEP: Purpose =
+    Purpose { table: "sweep", done: "swept", act: "sweep", not_time: "all members start at the same time" };
+
+/// The kind of a swept or fitted quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Slot {
     /// A parameter.
@@ -52,12 +68,12 @@ pub(crate) fn read(
     text: &str,
     formula: &Formula,
     start: &Start,
-    table: &Swept,
+    table: &Quantities<Values>,
 ) -> Result<Vec<SweptQuantity>, SceneError> {
     let mut swept = Vec::new();
     let mut members: usize = 1;
     for (name, values) in &table.0 {
-        let slot = slot(text, formula, start, name)?;
+        let slot = slot(text, formula, start, name, &SWEEP)?;
         let values_of = values_of(text, values)?;
         members = members.saturating_mul(values_of.len());
         if members > MAX_MEMBERS {
@@ -69,8 +85,15 @@ pub(crate) fn read(
     Ok(swept)
 }
 
-fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -> Result<Slot, SceneError> {
-    let refuse = |message: &str| Err(SceneError::at(text, name.span(), message));
+/// The kind of the quantity with a name.
+pub(super) fn slot(
+    text: &str,
+    formula: &Formula,
+    start: &Start,
+    name: &Location<String>,
+    Purpose { table, done, act, not_time }: &Purpose,
+) -> Result<Slot, SceneError> {
+    let refuse = |message: String| Err(SceneError::at(text, name.span(), message));
     let Some(of_start) = name.strip_prefix("start.") else {
         if formula.parameters().any(|(parameter, _)| parameter == **name) {
             return Ok(Slot::Parameter);
@@ -79,16 +102,16 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -
         let starts: Vec<String> = single_names(formula).iter().map(|name| format!("start.{name}")).collect();
         let all = known.iter().chain(&starts).map(String::as_str);
         let listed = all.clone().collect::<Vec<_>>().join(", ");
-        let message = format!("unknown name `{}` in [sweep]; the names that can be swept are {listed}", **name);
+        let message = format!("unknown name `{}` in [{table}]; the names that can be {done} are {listed}", **name);
         return Err(SceneError::unknown(text, name.span(), name, all, message));
     };
     match (entry_of(formula, of_start), &start.velocity) {
-        (Some((Part::Time, _)), _) => refuse("all members start at the same time; sweep another value"),
+        (Some((Part::Time, _)), _) => refuse(format!("{not_time}; {act} another value")),
         (Some((Part::Velocity, _)), InitialVelocity::Momentum(_) | InitialVelocity::MomentumNear { .. }) => {
-            refuse("the start is given by momenta; sweep one of them")
+            refuse(format!("the start is given by momenta; {act} one of them"))
         }
         (Some((Part::Momentum, _)), InitialVelocity::Velocity(_)) => {
-            refuse("the start is given by velocities; sweep one of them")
+            refuse(format!("the start is given by velocities; {act} one of them"))
         }
         (Some((part, entry)), _) => Ok(Slot::Start(part, entry)),
         (None, _) => {

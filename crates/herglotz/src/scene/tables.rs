@@ -1,14 +1,14 @@
 //! The tables of a scene: functions of time by samples.
 
 use super::SceneError;
+use super::csv_file::CsvFile;
 use super::file::{PiecesName, SamplesTable};
-use super::location::{Location, Named, Span};
+use super::location::{Location, Named};
 use crate::runtime::{Interpolation, Table};
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// The column of the times of a file.
-const TIME: &str = "t";
+pub(super) const TIME: &str = "t";
 
 /// The tables with their names. Files are in a folder.
 pub(super) fn read(
@@ -24,7 +24,7 @@ fn of(text: &str, folder: &Path, name: &Location<String>, table: &Location<Sampl
     let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
     let (times, values, span) = match (csv, times, values) {
         (Some(csv), None, None) => {
-            let (times, values) = File { text, folder, csv }.columns(time, value, name)?;
+            let (times, values) = columns(&CsvFile::read(text, folder, csv)?, time, value, name)?;
             (times, values, csv.span())
         }
         (None, Some(times), Some(values)) => {
@@ -54,78 +54,19 @@ fn of(text: &str, folder: &Path, name: &Location<String>, table: &Location<Sampl
     Table::new(&times, &values, interpolation).map_err(|error| SceneError::at(text, span, error.to_string()))
 }
 
-/// A file of comma-separated values that a scene names.
-struct File<'a> {
-    text: &'a str,
-    folder: &'a Path,
-    csv: &'a Location<String>,
-}
-
-impl File<'_> {
-    fn refuse<T>(&self, span: Span, message: impl Into<String>) -> Result<T, SceneError> {
-        Err(SceneError::at(self.text, span, message))
-    }
-
-    /// The columns of times and of values.
-    fn columns(
-        &self,
-        time: &Option<Location<String>>,
-        value: &Option<Location<String>>,
-        name: &Location<String>,
-    ) -> Result<(Vec<f64>, Vec<f64>), SceneError> {
-        let (csv, span) = (self.csv.as_str(), self.csv.span());
-        let contents = match std::fs::read_to_string(self.folder.join(csv)) {
-            Ok(contents) => contents,
-            Err(cause) if cause.kind() == ErrorKind::NotFound => {
-                let message =
-                    format!("there is no file {csv:?}; give its path relative to the folder of the scene file");
-                return self.refuse(span, message);
-            }
-            Err(cause) => return self.refuse(span, format!("the file {csv:?} cannot be read: {cause}")),
-        };
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_bytes());
-        let header = match reader.headers() {
-            Ok(header) => header.clone(),
-            Err(cause) => return self.refuse(span, format!("the file {csv:?} is no table: {cause}")),
-        };
-        let place = |column: &str, span: Span, key: &str| {
-            let found = header.iter().position(|known| known == column);
-            found.ok_or_else(|| {
-                let all = header.iter().collect::<Vec<_>>().join(", ");
-                let message =
-                    format!("the file {csv:?} has no column `{column}`; its columns are {all}: name one by `{key}`");
-                SceneError::unknown(self.text, span, column, header.iter(), message)
-            })
-        };
-        let of = |column: &Option<Location<String>>, default: &str, key: &str| {
-            let (name, span) = column.as_ref().map_or((default, span), |name| (name.as_str(), name.span()));
-            Ok((name.to_owned(), place(name, span, key)?))
-        };
-        let columns = [of(time, TIME, "time")?, of(value, name, "value")?];
-        let mut numbers = [Vec::new(), Vec::new()];
-        for row in reader.records() {
-            let row = match row {
-                Ok(row) => row,
-                Err(cause) => return self.refuse(span, format!("the file {csv:?} is no table: {cause}")),
-            };
-            let line = row.position().map_or(0, csv::Position::line);
-            for ((column, place), numbers) in columns.iter().zip(&mut numbers) {
-                let entry = row.get(*place).unwrap_or_default();
-                match entry.parse::<f64>() {
-                    Ok(number) => numbers.push(number),
-                    Err(_) => {
-                        let message = format!(
-                            "line {line} of the file {csv:?} has {entry:?} for `{column}`; it must be a number"
-                        );
-                        return self.refuse(span, message);
-                    }
-                }
-            }
-        }
-        let [times, values] = numbers;
-        Ok((times, values))
-    }
+/// The columns of times and of values of a file.
+fn columns(
+    file: &CsvFile<'_>,
+    time: &Option<Location<String>>,
+    value: &Option<Location<String>>,
+    name: &Location<String>,
+) -> Result<(Vec<f64>, Vec<f64>), SceneError> {
+    let numbers = |column: &Option<Location<String>>, default: &str, key: &str| {
+        let (name, span) = column.as_ref().map_or((default, file.span()), |name| (name.as_str(), name.span()));
+        let place = file.place(name, span, key)?;
+        file.entries(place).map(|(line, entry)| file.number(line, entry, name)).collect::<Result<Vec<_>, _>>()
+    };
+    Ok((numbers(time, TIME, "time")?, numbers(value, name, "value")?))
 }
 
 /// A number that tells tables apart: the FNV-1a hash of their samples.

@@ -223,6 +223,39 @@ class EnsembleGradient(NamedTuple):
     growth: Vector
     troubles: dict[int, str]
 
+class Fit:
+    names: tuple[str, ...]
+    x: Vector
+    errors: Vector
+    at_bounds: dict[str, str]
+    covariance: Vector | None
+    correlation: Vector | None
+    jacobian: Vector
+    success: bool
+    status: str
+    t: dict[str, Vector]
+    data: dict[str, Vector]
+    fitted: dict[str, Vector]
+    residuals: dict[str, Vector]
+    cost: float
+    residual_variance: float | None
+    degrees_of_freedom: int
+    rank: int
+    iterations: int
+    evaluations: int
+    system: System
+    q0: Vector
+    v0: Vector | None
+    p0: Vector | None
+    z0: float
+    step: float
+    costs: Vector
+    best_start: int
+    largest_defect: float | None
+    def __getitem__(self, name: str) -> float: ...
+    def error(self, name: str) -> float: ...
+    def plot_residuals(self, *names: str, ax: Any = None) -> Any: ...
+
 class Path:
     system: System
     t: Vector
@@ -466,6 +499,35 @@ def geometry(
 ) -> Geometry: ...
 def value_and_grad(loss: Expression) -> Callable[..., tuple[float, Gradient]]: ...
 def ensemble_value_and_grad(loss: Expression) -> Callable[..., tuple[Vector, EnsembleGradient]]: ...
+def fit(
+    L: Lagrangian,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    data: Mapping[str, ArrayLike] | None = None,
+    unknowns: Sequence[str] | None = None,
+    *,
+    t0: float | None = None,
+    sigma: float | Mapping[str, ArrayLike] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    loss: tuple[str, float] | None = None,
+    nodes: ArrayLike = (),
+    starts: Sequence[Mapping[str, float]] = (),
+    max_evaluations: int | None = None,
+    p0: ArrayLike | None = None,
+    z0: float = 0.0,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    scales: ArrayLike | None = None,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    force: Force | None = None,
+    rayleigh: Expression | None = None,
+    tables: Mapping[str, Table] | None = None,
+    breaks: Sequence[float] | None = None,
+) -> Fit: ...
 def path(
     L: Lagrangian,
     q0: ArrayLike,

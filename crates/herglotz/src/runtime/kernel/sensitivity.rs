@@ -52,6 +52,7 @@ pub(super) fn loss_gradient<const N: usize>(
 pub(super) fn sensitivity_of<const N: usize>(found: &Tangent<N>, n: usize) -> Sensitivity {
     Sensitivity {
         status: found.outcome.status,
+        unresolved: found.outcome.unresolved,
         states: found.rows.iter().map(|row| state(&row.state, n)).collect(),
         rows: found.rows.iter().map(|row| row.columns.iter().map(|column| derivative(column, n)).collect()).collect(),
         growth: found.growth,
