@@ -1,8 +1,11 @@
 //! Errors of the binaries, and their exit codes.
 
 use contact_geom::GeometryError;
+use discrete_herglotz::sensitivity::SensitivityError;
 use discrete_herglotz::{InputError, Status, StepError};
 use exact_lagrangian::ExactError;
+use formula_lagrangian::FormulaError;
+use herglotz_fit::FitError;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -62,6 +65,15 @@ pub enum Failure {
     /// A single step could not be taken: exit code 1.
     #[error("a step fails: {0}")]
     Step(#[from] StepError),
+    /// A run cannot be differentiated: exit code 1.
+    #[error(transparent)]
+    Sensitivity(#[from] SensitivityError),
+    /// A formula is invalid. Invalid input: exit code 2.
+    #[error(transparent)]
+    Formula(#[from] FormulaError),
+    /// A fit has no result: exit code 1.
+    #[error(transparent)]
+    Fit(#[from] FitError),
     /// An exact motion, or the motion between two points, was not found. The text is that of the error, whose type
     /// depends on the dimension. Exit code 1.
     #[error("the exact motion cannot be computed: {0}")]
@@ -106,9 +118,12 @@ impl Failure {
             | Failure::Table { .. }
             | Failure::Terminal(_)
             | Failure::Input(_)
-            | Failure::Geometry(_) => 2,
+            | Failure::Geometry(_)
+            | Failure::Formula(_) => 2,
             Failure::Run { .. }
             | Failure::Step(_)
+            | Failure::Sensitivity(_)
+            | Failure::Fit(_)
             | Failure::Exact(_)
             | Failure::Statements { .. }
             | Failure::Bounds { .. } => 1,
