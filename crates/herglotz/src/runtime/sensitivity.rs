@@ -2,8 +2,8 @@
 
 use crate::runtime::member_derivatives::of_expression;
 use crate::runtime::{Motion, RunMonitor, RuntimeError, System, velocity_name};
-use discrete_herglotz::{Status, UnresolvedStep};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
+use discrete_herglotz::{Status, UnresolvedStep};
 use formula_lagrangian::{Expression, nearest_name};
 
 /// A state of a motion, or the derivative of one.
