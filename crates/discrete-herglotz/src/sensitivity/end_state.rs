@@ -70,28 +70,27 @@ impl<const N: usize> EndCovector<N> {
 impl<const N: usize> EndState<N> {
     /// A loss of this state, with its partial derivatives.
     pub fn differentiate(&self, loss: &impl Loss<N>) -> (f64, EndCovector<N>) {
-        let along = |seeds: &dyn Fn(&mut EndState<N, Dual<f64, ChartVector<N>>>)| {
-            let EndState { t, q, v, p, z } = self;
-            let constant = |x: &SVector<f64, N>| x.map(Dual::from);
-            let (t, z) = (Dual::from(*t), Dual::from(*z));
-            let mut state = EndState { t, q: constant(q), v: constant(v), p: constant(p), z };
-            seeds(&mut state);
-            loss.value(&state)
-        };
-        let value = along(&|state| {
-            for i in 0..N {
-                state.q[i].d.x[i] = 1.0;
-                state.p[i].d.y[i] = 1.0;
-            }
-            state.z.d.z = 1.0;
-        });
-        let rest = along(&|state| {
-            for i in 0..N {
-                state.v[i].d.x[i] = 1.0;
-            }
-            state.t.d.z = 1.0;
-        });
+        let mut seeded = self.constant();
+        for i in 0..N {
+            seeded.q[i].d.x[i] = 1.0;
+            seeded.p[i].d.y[i] = 1.0;
+        }
+        seeded.z.d.z = 1.0;
+        let value = loss.value(&seeded);
+        let mut seeded = self.constant();
+        for i in 0..N {
+            seeded.v[i].d.x[i] = 1.0;
+        }
+        seeded.t.d.z = 1.0;
+        let rest = loss.value(&seeded);
         (value.re, EndCovector { t: rest.d.z, q: value.d.x, v: rest.d.x, p: value.d.y, z: value.d.z })
+    }
+
+    /// The state as constants, for which derivatives are seeded afterwards.
+    fn constant(&self) -> EndState<N, Dual<f64, ChartVector<N>>> {
+        let EndState { t, q, v, p, z } = self;
+        let [q, v, p] = [q, v, p].map(|x| x.map(Dual::from));
+        EndState { t: Dual::from(*t), q, v, p, z: Dual::from(*z) }
     }
 }
 

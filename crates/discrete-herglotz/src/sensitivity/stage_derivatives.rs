@@ -138,7 +138,7 @@ impl<const N: usize> StageDerivatives<N> {
             self.end_p[d] = (step.start.p[d] + end_value::<S>(forward, &step.force[d])) / self.end_rho;
         }
         forget_branches();
-        if !(self.evaluate_in_lanes::<S, L>(lagrangian) && !branched()) {
+        if !self.evaluate_in_lanes::<S, L>(lagrangian) || branched() {
             for i in 0..s {
                 self.evaluate_stage(lagrangian, i)?;
             }
