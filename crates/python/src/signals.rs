@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 /// The time between two checks for signals: short for a user, long for a run.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
+/// The stack size of the thread of a computation, 8 MiB: that of a main thread. Numbers that carry derivatives are large.
+const STACK_SIZE: usize = 1 << 23;
+
 /// The time of the last check, and the exception that a signal handler has raised.
 struct SignalState(Instant, Option<PyErr>);
 
@@ -69,7 +72,7 @@ pub fn with_signals<T: Send>(
     let (found, raised) = py.detach(move || {
         std::thread::scope(|scope| {
             let (flag, mut raised) = (&ended, None);
-            let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
+            let worker = std::thread::Builder::new().stack_size(STACK_SIZE).spawn_scoped(scope, move || {
                 let found = work(flag);
                 // Dropping the sender wakes the waiting thread.
                 drop(done);

@@ -3,9 +3,8 @@
 import subprocess
 import sys
 
-import pytest
-
 import herglotz as hz
+import pytest
 
 
 def test_what_a_motion_does_not_need_is_loaded_later():

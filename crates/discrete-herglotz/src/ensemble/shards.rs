@@ -2,10 +2,15 @@
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
 
 /// The number of shards per thread that may be completed or in progress while an earlier shard is not completed: it
 /// bounds the memory, and is large enough that no thread waits for a shard that takes several times longer.
 pub(crate) const MAX_SHARDS_PER_THREAD: usize = 8;
+
+/// The stack size of a thread, 8 MiB: that of a main thread, so that a run that is possible there is possible here. Numbers
+/// that carry derivatives in many coordinates are large.
+const STACK_SIZE: usize = 1 << 23;
 
 /// The state that the threads share.
 struct Window<R> {
@@ -92,7 +97,8 @@ pub(crate) fn in_order<R: Send>(
     let most = MAX_SHARDS_PER_THREAD * threads;
     std::thread::scope(|scope| {
         for _ in 1..threads {
-            scope.spawn(|| {
+            // If a thread cannot be started, the others do its work.
+            let _ = Builder::new().stack_size(STACK_SIZE).spawn_scoped(scope, || {
                 let _guard = AtTheEnd(&shared, false);
                 loop {
                     let mut window = shared.wait_while(|w| !w.over && w.next < count && !w.has_work(count, most));

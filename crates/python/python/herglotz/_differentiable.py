@@ -52,7 +52,7 @@ class DifferentiableMotion:
         else:
             q, v, z = self._rows_of_ensemble(members)
         shape = np.broadcast_shapes(*self._batches(start))
-        return tuple(x.reshape(*shape, *x.shape[1:]) for x in (q, v, z))
+        return tuple(x.reshape((*shape, *x.shape[1:])) for x in (q, v, z))
 
     def batch_of_tangents(self, *start_and_tangents):
         """The derivatives of these rows along tangents of the start."""
@@ -73,7 +73,7 @@ class DifferentiableMotion:
             found = _completed(sensitivity_of(*self._request(members), variables))
             q, v, z = found.q, found.v, found.z
         of = np.broadcast_shapes(*self._batches(start))
-        q, v, z = (x.reshape(*of, *x.shape[1:]) for x in (q, v, z))
+        q, v, z = (x.reshape((*of, *x.shape[1:])) for x in (q, v, z))
         q, v = (np.einsum("...kiv,...v->...ki", x, tangent[..., moved]) for x in (q, v))
         return q, v, np.einsum("...kv,...v->...k", z, tangent[..., moved])
 
@@ -82,7 +82,7 @@ class DifferentiableMotion:
         start, covectors = start_and_covectors[:4], start_and_covectors[4:]
         batches = [*self._batches(start), *(x.shape[: x.ndim - axes] for x, axes in zip(covectors, (2, 2, 1)))]
         shape = np.broadcast_shapes(*batches)
-        wide = lambda x, own: np.broadcast_to(x, (*shape, *own)).reshape(-1, *own)
+        wide = lambda x, own: np.broadcast_to(x, (*shape, *own)).reshape((int(np.prod(shape)), *own))
         q, v, z = (wide(numbers(x), own) for x, own in zip(covectors, ((self.rows, self.n),) * 2 + ((self.rows,),)))
         alone, members = self._members(start, shape)
         if alone is None:
@@ -94,7 +94,7 @@ class DifferentiableMotion:
             of = _completed(pullback_of(*self._request(members), q=q, v=v, z=z))
             values = [of.parameters[name] for name in self.names]
             found = of.q0, of.v0, of.z0, np.stack(values, axis=-1) if values else np.zeros((len(q), 0))
-        return tuple(x.reshape(*shape, *x.shape[1:]) for x in found)
+        return tuple(x.reshape((*shape, *x.shape[1:])) for x in found)
 
     def _batches(self, start):
         return [x.shape[: x.ndim - axes] for x, axes in zip(start, (1, 1, 0, 1))]
@@ -109,7 +109,8 @@ class DifferentiableMotion:
         """The starts of the members of a batch, and its shape if they are run as an ensemble, which has no scales."""
         batch = np.broadcast_shapes(*self._batches(start)) if batch is None else batch
         own = (self.n,), (self.n,), (), (len(self.names),)
-        members = [np.broadcast_to(numbers(x), (*batch, *shape)).reshape(-1, *shape) for x, shape in zip(start, own)]
+        count = int(np.prod(batch))
+        members = [np.broadcast_to(numbers(x), (*batch, *shape)).reshape((count, *shape)) for x, shape in zip(start, own)]
         return (None if len(members[0]) == 1 or "scales" in self.options else batch), members
 
     def _rows_of(self, *start):
