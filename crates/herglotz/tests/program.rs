@@ -4,10 +4,10 @@
 
 #[path = "program/ends.rs"]
 mod ends;
-#[path = "program/fit.rs"]
-mod fit;
 #[path = "program/events.rs"]
 mod events;
+#[path = "program/fit.rs"]
+mod fit;
 #[path = "program/support.rs"]
 mod support;
 

@@ -67,7 +67,7 @@ pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
     Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
 };
-#[cfg(feature = "fits")]
-pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};
 pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};
+#[cfg(feature = "fits")]
+pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};

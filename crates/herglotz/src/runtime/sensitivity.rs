@@ -1,8 +1,8 @@
 //! Derivatives of motions.
 
 use crate::runtime::{Motion, RunMonitor, RuntimeError, System, velocity_name};
-use discrete_herglotz::{Status, UnresolvedStep};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
+use discrete_herglotz::{Status, UnresolvedStep};
 use formula_lagrangian::{Expression, ExpressionGradient, nearest_name};
 
 /// A state of a motion, or the derivative of one.

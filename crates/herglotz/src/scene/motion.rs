@@ -13,8 +13,8 @@ use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
 use super::{SceneError, overrides, start, tables};
 use crate::runtime::{
-    AfterReset, Column, Crossing, Event, InputError, Motion, MotionFit, RuntimeError, SelectionFailure, Start, StepControl,
-    StepError, System, Table, in_words, velocity_name,
+    AfterReset, Column, Crossing, Event, InputError, Motion, MotionFit, RuntimeError, SelectionFailure, Start,
+    StepControl, StepError, System, Table, in_words, velocity_name,
 };
 use std::path::Path;
 
