@@ -2,22 +2,24 @@
 
 use herglotz_fit::{Curve, FitError, FitStatus, LeastSquares};
 
-fn wave() -> (Vec<f64>, Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64>) {
-    let x: Vec<f64> = (0..100).map(|i| 0.2 * f64::from(i)).collect();
-    let model = Curve::new(["frequency", "phase"], x.clone(), |x, p, g| {
+fn points() -> Vec<f64> {
+    (0..100).map(|i| 0.2 * f64::from(i)).collect()
+}
+
+fn wave() -> Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64> {
+    Curve::new(["frequency", "phase"], points(), |x, p, g| {
         if p[0] < 0.0 {
             return f64::NAN;
         }
         let (s, c) = (p[0] * x + p[1]).sin_cos();
         g.copy_from_slice(&[x * c, c]);
         s
-    });
-    (x, model)
+    })
 }
 
 #[test]
 fn the_best_start_is_found_and_each_result_kept() {
-    let (x, model) = wave();
+    let (x, model) = (points(), wave());
     let y: Vec<f64> = x.iter().map(|x| (2.0 * x + 0.3).sin()).collect();
     let problem = LeastSquares::new(&model, &y).unwrap();
     // The cost has a minimum near every few multiples of 2 pi/20.
@@ -48,7 +50,7 @@ fn the_best_start_is_found_and_each_result_kept() {
 
 #[test]
 fn starts_without_a_fit() {
-    let (_, model) = wave();
+    let model = wave();
     let problem = LeastSquares::new(&model, &[0.5; 100]).unwrap();
     let fits = problem.solve_from(&[[-1.0, 0.0], [-2.0, 0.0]]);
     assert_eq!(fits.best_index(), None);
@@ -58,7 +60,7 @@ fn starts_without_a_fit() {
 
 #[test]
 fn a_minimum_is_better_than_a_lower_cost_at_the_limit() {
-    let (x, model) = wave();
+    let (x, model) = (points(), wave());
     let y: Vec<f64> = x.iter().map(|x| (2.0 * x + 0.3).sin()).collect();
     let problem = LeastSquares::new(&model, &y).unwrap();
     let minimum = problem.solve(&[0.3, 0.0]).unwrap();

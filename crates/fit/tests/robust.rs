@@ -6,19 +6,22 @@ use herglotz_fit::{Curve, LeastSquares, Loss, Model};
 use nalgebra::DMatrix;
 use noise::Noise;
 
-fn decay(count: usize) -> (Vec<f64>, Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64>) {
-    let x: Vec<f64> = (0..count).map(|i| 4.0 * i as f64 / count as f64).collect();
-    let model = Curve::new(["amplitude", "rate"], x.clone(), |x, p, g| {
+fn points(count: usize) -> Vec<f64> {
+    (0..count).map(|i| 4.0 * i as f64 / count as f64).collect()
+}
+
+fn decay(x: &[f64]) -> Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64> {
+    Curve::new(["amplitude", "rate"], x.to_vec(), |x, p, g| {
         let e = (-p[1] * x).exp();
         g.copy_from_slice(&[e, -p[0] * x * e]);
         p[0] * e
-    });
-    (x, model)
+    })
 }
 
 #[test]
 fn outliers_do_not_move_the_parameters() {
-    let (x, model) = decay(60);
+    let x = points(60);
+    let model = decay(&x);
     let mut noise = Noise::new(1);
     let mut y: Vec<f64> = x.iter().map(|x| 2.0 * (-1.1 * x).exp() + 0.01 * noise.normal()).collect();
     for i in (3..60).step_by(7) {
@@ -67,7 +70,8 @@ fn outliers_do_not_move_the_parameters() {
 
 #[test]
 fn without_outliers_robust_losses_agree_with_least_squares() {
-    let (x, model) = decay(40);
+    let x = points(40);
+    let model = decay(&x);
     let y: Vec<f64> = x.iter().enumerate().map(|(i, x)| 2.0 * (-x).exp() + 0.01 * (i as f64).sin()).collect();
     let problem = LeastSquares::new(&model, &y).unwrap();
     let least_squares = problem.solve(&[1.0, 2.0]).unwrap();
@@ -83,7 +87,8 @@ fn without_outliers_robust_losses_agree_with_least_squares() {
 /// The errors are normal with outliers; the standard errors are compared with the scatter of the estimates.
 #[test]
 fn standard_errors_are_those_of_a_monte_carlo_estimate() {
-    let (x, model) = decay(80);
+    let x = points(80);
+    let model = decay(&x);
     for loss in [Loss::Huber { scale: 0.03 }, Loss::Cauchy { scale: 0.05 }] {
         let mut noise = Noise::new(7);
         let (mut estimates, mut variances) = (Vec::new(), 0.0);

@@ -72,7 +72,7 @@ fn velocities_deviations_bounds_losses_starts_and_pieces() {
         let (x, v) = exact(t);
         let error = 0.01 * f64::sin(TAU * f64::from(i * i % 101) / 101.0);
         let x = if i == 50 { 3.0 } else { x + error };
-        let of_velocity = if i % 2 == 0 { format!("{:e},0.02", v - 2.0 * error) } else { ",".to_owned() };
+        let of_velocity = if i.is_multiple_of(2) { format!("{:e},0.02", v - 2.0 * error) } else { ",".to_owned() };
         format!("{t:e},{x:e},{of_velocity}")
     };
     let rows: Vec<String> = ["time,x,v,s".to_owned()].into_iter().chain((0..=100).map(row)).collect();
