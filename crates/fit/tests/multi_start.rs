@@ -2,12 +2,12 @@
 
 use herglotz_fit::{Curve, FitError, FitStatus, LeastSquares};
 
-fn times() -> Vec<f64> {
+fn points() -> Vec<f64> {
     (0..100).map(|i| 0.2 * f64::from(i)).collect()
 }
 
 fn wave() -> Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64> {
-    Curve::new(["frequency", "phase"], times(), |x, p, g| {
+    Curve::new(["frequency", "phase"], points(), |x, p, g| {
         if p[0] < 0.0 {
             return f64::NAN;
         }
@@ -19,7 +19,7 @@ fn wave() -> Curve<impl Fn(f64, &[f64], &mut [f64]) -> f64> {
 
 #[test]
 fn the_best_start_is_found_and_each_result_kept() {
-    let (x, model) = (times(), wave());
+    let (x, model) = (points(), wave());
     let y: Vec<f64> = x.iter().map(|x| (2.0 * x + 0.3).sin()).collect();
     let problem = LeastSquares::new(&model, &y).unwrap();
     // The cost has a minimum near every few multiples of 2 pi/20.
@@ -60,7 +60,7 @@ fn starts_without_a_fit() {
 
 #[test]
 fn a_minimum_is_better_than_a_lower_cost_at_the_limit() {
-    let (x, model) = (times(), wave());
+    let (x, model) = (points(), wave());
     let y: Vec<f64> = x.iter().map(|x| (2.0 * x + 0.3).sin()).collect();
     let problem = LeastSquares::new(&model, &y).unwrap();
     let minimum = problem.solve(&[0.3, 0.0]).unwrap();

@@ -15,7 +15,8 @@ def position(t, k=1.0, gamma=-0.1):
 
 
 def spring(data, unknowns=("k", "gamma"), t=T, q0=1.0, v0=0.0, **more):
-    return hz.fit(L, [q0], [v0], t, data, list(unknowns), **GUESS | more)
+    unknowns = unknowns if isinstance(unknowns, str) else list(unknowns)
+    return hz.fit(L, [q0], [v0], t, data, unknowns, **GUESS | more)
 
 
 def test_the_damped_spring_of_the_book_of_diffsol():

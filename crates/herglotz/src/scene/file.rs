@@ -54,7 +54,7 @@ pub(crate) struct File {
     pub sweep: Quantities<Values>,
     /// Data to which `herglotz fit` fits parameters and the initial state.
     #[serde(default)]
-    pub fit: Option<Location<FitTable>>,
+    pub fit: Option<Box<Location<FitTable>>>,
 }
 
 /// The Lagrangian.
