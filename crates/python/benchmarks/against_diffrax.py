@@ -20,7 +20,6 @@ import sys
 import jax
 import jax.numpy as jnp
 import numpy as np
-
 from against_heyoka import beside, median
 
 jax.config.update("jax_enable_x64", True)

@@ -36,7 +36,7 @@ struct Arguments {
 /// Two fits, of the beginnings of the motions and of the whole, which starts from the weights of the first: the end of a motion
 /// depends on the weights much more strongly than its beginning.
 const STAGES: [Stage; 2] =
-    [Stage { motions: 12, times: 5, evaluations: 20 }, Stage { motions: 12, times: 15, evaluations: 60 }];
+    [Stage { motions: 16, times: 5, evaluations: 20 }, Stage { motions: 16, times: 15, evaluations: 70 }];
 
 fn main() -> ExitCode {
     finish(run(&Arguments::parse()))
@@ -108,7 +108,7 @@ mod tests {
     use discrete_herglotz::sensitivity::EndState;
     use training::smallest_mass;
 
-    const SHORT: Stage = Stage { motions: 12, times: 5, evaluations: 20 };
+    const SHORT: Stage = STAGES[0];
 
     /// The adjoint and the tangents have the same gradient, and a few iterations find most of the motion.
     #[test]

@@ -18,7 +18,7 @@ use contact_examples::Failure;
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
 /// The number of neurons of the hidden layer.
-pub const HIDDEN: usize = 6;
+pub const HIDDEN: usize = 5;
 
 /// The inputs of the network.
 const INPUTS: [&str; 3] = ["cos(q1)", "cos(q2)", "cos(q1 - q2)"];

@@ -118,7 +118,8 @@ impl Training {
 
     /// Fits the weights to the angles, from those that the network has.
     pub fn fit(&self) -> Result<Fit, Failure> {
-        let fit = LeastSquares::new(self, &self.data)?.max_evaluations(self.evaluations);
+        // Longer first steps lead to motions far from the data.
+        let fit = LeastSquares::new(self, &self.data)?.max_evaluations(self.evaluations).step_bound(1.0)?;
         Ok(fit.solve(&self.network.parameters())?)
     }
 
@@ -183,6 +184,9 @@ impl Model for Training {
             let tangent = states(&network, *start, &self.times, variables, (STAGES, STEP)).map_err(undefined)?;
             if tangent.outcome.status != Status::Completed {
                 return Err(undefined(tangent.outcome.status));
+            }
+            if let Some(unresolved) = tangent.outcome.unresolved {
+                return Err(undefined(unresolved));
             }
             for row in &tangent.rows {
                 if smallest_mass(&network, &row.state).is_none() {
