@@ -1,7 +1,9 @@
 //! Integrators: the trait, the properties of a method and the options of its stepper.
 
 use crate::rules::Node;
-use crate::{InputError, Problem, SplittingScheme, Stepper};
+use crate::{InputError, Problem, SplittingScheme, StepError, Stepper};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::DMatrix;
 use std::borrow::Cow;
 
 /// The properties of an integrator.
@@ -102,6 +104,22 @@ pub trait Integrator<'a, L, const N: usize> {
     fn step_formula(&self) -> Option<StepFormula> {
         None
     }
+
+    /// The derivative of the state `(q, p, z)` at the end of a step in that at its start, as a matrix with the coordinates in
+    /// this order; for an integrator with [`StepFormula::Jacobian`]. The step has length h, and is given by its time and
+    /// state at the start and by its end. [`hamiltonian_flow_jacobian`](crate::theory::hamiltonian_flow_jacobian) is the matrix of a
+    /// discrete Lagrangian. The default is `None`.
+    ///
+    /// # Errors
+    /// [`StepError`] where the step is not differentiable.
+    fn step_jacobian(
+        &self,
+        _problem: &Problem<'a, L, N>,
+        _h: f64,
+        _step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        Ok(None)
+    }
 }
 
 /// The sub-flows of which a step consists.
@@ -113,6 +131,9 @@ pub enum StepFormula {
     Rule(&'static [Node]),
     /// Steps of the symmetric rule with these nodes, over the fractions of a step that are the substeps of a scheme.
     Composition(&'static [Node], SplittingScheme),
+    /// A step whose derivative in the state is the matrix [`Integrator::step_jacobian`]; that in parameters and in the step
+    /// size is not known.
+    Jacobian,
 }
 
 /// A kernel that takes the steps of an [`Integrator`] for many motions at once.

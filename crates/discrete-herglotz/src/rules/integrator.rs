@@ -1,11 +1,15 @@
 //! Discrete Lagrangians as integrators.
 
+use crate::error::step_error;
 use crate::integration::StepFormula;
 use crate::{
-    DiscreteLagrangian, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper, StepperOptions,
+    DiscreteLagrangian, InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper,
+    StepperOptions,
     rules::{AnyDiscreteLagrangian, Composition, Flow, Method, Quadrature, Rule},
+    theory::hamiltonian_flow_jacobian,
 };
-use contact_geom::Lagrangian;
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint};
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
@@ -35,6 +39,19 @@ pub trait DiscretizationMethod<'a, L, const N: usize> {
     /// The formula of its step, from which the tangent is computed; `None`, the default, where it is not implemented.
     fn step_formula(&self) -> Option<StepFormula> {
         None
+    }
+
+    /// The derivative of a step in the state at its start; see [`Integrator::step_jacobian`].
+    ///
+    /// # Errors
+    /// Those of [`Integrator::step_jacobian`].
+    fn step_jacobian(
+        &self,
+        _problem: &Problem<'a, L, N>,
+        _h: f64,
+        _step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        Ok(None)
     }
 }
 
@@ -66,6 +83,15 @@ macro_rules! integrates {
 
             fn step_formula(&self) -> Option<StepFormula> {
                 DiscretizationMethod::<'a, L, N>::step_formula(self)
+            }
+
+            fn step_jacobian(
+                &self,
+                problem: &Problem<'a, L, N>,
+                h: f64,
+                step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+            ) -> Result<Option<DMatrix<f64>>, StepError> {
+                DiscretizationMethod::<'a, L, N>::step_jacobian(self, problem, h, step)
             }
         }
     };
@@ -174,6 +200,20 @@ where
 
     fn discretise(&self, _: &Problem<'a, L, N>, h: f64) -> Result<D, InputError> {
         (self.make)(h)
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(StepFormula::Jacobian)
+    }
+
+    fn step_jacobian(
+        &self,
+        _: &Problem<'a, L, N>,
+        h: f64,
+        (t, start, end): (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        let ld = (self.make)(h).map_err(step_error)?;
+        hamiltonian_flow_jacobian(&ld, t, &DiscretePoint { q0: start.q, q1: end.q, z0: start.z }).map(Some)
     }
 }
 

@@ -3,6 +3,8 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+pub(crate) mod second_order;
+
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};

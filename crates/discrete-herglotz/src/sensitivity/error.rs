@@ -1,5 +1,6 @@
 //! Errors of derivatives of runs.
 
+use crate::sensitivity::Variable;
 use crate::{InputError, StepError};
 use contact_geom::UnknownParameter;
 use std::borrow::Cow;
@@ -25,6 +26,39 @@ pub enum SensitivityError {
         method: Cow<'static, str>,
         /// In which case, if not always.
         case: &'static str,
+    },
+    /// The integrator has no second derivatives.
+    #[error(
+        "second derivatives of runs by `{method}` are not implemented; choose `GaussCollocation` without impacts and \
+         resets, or differences of first derivatives"
+    )]
+    NoSecondTangent {
+        /// The name of the method.
+        method: Cow<'static, str>,
+    },
+    /// The steps can be differentiated with respect to the start alone.
+    #[error(
+        "runs by `{method}` are differentiable in the position, the velocity or momentum and the action of the start, \
+         but not in {variable}, because its discrete Lagrangian is a function of these alone; choose `GaussCollocation`"
+    )]
+    OnlyInStart {
+        /// The name of the method.
+        method: Cow<'static, str>,
+        /// The variable.
+        variable: Variable,
+    },
+    /// A direction has another number of components than there are variables, or one that is not finite.
+    #[error(
+        "direction {index} has {components} components for {variables} variables; pass a finite component for each \
+         variable"
+    )]
+    Direction {
+        /// The direction, counted from 0.
+        index: usize,
+        /// The number of its components.
+        components: usize,
+        /// The number of variables.
+        variables: usize,
     },
     /// A variable that the start of the problem does not have.
     #[error(

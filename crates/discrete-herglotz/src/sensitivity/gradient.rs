@@ -28,7 +28,9 @@ pub struct Gradient<const N: usize> {
     /// In the initial action.
     pub z: f64,
     /// In the parameters, in the order of [`Parametric::parameter_names`]; NaN for a parameter in which the steps of a
-    /// splitting are not differentiable, because its hypotheses hold only for one value.
+    /// splitting are not differentiable, because its hypotheses hold only for one value. For a
+    /// [`CustomMethod`](crate::CustomMethod), parameters and times are NaN: its discrete Lagrangian is differentiated in the
+    /// state alone.
     pub parameters: Vec<f64>,
     /// In the time of the start, for a fixed end time and a fixed number of steps.
     pub t0: f64,

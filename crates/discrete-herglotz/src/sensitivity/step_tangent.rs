@@ -80,7 +80,9 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
-            Some(formula) => Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula)?))),
+            Some(formula) => {
+                Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula, &steps.integrator)?)))
+            }
             None => refused(""),
         }
     }
@@ -108,6 +110,11 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
             StepTangent::Collocation(_) => None,
             StepTangent::Flow(engine) => engine.obstacle(parameter),
         }
+    }
+
+    /// Whether the steps are differentiable with respect to their start alone.
+    pub fn only_in_start(&self) -> bool {
+        matches!(self, StepTangent::Flow(engine) if engine.only_in_start())
     }
 
     /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.

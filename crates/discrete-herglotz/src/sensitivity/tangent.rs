@@ -216,6 +216,12 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
         let problem = plan.steps.problem;
         let columns = variables.iter().map(|v| v.column(problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
+        if engine.only_in_start()
+            && let Some(variable) = variables.iter().find(|variable| !variable.is_of_start())
+        {
+            let method = plan.steps.info.name.clone();
+            return Err(SensitivityError::OnlyInStart { method, variable: variable.clone() });
+        }
         if let Some(case) = columns.iter().find_map(|column| engine.obstacle(column.parameter?)) {
             return Err(no_tangent(&plan, case));
         }

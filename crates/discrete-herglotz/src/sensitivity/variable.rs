@@ -6,6 +6,7 @@ use crate::sensitivity::columns::Column;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric};
+use std::fmt::{Display, Formatter};
 
 /// A variable on which a run depends.
 ///
@@ -29,6 +30,20 @@ pub enum Variable {
     EndTime,
 }
 
+impl Display for Variable {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Variable::Position(i) => write!(f, "position {i}"),
+            Variable::Velocity(i) => write!(f, "velocity {i}"),
+            Variable::Momentum(i) => write!(f, "momentum {i}"),
+            Variable::Action => write!(f, "the action"),
+            Variable::Parameter(name) => write!(f, "the parameter `{name}`"),
+            Variable::StartTime => write!(f, "the time of the start"),
+            Variable::EndTime => write!(f, "the time of the end"),
+        }
+    }
+}
+
 impl Variable {
     /// All variables of a problem: the start in the order q, v or p, z; the parameters; the times.
     pub fn all<L: Parametric<N>, const N: usize>(problem: &Problem<'_, L, N>) -> Vec<Variable> {
@@ -36,6 +51,11 @@ impl Variable {
         let start = (0..N).map(Variable::Position).chain((0..N).map(rate)).chain([Variable::Action]);
         let parameters = problem.lagrangian.parameter_names().into_iter().map(Variable::Parameter);
         start.chain(parameters).chain([Variable::StartTime, Variable::EndTime]).collect()
+    }
+
+    /// Whether it is a component of the initial state.
+    pub(crate) fn is_of_start(&self) -> bool {
+        !matches!(self, Variable::Parameter(_) | Variable::StartTime | Variable::EndTime)
     }
 
     /// The tangent of the start along the variable, for a run of this number of steps.

@@ -6,6 +6,7 @@
 
 mod action_map;
 mod coefficients;
+mod discrete;
 mod drift;
 mod exponential_integrals;
 mod kick;
@@ -20,11 +21,13 @@ use crate::integration::StepFormula;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
-use crate::{Problem, StepError};
+use crate::{Integrator, Problem, StepError};
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{Parametric, PhasePoint};
+use discrete::DiscreteSteps;
 use rules::Rules;
 use splittings::{ActionFlows, DragFlows, LinearDragFlows};
+use std::sync::Arc;
 use sub_flow::SubFlow;
 
 /// The ends of a step.
@@ -53,6 +56,11 @@ trait SubFlows<const N: usize> {
     fn obstacle(&self, _parameter: usize) -> Option<&'static str> {
         None
     }
+
+    /// Whether the steps are differentiable with respect to their start alone: not in parameters, time and step size.
+    fn only_in_start(&self) -> bool {
+        false
+    }
 }
 
 /// The tangent of steps that are compositions of sub-flows, with its workspace.
@@ -67,7 +75,11 @@ pub(crate) struct FlowEngine<'a, const N: usize> {
 impl<'a, const N: usize> FlowEngine<'a, N> {
     /// # Errors
     /// Those of the steps of the method.
-    pub fn new<L: Parametric<N>>(problem: &Problem<'a, L, N>, formula: StepFormula) -> Result<Self, SensitivityError> {
+    pub fn new<L: Parametric<N>>(
+        problem: &Problem<'a, L, N>,
+        formula: StepFormula,
+        integrator: &Arc<dyn Integrator<'a, L, N> + 'a>,
+    ) -> Result<Self, SensitivityError> {
         let lagrangian = problem.lagrangian;
         let mut of_parameters = ParameterDerivatives::new(lagrangian);
         let of = &mut of_parameters;
@@ -84,6 +96,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
                 let lengths = scheme.substeps().unwrap_or_else(|| vec![1.0]);
                 Box::new(Rules { lagrangian, nodes, lengths })
             }
+            StepFormula::Jacobian => Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone() }),
         };
         let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
         Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
@@ -92,6 +105,11 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
     /// Why the steps are not differentiable in a parameter, if they are not.
     pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
         self.obstacles.get(parameter).copied().flatten()
+    }
+
+    /// Whether the steps are differentiable with respect to their start alone.
+    pub fn only_in_start(&self) -> bool {
+        self.method.only_in_start()
     }
 
     fn linearise(&mut self, step: &StepEnds<N>, with_sources: bool) -> Result<(), StepError> {
