@@ -101,10 +101,11 @@ evaluations = 500
     let numbers = |row: usize| -> Vec<f64> {
         fit.lines().nth(row).unwrap().split(',').filter_map(|entry| entry.parse().ok()).collect()
     };
-    // Within four standard errors of the truth: the errors are not larger than a normal deviate of variance 1/2.
+    // Within four standard errors of the truth. The motion decays in 20 units of time, 50 positions, a quarter of which
+    // count for each of four unknowns: the errors are about 0.01/sqrt(12) or less.
     for (row, expected) in [(1, 1.0), (2, -0.1), (4, 0.0)] {
         let [value, error, ..] = numbers(row)[..] else { panic!("{fit}") };
-        assert!((value - expected).abs() < 4.0 * error && error < 2e-3, "{fit}");
+        assert!((value - expected).abs() < 4.0 * error && error < 5e-3, "{fit}");
     }
     let residuals = at.read("out/residuals.csv");
     assert_eq!(residuals.lines().count(), 1 + 101 + 51);
@@ -141,7 +142,7 @@ fn what_the_data_do_not_determine_is_named() {
     let file = at.write("mass.toml", &of_mass);
     let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
     assert!(code == Some(1) && told.contains("the Jacobian has rank 2 of 3; the model does not change with"), "{told}");
-    assert!(told.contains("`k` : `m` = 1.0000 : 1."), "{told}");
+    assert!(told.contains("the model does not change with `k` : `m` = 1.0000 : "), "{told}");
     assert!(at.read("out/fit.csv").contains("\nk,"));
     at.write("data.csv", "t,x\n1,0.5\n");
     let file = at.write("few.toml", SPRING);
@@ -214,15 +215,19 @@ fn invalid_fits_are_refused_with_their_place() {
             "sigma.csv\"\nsigma = { x = \"s\" }",
             "line 13, column 7: line 3 of the file \"sigma.csv\" has \"-1\" for `s`; a standard deviation must be positive",
         ),
-        ("[\"x\"]", "[\"y\"]", "line 14, column 13: unknown name `y`; did you mean `x`?"),
-        ("[\"x\"]", "[\"t\"]", "line 14, column 12: the column `t` is the time"),
-        ("[\"x\"]", "[\"sigma\"]", "line 14, column 12: the column `sigma` contains `sigma` or `log_factor`"),
+        ("observe = [\"x\"]", "observe = [\"y\"]", "line 14, column 13: unknown name `y`; did you mean `x`?"),
+        ("observe = [\"x\"]", "observe = [\"t\"]", "line 14, column 12: the column `t` is the time"),
         (
-            "[\"x\"]",
-            "[\"e = energy\"]",
+            "observe = [\"x\"]",
+            "observe = [\"sigma\"]",
+            "line 14, column 12: the column `sigma` contains `sigma` or `log_factor`",
+        ),
+        (
+            "observe = [\"x\"]",
+            "observe = [\"e = energy\"]",
             "line 14, column 12: the file \"data.csv\" has no column `e`; its columns are t, x, s",
         ),
-        ("[\"x\"]", "[]", "line 14, column 11: nothing is observed"),
+        ("observe = [\"x\"]", "observe = []", "line 14, column 11: nothing is observed"),
         ("observe = [\"x\"]\n", "", "line 13, column 7: the column `s` is no quantity of the motion"),
         (
             "observe",

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! where `o_k(q)` are the outputs of one hidden layer, `o_k = sum_j b_kj (tanh(a_j . x(q) + c_j) - tanh(a_j . x(0) + c_j))`.
-//! M is positive definite for all weights, so that Herglotz' equation determines the acceleration. The inputs x are the
+//! But for round-off M is positive definite for all weights, so that Herglotz' equation determines the acceleration. The inputs x are the
 //! functions `cos q1, cos q2, cos(q1 - q2)`, by which every function of two angles that is even, such as those of a
 //! pendulum with a mirror plane, can be expressed.
 //!
