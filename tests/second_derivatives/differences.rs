@@ -112,7 +112,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
             let along = run().second_tangent_along(&variables, &units, until).unwrap();
             let hessian = run().hessian(&Mixture, &variables, until).unwrap();
             let direction: Vec<f64> = (0..count).map(|i| 0.4 - 0.3 * i as f64).collect();
-            let product = run().hessian_along(&Mixture, &variables, &[direction.clone()], until).unwrap();
+            let product = run().hessian_along(&Mixture, &variables, std::slice::from_ref(&direction), until).unwrap();
             (all.end.unwrap(), along.end.unwrap(), hessian.loss.unwrap(), product.loss.unwrap(), direction)
         };
         let (all, along, hessian, product, direction) = self.moved(&still, 0.0, run);

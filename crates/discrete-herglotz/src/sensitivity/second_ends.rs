@@ -1,7 +1,7 @@
 //! The second derivatives of the momentum at the start of a run, and of the velocity at its end.
 
+use crate::sensitivity::columns::Column;
 use crate::sensitivity::end_state::VelocityDependence;
-use crate::sensitivity::engine::Column;
 use crate::sensitivity::engine::second_order::SecondColumn;
 use crate::sensitivity::second_derivatives::{PointTangent, SecondDerivatives};
 use crate::sensitivity::{EndState, StateDerivative, Variable};

@@ -2,8 +2,9 @@
 
 use crate::Status;
 use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Until};
+use crate::sensitivity::columns::Column;
+use crate::sensitivity::engine::Engine;
 use crate::sensitivity::engine::second_order::{CarriedTangent, SecondColumn, SecondPush};
-use crate::sensitivity::engine::{Column, Engine};
 use crate::sensitivity::second_derivatives::SecondDerivatives;
 use crate::sensitivity::second_ends::{CarriedDerivatives, EndAlong, Pair, StartTangent};
 use crate::sensitivity::step_maps::Direction;

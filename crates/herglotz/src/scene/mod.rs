@@ -35,7 +35,6 @@ pub fn schema() -> serde_json::Value {
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
     #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
-    #[expect(clippy::large_enum_variant, reason = "no value of it exists")]
     enum AnyFile {
         System(file::File),
         Lattice(lattice::LatticeFile),
