@@ -3,6 +3,8 @@
 
 #[path = "discrete/boundary.rs"]
 mod boundary;
+#[path = "discrete/derivatives.rs"]
+mod derivatives;
 #[path = "discrete/ensembles.rs"]
 mod ensembles;
 #[path = "discrete/integrators.rs"]
@@ -59,11 +61,26 @@ pub const EXCEPTIONS: Exceptions = &[
     ("LyapunovExponents::*", "takes no number"),
     ("Run::lyapunov_exponents", "takes no number"),
     ("Run::lyapunov_exponents_within", "tests/gradients/lyapunov"),
+    ("Integrator::step_jacobian", "tests/discrete_tangents"),
+    ("DiscretizationMethod::step_jacobian", "tests/discrete_tangents"),
+    ("Integrator::step_formula", "takes no number"),
+    ("DiscretizationMethod::step_formula", "takes no number"),
+    ("Stepper::solved_stages", "takes no number"),
+    ("SolvedStages::*", "takes no number"),
+    ("EndCovector::zero", "takes no number"),
+    ("EndState::differentiate", "arithmetic: a derivative that is not finite follows from input that is not"),
+    ("Loss::value", "the implementor's"),
+    ("Run::tangent", "tests/gradients/invalid_input; the second derivatives here include it"),
+    ("Run::tangent_at", "tests/gradients/invalid_input"),
+    ("Run::record", "tests/gradients/invalid_input"),
+    ("Run::gradient*", "tests/gradients/invalid_input"),
+    ("RecordedRun::*", "tests/gradients/invalid_input"),
     ("Observer::*", "the implementor's; observers with odd requests are in the test of Run::observe"),
 ];
 
 pub const TESTS: &[&[InputTest]] = &[
     boundary::TESTS,
+    derivatives::TESTS,
     ensembles::TESTS,
     integrators::TESTS,
     lagrangians::TESTS,

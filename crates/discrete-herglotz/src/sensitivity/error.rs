@@ -39,7 +39,8 @@ pub enum SensitivityError {
     /// The steps can be differentiated with respect to the start alone.
     #[error(
         "runs by `{method}` are differentiable in the position, the velocity or momentum and the action of the start, \
-         but not in {variable}, because its discrete Lagrangian is a function of these alone; choose `GaussCollocation`"
+         but not in {variable}, because the dependence of its discrete Lagrangian on it is not known; choose \
+         `GaussCollocation`"
     )]
     OnlyInStart {
         /// The name of the method.

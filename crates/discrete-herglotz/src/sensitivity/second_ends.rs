@@ -123,7 +123,7 @@ impl<const N: usize> EndAlong<N> {
     /// the last term is the second derivative along the first ones.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where W is singular.
+    /// [`StepError::Singular`] where W is singular, [`StepError::NonFinite`] where a derivative is not finite.
     pub fn new<L: Parametric<N>>(
         problem: &Problem<'_, L, N>,
         state: EndState<N>,
@@ -160,7 +160,14 @@ impl<const N: usize> EndAlong<N> {
                 second[*i][*d] = derivative;
             }
         }
+        if !columns.iter().map(|column| &column.state).chain(second.iter().flatten()).all(is_finite) {
+            return Err(StepError::NonFinite);
+        }
         let growth = if largest > size { largest / size } else { 1.0 };
         Ok(EndAlong { state, columns, along, second, growth })
     }
+}
+
+fn is_finite<const N: usize>(of: &StateDerivative<N>) -> bool {
+    of.q.iter().chain(&of.v).chain(&of.p).chain([&of.z]).all(|x| x.is_finite())
 }
