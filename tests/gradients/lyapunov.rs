@@ -1,14 +1,16 @@
 //! Lyapunov exponents: those of a linear motion in closed form, and their pairing.
 
+use crate::gradients::impacts::Floor;
 use crate::gradients::runs::Method;
 use contact_geom::VelocityPoint;
 use contact_geom::numbers::max_or_nan;
+use contact_geom::switching::{Impact, Impacts};
 use contact_geom::systems::{
     Chain, CoupledInZ, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
-    visit_catalogue,
+    UniformField, visit_catalogue,
 };
 use discrete_herglotz::sensitivity::{LyapunovExponents, SensitivityError};
-use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Steps, TransformedGauss, Until, rules};
+use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Status, Steps, TransformedGauss, Until, rules};
 
 fn exponents<const N: usize, S: System<N>, M: Method>(
     system: &S,
@@ -117,6 +119,20 @@ fn a_chaotic_motion() {
         gauss.exponents,
         splitting.exponents
     );
+}
+
+/// A ball with drag above a floor: an elastic impact preserves the contact structure, so that the exponents of q and p have the
+/// sum of the drag's rate, up to the error of the steps that end at impacts.
+#[test]
+fn elastic_impacts_keep_the_pairing() {
+    let ball = Impacts::new(UniformField { field: [-1.0], gamma: -0.1 }, Floor, Impact::Elastic);
+    let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.37));
+    let found = run.lyapunov_exponents(Until::Time(14.8)).unwrap();
+    assert_eq!(found.outcome.status, Status::Completed);
+    assert!((found.rate + 0.1).abs() <= 1e-12, "{}", found.rate);
+    let sum: f64 = found.exponents.iter().sum();
+    assert!((sum - 2.0 * found.rate).abs() <= 1e-11, "{sum} and twice {}", found.rate);
 }
 
 #[test]

@@ -53,10 +53,10 @@ mod formula {
         v[0] * v[0] * 0.5 - q[0] * theta[0] - z * 0.05
     }
 
-    pub fn Disk<T: Scalar>(theta: &[T], t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let (zero, inside) = (T::zero(), Disk::surface(theta[1], t, q));
+    pub fn Region<T: Scalar>(theta: &[T], t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        let (zero, inside) = (T::zero(), Region::surface([theta[2], theta[3], theta[4]], t, q));
         let potential = inside.if_less(zero, theta[0] * (q[0] * 0.3 + 1.0), zero);
-        let mass = inside.if_less(zero, T::from(1.2), T::one());
+        let mass = inside.if_less(zero, theta[1], T::one());
         v.dot(v) * mass * 0.5 - potential - q[1] * 0.1 - z * 0.05
     }
 
@@ -242,49 +242,50 @@ fn refraction_and_reflection() {
     }
 }
 
-/// A disk of another potential, with an index of refraction for the mass too, that moves.
-struct Disk {
+/// A region with another potential and another mass: a disk, or for `curvature` 0 a strip, that moves.
+struct Region {
     height: f64,
+    mass: f64,
     radius: f64,
+    curvature: f64,
+    velocity: f64,
 }
 
-impl Disk {
-    fn surface<T: Scalar>(radius: T, t: T, q: &SVector<T, 2>) -> T {
-        let x = q[0] - t * 0.1;
-        x * x + q[1] * q[1] - radius * radius
+impl Region {
+    fn surface<T: Scalar>([radius, curvature, velocity]: [T; 3], t: T, q: &SVector<T, 2>) -> T {
+        let x = q[0] - t * velocity;
+        x * x + q[1] * q[1] * curvature - radius * radius
     }
 }
 
-impl Lagrangian<2> for Disk {
+impl Lagrangian<2> for Region {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        formula::Disk(&[self.height, self.radius].map(T::from), t, q, v, z)
+        formula::Region(&self.parameters().into_iter().map(T::from).collect::<Vec<_>>(), t, q, v, z)
     }
     fn switching_functions(&self, t: f64, x: &VelocityPoint<2>, values: &mut Vec<f64>) {
-        values.push(Disk::surface(self.radius, t, &x.q));
+        values.push(Region::surface([self.radius, self.curvature, self.velocity], t, &x.q));
     }
 }
 
-parametric!(Disk, 2, height, radius);
+parametric!(Region, 2, height, mass, radius, curvature, velocity);
 
+/// A jump of the potential alone, of the mass alone, and of both, at a surface that is straight or curved, at rest or moving;
+/// the motion enters and leaves the region, or is reflected by it.
 #[test]
-#[ignore = "forward and adjoint agree, but differ from the differences by 8e-3 in q0: which of the two is wrong is not known yet"]
-fn jumps_across_a_curved_surface_that_moves() {
-    for (height, switches) in [(0.2, 2), (3.0, 1)] {
-        let system = Disk { height, radius: 0.8 };
-        let start = VelocityPoint::new([-1.5, 0.2], [1.3, 0.1], 0.0);
-        let case = Case {
-            lagrangian: &system,
-            t0: 0.0,
-            start,
-            from_momentum: false,
-            t_end: 3.0,
-            steps: 5,
-            method: GaussCollocation { stages: 6 },
-        };
-        let (_, tangent, _) = case.agree("disk", 1e-11);
-        assert_eq!(tangent.switches.len(), switches, "height {height}");
-        case.compare("disk", 1e-11, 1e-5);
+fn jumps_across_surfaces() {
+    let jumps = [(0.2, 1.0, 2), (0.0, 1.2, 2), (0.0, 0.8, 2), (0.2, 1.2, 2), (3.0, 1.0, 1), (3.0, 1.2, 1)];
+    for (height, mass, switches) in jumps {
+        for (curvature, velocity) in [(0.0, 0.0), (0.0, 0.1), (1.0, 0.0), (1.0, 0.1)] {
+            let system = Region { height, mass, radius: 0.8, curvature, velocity };
+            let start = VelocityPoint::new([-1.5, 0.2], [1.3, 0.1], 0.0);
+            let method = GaussCollocation { stages: 6 };
+            let case = Case { lagrangian: &system, t0: 0.0, start, from_momentum: false, t_end: 3.0, steps: 5, method };
+            let name = format!("height {height}, mass {mass}, curvature {curvature}, velocity {velocity}");
+            let (_, tangent, _) = case.agree(&name, 1e-11);
+            assert_eq!(tangent.switches.len(), switches, "{name}");
+            case.compare(&name, 1e-11, 1e-5);
+        }
     }
 }
 

@@ -5,14 +5,14 @@
 //! `((v- - v+) . dp- + [L_q] . dq + [L_z] dz + [L_t] dt + [L_theta] dtheta - lambda (v+ . dg_q + dg_t)) / (v+ . g_q + g_t)`
 //! with the jumps [] from before to after, each at its own velocity.
 
-use crate::StepError;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::switch::{Argument, Switch, difference};
 use crate::sensitivity::{PartPoint, SensitivityError};
+use crate::{StepError, theory::legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
-use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
 
 /// The distance from the surface of the first of three points from which one-sided limits are extrapolated, relative to
 /// the position and to its change in a step.
@@ -35,29 +35,41 @@ pub(crate) struct CornerDerivatives<const N: usize> {
     normal_parameters: Vec<SVector<f64, N>>,
 }
 
-/// The first derivatives of L on one side.
+/// The velocity of a momentum and the first derivatives of L on one side.
 struct OneSided<const N: usize> {
+    v: SVector<f64, N>,
     gradient: ChartVector<N>,
     time: f64,
     parameters: Vec<f64>,
 }
 
 impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
-    /// The derivatives of L at a velocity, as limits from the side where `g` has the sign of `toward`, times its normal.
-    fn one_sided(&self, v: &SVector<f64, N>, toward: &SVector<f64, N>) -> OneSided<N> {
+    /// The velocity of a momentum and the derivatives of L there, as limits from the side to which `toward` points. On the
+    /// surface itself the mass may be that of either side.
+    ///
+    /// # Errors
+    /// Those of [`legendre_inverse`].
+    fn one_sided(
+        &self,
+        p: SVector<f64, N>,
+        guess: &SVector<f64, N>,
+        toward: &SVector<f64, N>,
+    ) -> Result<OneSided<N>, StepError> {
         let lagrangian = self.problem.lagrangian;
         let mut of = ParameterDerivatives::new(lagrangian);
         let zero = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
-        let mut sum = OneSided { gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
+        let mut sum = OneSided { v: zero.x, gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
         for (weight, k) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
-            let (t, x) = (self.at.t, VelocityPoint { q: self.at.state.q + toward * k, v: *v, z: self.at.state.z });
+            let (t, state) = (self.at.t, PhasePoint { q: self.at.state.q + toward * k, p, z: self.at.state.z });
+            let x = legendre_inverse(lagrangian, t, &state, guess)?;
+            sum.v += x.v * weight;
             sum.gradient = sum.gradient.plus(lagrangian.gradient(t, &x).scale(weight));
             sum.time += weight * of.at(lagrangian, Quantity::Time, t, &x).l;
             for (index, parameter) in sum.parameters.iter_mut().enumerate() {
                 *parameter += weight * of.at(lagrangian, Quantity::Parameter(index), t, &x).l;
             }
         }
-        sum
+        Ok(sum)
     }
 
     /// The normal `g_q` and the rate `g_t` of the surface, at a point that is moved, by differences.
@@ -93,14 +105,15 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         let in_time = second(Argument::Time)?;
         let in_parameters = (0..count).map(|k| second(Argument::Parameter(k))).collect::<Result<Vec<_>, _>>()?;
 
-        let (v_before, v_after) = (self.at.v, next.v);
         let size = max_abs_or_nan(self.at.state.q.iter().copied());
-        let moved = max_abs_or_nan(v_before.iter().map(|v| v * self.h));
+        let moved = max_abs_or_nan(self.at.v.iter().map(|v| v * self.h));
         let length = SURFACE_DISTANCE * if max_or_nan(size, moved) > 0.0 { max_or_nan(size, moved) } else { 1.0 };
         let side = if self.rising { -1.0 } else { 1.0 };
         let toward = normal * (side * length / normal.norm());
-        let before = self.one_sided(&v_before, &toward);
-        let after = self.one_sided(&v_after, &if is_refracted { -toward } else { toward });
+        let from = if is_refracted { -toward } else { toward };
+        let before = self.one_sided(self.at.state.p, &self.at.v, &toward).map_err(|cause| self.failed(cause))?;
+        let after = self.one_sided(next.state.p, &next.v, &from).map_err(|cause| self.failed(cause))?;
+        let (v_before, v_after) = (before.v, after.v);
 
         let lambda = (next.state.p - self.at.state.p).dot(&normal) / normal.dot(&normal);
         let divisor = v_after.dot(&normal) + rate;

@@ -18,6 +18,9 @@ use std::ops::ControlFlow;
 /// They are those of the discrete run. Without an applied force, the sum of all `2n + 1` exponents is `n + 1` times
 /// [`rate`](Self::rate), to round-off. If `L_z` is constant too, one of them equals the rate, and the others are `n` pairs
 /// of this sum, to round-off, after any number of steps.
+///
+/// The tangent is carried across kinks, jumps and impacts. Steps that meet an elastic impact have these sums up to their error,
+/// and those that meet another reset do not have them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LyapunovExponents<const N: usize> {
     /// The outcome of the run. Where it ended early, the exponents are those of its whole steps.
