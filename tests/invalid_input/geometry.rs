@@ -32,6 +32,13 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Scalar::piecewise", "the caller's function; tables are tested"),
     ("Statement::*", "takes no number but its own; its test tries all"),
     ("ChartVector::from_fn", "the caller's function"),
+    ("Parametric::*", "the implementor's; those of the catalogue are compared with differences in tests/gradients"),
+    ("ParametricForce::*", "the implementor's; tests/gradients/forces"),
+    ("Surface::parameter*", "the implementor's, and none by default; tests/gradients/impacts"),
+    ("Surface::value_at", "the implementor's; tests/gradients/impacts"),
+    ("Surface::with_parameters", "the implementor's; tests/gradients/impacts"),
+    ("Impact::parameter_name", "takes no number"),
+    ("nearest_name", "takes no number"),
     ("$name::new", "stores its arguments; check() and every start check them"),
 ];
 
