@@ -6,7 +6,7 @@ use contact_geom::numbers::max_or_nan;
 use contact_geom::systems::{Kepler, Pendulum, System};
 use contact_geom::{Forced, Parametric, Scalar, VelocityDrag, VelocityPoint, legendre};
 use discrete_herglotz::sensitivity::{EndState, Gradient, Loss, StateDerivative, Variable};
-use discrete_herglotz::{GaussCollocation, Problem, Start, Steps, Until};
+use discrete_herglotz::{GaussCollocation, Problem, Start, Status, Steps, Until};
 
 /// A run whose derivatives are compared.
 struct Case<'a, L, const N: usize> {
@@ -113,6 +113,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
             let hessian = run().hessian(&Mixture, &variables, until).unwrap();
             let direction: Vec<f64> = (0..count).map(|i| 0.4 - 0.3 * i as f64).collect();
             let product = run().hessian_along(&Mixture, &variables, std::slice::from_ref(&direction), until).unwrap();
+            assert_eq!(all.outcome.status, Status::Completed, "{name}");
             (all.end.unwrap(), along.end.unwrap(), hessian.loss.unwrap(), product.loss.unwrap(), direction)
         };
         let (all, along, hessian, product, direction) = self.moved(&still, 0.0, run);
@@ -180,7 +181,7 @@ fn kepler_with_drag() {
         start: kepler.initial(),
         from_momentum: false,
         t_end,
-        steps: 12,
+        steps: 30,
         stages: 6,
         distance,
     };
@@ -189,7 +190,7 @@ fn kepler_with_drag() {
         Forced { lagrangian: kepler, force: VelocityDrag { linear: SVector::from([0.1, 0.2]), quadratic: 0.3 } };
     for from_momentum in [false, true] {
         let start = kepler.initial();
-        let case = Case { lagrangian: &forced, t0, start, from_momentum, t_end, steps: 10, stages: 5, distance };
+        let case = Case { lagrangian: &forced, t0, start, from_momentum, t_end, steps: 30, stages: 5, distance };
         case.compare("Kepler with a drag of the velocity", 1e-8);
     }
 }
