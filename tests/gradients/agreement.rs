@@ -7,7 +7,7 @@ use discrete_herglotz::GaussCollocation;
 /// Every system, from sampled states, with 1 to 16 stages, forward and backward in time, from velocities and momenta.
 ///
 /// Forward and backward derivatives differ by round-off, which the linear systems of the stages and the run itself
-/// amplify by less than 1e3. Differences are limited by the round-off of the run, 256 units of it, and by their order.
+/// amplify by less than 1e3. Differences are limited by the round-off of the run, 2048 units of it, and by their order.
 #[test]
 fn forward_backward_and_differences_agree() {
     struct Visit(u32);

@@ -2,10 +2,9 @@
 
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
+use discrete_herglotz::rules;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
-use discrete_herglotz::{
-    GaussCollocation, InputError, Problem, SplittingScheme, Status, Steps, TransformedGauss, Until,
-};
+use discrete_herglotz::{GaussCollocation, InputError, Problem, Status, Steps, TransformedGauss, Until};
 
 struct Constant(f64);
 
@@ -60,7 +59,7 @@ impl Parametric<1> for Kinked {}
 fn switching_functions() {
     let problem = Problem::new(&Kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let found =
-        problem.by(SplittingScheme::STRANG).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
+        problem.by(rules::Method::Midpoint).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
     assert!(found.unwrap_err().to_string().contains("switching functions"));
 }
 
@@ -76,24 +75,22 @@ fn losses_that_are_not_finite() {
     assert_eq!((value, gradient.q[0], gradient.parameters[0], gradient.t_end), (2.0, 0.0, 0.0, 0.0));
 }
 
-/// A run that fails has a status and no gradient; its tangent is that of the last state.
+/// A run that fails has a status and no gradient; its tangent is that of the last state. The square root is not defined
+/// below 0, where a fall from 1 arrives after a time of 1.4.
 #[test]
 fn runs_that_end_early() {
     struct Falling;
     impl Lagrangian<1> for Falling {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 + q[0].recip()
+            v[0] * v[0] * 0.5 - q[0] + q[0].sqrt() * 1e-3
         }
     }
     impl Parametric<1> for Falling {}
     let problem = Problem::new(&Falling, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
-    let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.01));
+    let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let found = run().gradient(&Constant(1.0), Until::Time(2.0)).unwrap();
     assert!(matches!(found.outcome.status, Status::Failed { .. }), "{}", found.outcome.status);
     assert!(found.loss.is_none());
-    // The derivatives of the last steps may not be finite, which is an error.
-    match run().tangent(&[Variable::Position(0)], Until::Time(2.0)) {
-        Ok(tangent) => assert!(tangent.outcome.status == found.outcome.status && tangent.columns[0].q[0].is_finite()),
-        Err(cause) => assert!(matches!(cause, SensitivityError::Step { .. }), "{cause}"),
-    }
+    let tangent = run().tangent(&[Variable::Position(0)], Until::Time(2.0)).unwrap();
+    assert!(tangent.outcome.status == found.outcome.status && tangent.columns[0].q[0].is_finite());
 }

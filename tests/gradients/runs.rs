@@ -88,12 +88,12 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
     }
 
     /// Central differences of the run, extrapolated four times: the error is of order ten in the distance, and round-off
-    /// of the run is divided by the smallest distance, 1/256 of a typical value.
+    /// of the run is divided by the smallest distance, 1/2048 of a typical value.
     fn difference(&self, variable: &Variable) -> StateDerivative<N> {
         const LEVELS: usize = 5;
         let mut table: Vec<StateDerivative<N>> = (0..LEVELS)
             .map(|level| {
-                let by = 0.0625 * 0.5_f64.powi(level as i32);
+                let by = 0.5_f64.powi(7 + level as i32);
                 let [a, b] = [by, -by].map(|by| self.moved(variable, by));
                 let over = |a: SVector<f64, N>, b: SVector<f64, N>| (a - b) / (2.0 * by);
                 StateDerivative {

@@ -148,9 +148,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         let end = stepper.state();
         let v = self.velocity(t, &end, stepper.last_velocity())?;
         let short = match step {
-            WholeStep::Collocation(_) => {
-                WholeStep::Collocation(Box::new(stepper.solved_stages().ok_or(StepError::NonFinite)?))
-            }
+            WholeStep::Collocation(_) => WholeStep::Collocation(stepper.solved_stages().ok_or(StepError::NonFinite)?),
             WholeStep::Flow(_) => WholeStep::Flow(StepEnds { t: t0, h: t - t0, start: *start, end }),
         };
         Ok((short, end, v))

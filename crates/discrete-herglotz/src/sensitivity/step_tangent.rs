@@ -20,9 +20,10 @@ pub(crate) enum TakenStep<const N: usize> {
 
 /// A step, or a part of one, that nothing interrupts.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
 pub(crate) enum WholeStep<const N: usize> {
     /// The stages of a collocation step.
-    Collocation(Box<SolvedStages<N>>),
+    Collocation(SolvedStages<N>),
     /// The ends of a step that consists of sub-flows.
     Flow(StepEnds<N>),
 }
@@ -95,7 +96,7 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
     pub fn taken(&self, stepper: &dyn Stepper<N>, h: f64, (t, start): (f64, PhasePoint<N>)) -> Option<TakenStep<N>> {
         match self {
             StepTangent::Collocation(_) => match stepper.solved_stages() {
-                Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(Box::new(stages)))),
+                Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(stages))),
                 None => Some(stepper.solved_parts()).filter(|parts| !parts.is_empty()).map(TakenStep::Parts),
             },
             StepTangent::Flow(_) => {

@@ -27,7 +27,7 @@ impl<'a, L, S: AsStepper<N>, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
         let point = |at: &TimedState<N>| PartPoint { t: at.t, state: at.state, v: at.v };
         let part = |of: &EndOfPart<N>| {
             let stages = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
-            let step = stages.map(|stages| WholeStep::Collocation(Box::new(stages)));
+            let step = stages.map(WholeStep::Collocation);
             let known = step.is_some() || !of.has_stepper;
             known.then(|| SolvedPart {
                 step,
