@@ -191,6 +191,7 @@ fn kepler_with_drag() {
     let forced = Forced { lagrangian: kepler, force };
     let start = VelocityPoint::new([1.0, 0.1], [0.2, 0.9], 0.3);
     for from_momentum in [false, true] {
+        let distance = 1.0 / 128.0;
         let case = Case { lagrangian: &forced, t0, start, from_momentum, t_end, steps: 30, stages: 5, distance };
         case.compare("Kepler with a drag of the velocity", 1e-8);
     }
