@@ -64,12 +64,11 @@ def test_bounds_starts_and_nodes():
     data = {"x": position(T)}
     held = spring(data, bounds={"gamma": (-0.05, 0.0)}, parameters={"k": 0.9, "gamma": -0.01})
     assert held.at_bounds == {"gamma": "lower"} and held["gamma"] == -0.05 and np.isnan(held.error("gamma"))
-    # A wrong frequency: one start ends in a local minimum, another does not, and pieces find it from the first.
+    # From a wrong frequency: the best of several starts, and pieces of the motion.
     wrong = dict(parameters={"k": 2.5, "gamma": -0.1})
-    one = spring(data, **wrong)
-    assert abs(one["k"] - 1) > 0.1
-    several = spring(data, starts=[{}, {"k": 1.05}], **wrong)
-    assert several.best_start == 1 and several.costs[1] < several.costs[0] and abs(several["k"] - 1) < 1e-8
+    several = spring(data, starts=[{"k": 1.2}, {"k": 1.05}], **wrong)
+    assert len(several.costs) == 2 and several.costs[several.best_start] == several.costs.min() and abs(several["k"] - 1) < 1e-8
+    one = spring(data, parameters={"k": 1.05, "gamma": -0.1})
     shooting = spring(data, nodes=np.arange(2.0, 40.0, 2.0), **wrong)
     assert abs(shooting["k"] - 1) < 1e-8 and shooting.largest_defect < 1e-8 and one.largest_defect is None
 
@@ -113,7 +112,6 @@ def test_what_the_data_do_not_determine_is_named():
         (dict(loss=("huber", -1.0)), "the scale of the loss is -1; it must be positive"),
         (dict(nodes=[50.0]), "the node 0 is at 50; nodes must ascend strictly"),
         (dict(starts=[{"m": 1.0}]), "`starts` has 'm', which is no unknown"),
-        (dict(force={"x": "-0.1*abs(x - 0.5)"}), "are not implemented; choose a Gauss method"),
     ],
 )
 def test_invalid_fits_are_refused(change, message):
@@ -123,8 +121,7 @@ def test_invalid_fits_are_refused(change, message):
 
 
 def test_residuals_are_plotted():
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
+    figure = pytest.importorskip("matplotlib.figure")
     found = spring({"x": position(T)})
-    ax = found.plot_residuals(ax=matplotlib.figure.Figure().subplots())
+    ax = found.plot_residuals(ax=figure.Figure().subplots())
     assert len(ax.lines) == 2 and ax.get_ylabel() == "residual"

@@ -243,7 +243,7 @@ pub(crate) fn in_words(error: &SensitivityError) -> String {
         SensitivityError::Input(error) => crate::runtime::in_words(error),
         SensitivityError::NoTangent { method, case } => format!(
             "derivatives of motions by {method}{case} are not implemented; Gauss methods such as \"gauss_8\" have those in all \
-             variables, splittings and quadrature rules such as \"strang\" and \"midpoint\" in most, all for a Lagrangian \
+             variables, splittings and quadrature rules such as \"strang\" and \"midpoint\" in most, the latter for a Lagrangian \
              without kinks, jumps and resets along the motion"
         ),
         error => error.to_string(),

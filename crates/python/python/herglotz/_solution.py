@@ -214,8 +214,8 @@ class Solution:
         """The derivatives of the rows with respect to variables, forward, by the tangents of the steps.
 
         They are those of the discrete motion, to round-off: of the steps that were given, or chosen for the accuracy,
-        whose number is fixed. The motion is run once more. Gauss methods have derivatives in all variables, splittings
-        and quadrature rules in most, for motions without kinks, jumps and resets.
+        whose number is fixed. The motion is run once more. Gauss methods have derivatives in all variables, across
+        kinks, jumps and resets too; splittings and quadrature rules have most, for motions without them.
 
         Parameters
         ----------
