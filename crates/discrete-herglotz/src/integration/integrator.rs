@@ -106,8 +106,8 @@ pub trait Integrator<'a, L, const N: usize> {
     }
 
     /// The derivative of the state `(q, p, z)` at the end of a step in that at its start, as a matrix with the coordinates in
-    /// this order; for an integrator with [`StepFormula::Jacobian`]. The step has length h, and is given by its time and
-    /// state at the start and by its end. [`hamiltonian_flow_jacobian`](crate::theory::hamiltonian_flow_jacobian) is the matrix of a
+    /// this order; for an integrator whose tangent is computed neither from stages nor from sub-flows. The step has length
+    /// h, and is given by its time and state at the start and by its end. [`hamiltonian_flow_jacobian`](crate::theory::hamiltonian_flow_jacobian) is the matrix of a
     /// discrete Lagrangian. The default is `None`.
     ///
     /// # Errors
