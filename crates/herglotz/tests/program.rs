@@ -242,7 +242,7 @@ fn plans_and_checks_say_what_holds() {
 }
 
 /// Pairs of exponents have the sum of the rate of the conformal factor, to round-off; without constant `L_z` only the sum
-/// of all is known; a motion with impacts is refused.
+/// of all is known; a lattice is refused.
 #[test]
 fn checks_have_lyapunov_exponents() {
     let of = |name: &str| -> serde_json::Value {
@@ -263,7 +263,7 @@ fn checks_have_lyapunov_exponents() {
         assert!(said.contains(part), "{part}: {said}");
     }
     let (code, said) = fail(&["check", &scene("kinks"), "--places", "1", "--lyapunov"]);
-    assert!(code == Some(2) && said.contains("are not implemented; Gauss methods"), "{said}");
+    assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{said}");
 }
 
 #[test]
@@ -305,7 +305,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 17, "{names:?}");
+    assert_eq!(names.len(), 18, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");

@@ -132,7 +132,7 @@ fn the_scene_of_a_fit_finds_its_values() {
     }
 }
 
-/// Data that do not determine the unknowns, and motions that cannot be computed.
+/// Data that do not determine the unknowns, and a scene without data.
 #[test]
 fn what_the_data_do_not_determine_is_named() {
     let at = Directory::new("fit_null");
@@ -153,14 +153,6 @@ fn what_the_data_do_not_determine_is_named() {
     let file = at.write("none.toml", SPRING.split("[fit]").next().unwrap());
     let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
     assert!(code == Some(2) && told.contains("none.toml: the scene has no data; add [fit]"), "{told}");
-    // A motion without tangents.
-    at.write("data.csv", &data(0.0));
-    let file = at.write("kink.toml", &SPRING.replace("k*x^2/2", "k*abs(x)"));
-    let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
-    assert!(
-        code == Some(2) && told.contains("kink.toml, line 10, column 14: derivatives of motions by gauss_8"),
-        "{told}"
-    );
 }
 
 #[test]
