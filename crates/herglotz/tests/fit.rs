@@ -123,21 +123,21 @@ fn invalid_fits_are_refused() {
         let unknowns: Vec<Unknown> = unknowns.iter().map(|name| Unknown::free(*name)).collect();
         MotionFit::new(motion(start.clone()), unknowns, [data])
     };
-    let told = |request: &MotionFit| system.fit(request, &mut ()).unwrap_err().to_string();
-    assert_eq!(told(&request(&["gama"], data())), "there is no variable `gama`; did you mean `gamma`?");
-    assert!(told(&request(&["t_end"], data())).starts_with("t_end cannot be an unknown of a fit"));
-    assert_eq!(told(&request(&[], data())), "the model has no parameters; there is nothing to fit");
+    let message = |request: &MotionFit| system.fit(request, &mut ()).unwrap_err().to_string();
+    assert_eq!(message(&request(&["gama"], data())), "there is no variable `gama`; did you mean `gamma`?");
+    assert!(message(&request(&["t_end"], data())).starts_with("t_end cannot be an unknown of a fit"));
+    assert_eq!(message(&request(&[], data())), "the model has no parameters; there is nothing to fit");
     let early = Series { times: vec![0.5, 2.0], ..data() };
-    assert!(told(&request(&["gamma"], early)).starts_with("the time 0 is 0.5; times must be finite"));
+    assert!(message(&request(&["gamma"], early)).starts_with("the time 0 is 0.5; times must be finite"));
     let at_start = Series { times: vec![1.0, 1.0], ..data() };
-    assert!(told(&request(&["gamma"], at_start)).starts_with("no value was observed after the start, at t0 = 1"));
+    assert!(message(&request(&["gamma"], at_start)).starts_with("no value was observed after the start, at t0 = 1"));
     let short = Series { values: vec![0.5], ..data() };
-    assert_eq!(told(&request(&["gamma"], short)), "values of a series: there are 1, but there must be 2");
+    assert_eq!(message(&request(&["gamma"], short)), "values of a series: there are 1, but there must be 2");
     let nan = Series { values: vec![0.5, f64::NAN], ..data() };
-    assert!(told(&request(&["gamma"], nan)).starts_with("the measured value 1 is NaN"));
+    assert!(message(&request(&["gamma"], nan)).starts_with("the measured value 1 is NaN"));
     let factor = Series { quantity: "sigma".into(), ..data() };
-    assert!(told(&request(&["gamma"], factor)).contains("contains `sigma` or `log_factor`"));
-    let few = told(&request(&["gamma", "theta", "theta'"], data()));
+    assert!(message(&request(&["gamma"], factor)).contains("contains `sigma` or `log_factor`"));
+    let few = message(&request(&["gamma", "theta", "theta'"], data()));
     assert!(few.contains("2 measured values cannot determine 3 parameters: the Jacobian has rank 2 of 3"), "{few}");
     // The strength of gravity and the length enter as a ratio.
     let system = System::parse("m*x'^2/2 - k*x^2/2", &["x"], &[("m", 1.0), ("k", 1.0)]).unwrap();

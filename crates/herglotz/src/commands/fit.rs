@@ -68,7 +68,7 @@ impl Fit {
         if self.json {
             print_json(&of_json(&fitted))?
         } else {
-            print(&told(&fitted))?
+            print(&summary(&fitted))?
         }
         let status = &fitted.fit.status;
         if status.is_converged() { Ok(()) } else { Err(Failure::Run(status.to_string())) }
@@ -162,7 +162,7 @@ fn of_json(fitted: &FittedMotion) -> serde_json::Value {
     })
 }
 
-fn told(fitted: &FittedMotion) -> String {
+fn summary(fitted: &FittedMotion) -> String {
     let fit = &fitted.fit;
     let has_several = fit.names.len() > 1;
     let header = ["unknown", "value", "standard error"].map(str::to_owned).into_iter();
