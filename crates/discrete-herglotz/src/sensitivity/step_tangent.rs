@@ -12,6 +12,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Parametric, PhasePoint};
 
 /// A step that was taken, with what its tangent needs.
+#[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
 pub(crate) enum TakenStep<const N: usize> {
     Whole(WholeStep<N>),
     /// The parts of a step that ends parts at zeros of switching functions and at breaks.
