@@ -1,10 +1,10 @@
 """Motions as differentiable functions of their start and parameters, for libraries of automatic differentiation."""
 
-import inspect
 
 import numpy as np
 
 from . import _core
+from ._arguments import Arguments
 from ._ensemble import ensemble, request_of
 from ._ensemble_derivatives import pullback_of, sensitivity_of
 from ._solve import solve
@@ -126,9 +126,7 @@ class DifferentiableMotion:
 
     def _request(self, members):
         given, named = self._arguments(members, self.t)
-        bound = _ENSEMBLE.bind(*given, **named)
-        bound.apply_defaults()
-        return request_of(**bound.arguments)[:2]
+        return request_of(**_ENSEMBLE.bind(given, named))[:2]
 
     def _ensemble(self, members, t):
         given, named = self._arguments(members, t)
@@ -148,7 +146,7 @@ class DifferentiableMotion:
         return many.q[:, ::2], many.v[:, ::2], many.z[:, ::2]
 
 
-_ENSEMBLE = inspect.signature(ensemble)
+_ENSEMBLE = Arguments(ensemble)
 
 
 def _completed(found):

@@ -1,11 +1,11 @@
 """Derivatives of the members of ensembles."""
 
-import inspect
 from typing import NamedTuple
 
 import numpy as np
 
 from . import _core
+from ._arguments import Arguments
 from ._ensemble import ensemble, request_of
 from ._sensitivity import names_of_variables, partials
 
@@ -112,17 +112,16 @@ def ensemble_value_and_grad(loss):
     """
 
     def run(*arguments, **named):
-        given = _SIGNATURE.bind(*arguments, **named)
-        given.apply_defaults()
+        given = _ENSEMBLE.bind(arguments, named)
         # As a column it is traced, and its parameters and tables are found.
-        of, request, _, columns = request_of(**given.arguments | {"observe": {"loss": loss}, "events": ()})
+        of, request, _, columns = request_of(**given | {"observe": {"loss": loss}, "events": ()})
         values, *gradients = _core.ensemble_value_and_gradient(of, request, columns[0])
         return values, _gradient(of, request, (values, *gradients))
 
     return run
 
 
-_SIGNATURE = inspect.signature(ensemble)
+_ENSEMBLE = Arguments(ensemble)
 
 
 def _gradient(system, request, found):

@@ -1,11 +1,11 @@
 """Derivatives of motions: forward, and by the adjoint."""
 
-import inspect
 from typing import NamedTuple
 
 import numpy as np
 
 from . import _core
+from ._arguments import Arguments
 from ._solve import request_of, solve
 
 
@@ -148,10 +148,9 @@ def value_and_grad(loss):
     """
 
     def run(*arguments, **named):
-        given = _SIGNATURE.bind(*arguments, **named)
-        given.apply_defaults()
+        given = _SOLVE.bind(arguments, named)
         # As a column it is traced, and its parameters and tables are found.
-        of, request, *_ = request_of(**given.arguments | {"observe": {"loss": loss}, "events": ()})
+        of, request, *_ = request_of(**given | {"observe": {"loss": loss}, "events": ()})
         (text,) = request[5]
         value, slopes = _core.value_and_gradient(_core.Motion(of, *request[:5], [], *request[6:]), text)
         return value, _gradient(of, request, slopes)
@@ -159,7 +158,7 @@ def value_and_grad(loss):
     return run
 
 
-_SIGNATURE = inspect.signature(solve)
+_SOLVE = Arguments(solve)
 
 
 def _gradient(system, request, slopes):
