@@ -10,7 +10,7 @@ NOTEBOOKS = sorted(Path(__file__).parent.parent.glob("notebooks/*.ipynb"))
 
 
 def test_there_are_notebooks():
-    assert [path.stem for path in NOTEBOOKS] == ["damped_pendulum", "paper_figures"]
+    assert [path.stem for path in NOTEBOOKS] == ["damped_pendulum", "herglotz_network", "paper_figures"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
