@@ -114,13 +114,15 @@ def test_what_is_pickled_is_the_same():
 
 
 def test_tables_and_plots(tmp_path):
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
     sol = pendulum(np.linspace(0, 10, 11), observe={"twice": "2*theta"}, conformal_factor=True)
     frame = sol.to_pandas()
     assert np.array_equal(frame["theta'"], sol.v[:, 0]) and np.array_equal(frame.index, sol.t)
     data = sol.to_xarray()
     assert np.array_equal(data["q"].sel(coordinate="theta"), sol.q[:, 0]) and data["twice"].dims == ("t",)
+    # Without axes of its own a plot continues the current ones, which another test may have left.
+    pyplot.close("all")
     axes = sol.plot("theta", "twice")
     assert len(axes.lines) == 2
     axes.figure.savefig(tmp_path / "plot.png")
