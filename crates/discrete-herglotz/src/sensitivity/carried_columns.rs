@@ -11,9 +11,9 @@ use contact_geom::Parametric;
 /// Columns, with the rows and the zeros of switching functions on their way.
 pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
     pub steps: &'r Discretization<'p, L, N>,
-    pub engine: StepTangent<'p, L, N>,
+    pub engine: StepTangent<'p, N>,
     /// For shortened steps and parts of steps.
-    pub row_engine: RowTangent<'p, L, N>,
+    pub row_engine: RowTangent<'p, N>,
     pub columns: Vec<Column<N>>,
     pub times: RowTimes,
     pub rows: Vec<TangentRow<N>>,
@@ -23,7 +23,7 @@ pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
 impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
     pub fn new(
         steps: &'r Discretization<'p, L, N>,
-        engine: StepTangent<'p, L, N>,
+        engine: StepTangent<'p, N>,
         columns: Vec<Column<N>>,
         times: RowTimes,
     ) -> Self {

@@ -15,16 +15,17 @@ use crate::sensitivity::linear_stages::{
 };
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
+use crate::sensitivity::stage_system::StageSystem;
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
+use contact_geom::{Parametric, VelocityPoint};
 use pulp::{Simd, WithSimd};
 
 /// The tangent of steps of one length in one direction, with its workspace.
-pub(crate) struct Engine<'a, L, const N: usize> {
-    lagrangian: &'a L,
+pub(crate) struct Engine<'a, const N: usize> {
+    system: &'a dyn StageSystem<N>,
     forward: StepMaps,
     maps: StepMaps,
     at: StageDerivatives<N>,
@@ -40,14 +41,14 @@ pub(crate) struct Engine<'a, L, const N: usize> {
     arch: Instructions,
 }
 
-impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
-    pub fn new(problem: &Problem<'a, L, N>, s: usize, h: f64, direction: Direction) -> Self {
+impl<'a, const N: usize> Engine<'a, N> {
+    pub fn new<L: Parametric<N>>(problem: &Problem<'a, L, N>, s: usize, h: f64, direction: Direction) -> Self {
         let lagrangian = problem.lagrangian;
         let at = StageDerivatives::new(problem);
         let velocity_terms = !at.form.separable || const { L::HINTS.forced };
         let condenses = !velocity_terms && at.form.affine && problem.structure.has_constant_rate();
         Engine {
-            lagrangian,
+            system: lagrangian,
             forward: StepMaps::new(s, h, Direction::Forward),
             maps: StepMaps::new(s, h, direction),
             linear: LinearStages::new(direction, !at.form.affine, velocity_terms),
@@ -62,7 +63,7 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
     }
 
     /// An engine for a shortened step, which is kept in `engine`.
-    pub fn of_row<'e>(
+    pub fn of_row<'e, L: Parametric<N>>(
         engine: &'e mut Option<Self>,
         problem: &Problem<'a, L, N>,
         step: &SolvedStages<N>,
@@ -94,13 +95,13 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
 
     /// Evaluates the derivatives at the stages of a step.
     #[inline(always)]
-    fn prepare<S: Simd>(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
+    fn prepare(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
         if self.actions.is_none() && !step.knows_l {
             let (t, x) =
                 (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
-            self.actions = self.forward.resolvent(-self.lagrangian.rate(t, &x));
+            self.actions = self.forward.resolvent(-self.system.rate_at(t, &x));
         }
-        self.at.evaluate::<S, L>(self.lagrangian, &self.forward, step, self.actions.as_ref())?;
+        self.system.evaluate(self.arch, &mut self.at, &self.forward, step, self.actions.as_ref())?;
         if self.condenses
             && !self.linear.is_condensed()
             && let Some(inverse) = &self.at.form.inverse_mass
@@ -176,11 +177,11 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
             let (t, x) = self.at.point(i);
             let mut of = QuantityDerivatives::ZERO;
             if let Some(k) = column.parameter {
-                of.add(1.0, &self.of_parameters.at(self.lagrangian, Quantity::Parameter(k), t, &x));
+                of.add(1.0, &self.system.quantity_at(&mut self.of_parameters, Quantity::Parameter(k), t, &x));
             }
             if moves {
                 let factor = start + c[i].0 * column.dh;
-                of.add(factor, &self.of_parameters.at(self.lagrangian, Quantity::Time, t, &x));
+                of.add(factor, &self.system.quantity_at(&mut self.of_parameters, Quantity::Time, t, &x));
             }
             let rho = self.at.rho.0[i];
             for d in 0..N {
@@ -236,51 +237,38 @@ impl<'a, L: Parametric<N>, const N: usize> Engine<'a, L, N> {
         covector.step += end_value::<S>(&self.forward, &stretch) / step.h;
         for index in 0..covector.parameters.len() {
             covector.parameters[index] +=
-                self.derivative_in::<S>(Quantity::Parameter(index), &covector.rates, &self.forward.weights.clone());
+                self.derivative_in(Quantity::Parameter(index), &covector.rates, &self.forward.weights.clone());
         }
         if self.timed {
             let weights = self.forward.weights;
-            let time = self.derivative_in::<S>(Quantity::Time, &covector.rates, &weights);
+            let time = self.derivative_in(Quantity::Time, &covector.rates, &weights);
             let moved = Stages(std::array::from_fn(|i| weights.0[i] * self.forward.times.0[i] / step.h));
             covector.time += time;
-            covector.step += k as f64 * time + self.derivative_in::<S>(Quantity::Time, &covector.rates, &moved);
+            covector.step += k as f64 * time + self.derivative_in(Quantity::Time, &covector.rates, &moved);
         }
     }
 
-    /// The derivative in a quantity over the step: `d(rho L_theta)[w] + rho f_theta . w_q` at the stages, with weights.
-    #[inline(always)]
-    fn derivative_in<S: Simd>(&mut self, quantity: Quantity, w: &StageTangent<N>, weights: &Stages) -> f64 {
-        let at = &self.at;
-        if let Some(sum) = self.of_parameters.sum_along::<S, L>(self.lagrangian, quantity, at, w, weights) {
-            return sum;
-        }
-        let mut sum = 0.0;
-        for i in 0..at.s {
-            let (t, x) = at.point(i);
-            let stage = |x: &[Stages; N]| SVector::<f64, N>::from_fn(|d, _| x[d].0[i]);
-            let tangent = ChartVector { x: stage(&w.q), y: stage(&w.v), z: w.z.0[i] };
-            let along = self.of_parameters.along(self.lagrangian, quantity, (t, &x, at.rho.0[i]), (&tangent, w.r.0[i]));
-            sum += weights.0[i] * along;
-        }
-        sum
+    /// The derivative in a quantity over the step, with weights.
+    fn derivative_in(&mut self, quantity: Quantity, w: &StageTangent<N>, weights: &Stages) -> f64 {
+        self.system.quantity_along(self.arch, &mut self.of_parameters, quantity, &self.at, (w, weights))
     }
 }
 
 /// Columns over a step, compiled for one instruction set.
-struct Push<'e, 'a, L, const N: usize> {
-    engine: &'e mut Engine<'a, L, N>,
+struct Push<'e, 'a, const N: usize> {
+    engine: &'e mut Engine<'a, N>,
     step: &'e SolvedStages<N>,
     k: usize,
     columns: &'e mut [Column<N>],
 }
 
-impl<L: Parametric<N>, const N: usize> WithSimd for Push<'_, '_, L, N> {
+impl<const N: usize> WithSimd for Push<'_, '_, N> {
     type Output = Result<f64, StepError>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Push { engine, step, k, columns } = self;
-        engine.prepare::<S>(step)?;
+        engine.prepare(step)?;
         let mut largest = 0.0;
         for column in columns {
             engine.push_column::<S>(step, k, column)?;
@@ -291,20 +279,20 @@ impl<L: Parametric<N>, const N: usize> WithSimd for Push<'_, '_, L, N> {
 }
 
 /// Covectors over a step, compiled for one instruction set.
-struct Pull<'e, 'a, L, const N: usize> {
-    engine: &'e mut Engine<'a, L, N>,
+struct Pull<'e, 'a, const N: usize> {
+    engine: &'e mut Engine<'a, N>,
     step: &'e SolvedStages<N>,
     k: usize,
     covectors: &'e mut [Covector<N>],
 }
 
-impl<L: Parametric<N>, const N: usize> WithSimd for Pull<'_, '_, L, N> {
+impl<const N: usize> WithSimd for Pull<'_, '_, N> {
     type Output = Result<(), StepError>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Pull { engine, step, k, covectors } = self;
-        engine.prepare::<S>(step)?;
+        engine.prepare(step)?;
         for covector in covectors {
             engine.pull_covector::<S>(step, k, covector)?;
             covector.largest = max_or_nan(covector.largest, covector.size());

@@ -276,7 +276,7 @@ pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
     steps: &'r Discretization<'p, L, N>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
-    tangent: RowTangent<'p, L, N>,
+    tangent: RowTangent<'p, N>,
 }
 
 impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
@@ -284,7 +284,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     /// steps.
     fn add(
         &mut self,
-        engine: &mut StepTangent<'p, L, N>,
+        engine: &mut StepTangent<'p, N>,
         step: &WholeStep<N>,
         k: usize,
         to: &mut Covector<N>,
@@ -299,7 +299,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     /// derivative in the time of this start.
     pub fn add_within(
         &mut self,
-        engine: &mut StepTangent<'p, L, N>,
+        engine: &mut StepTangent<'p, N>,
         step: &WholeStep<N>,
         to: &mut Covector<N>,
     ) -> Result<f64, StepError> {

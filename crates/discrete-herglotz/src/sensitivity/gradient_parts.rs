@@ -19,7 +19,7 @@ use contact_geom::{ChartVector, Parametric};
 /// Carries covectors over the parts of steps.
 pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
     pub steps: &'r Discretization<'p, L, N>,
-    pub tangent: RowTangent<'p, L, N>,
+    pub tangent: RowTangent<'p, N>,
 }
 
 impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
@@ -27,7 +27,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     /// first of them; `engine` is the tangent of whole steps.
     pub fn pull(
         &mut self,
-        engine: &mut StepTangent<'p, L, N>,
+        engine: &mut StepTangent<'p, N>,
         (parts, k): (&[SolvedPart<N>], usize),
         all: &mut [Covector<N>],
         rows: &mut RowCovectors<'_, 'p, L, N>,
@@ -70,7 +70,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     /// Carries covectors over a part; `times` are their derivatives in the time of its end, and then of its start.
     fn pull_part(
         &mut self,
-        engine: &mut StepTangent<'p, L, N>,
+        engine: &mut StepTangent<'p, N>,
         (part, k): (&SolvedPart<N>, usize),
         all: &mut [Covector<N>],
         times: &mut [f64],
@@ -128,7 +128,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     /// Carries covectors over a part for a fixed time of its end.
     fn pull_over(
         &mut self,
-        engine: &mut StepTangent<'p, L, N>,
+        engine: &mut StepTangent<'p, N>,
         part: &SolvedPart<N>,
         all: &mut [Covector<N>],
     ) -> Result<(), StepError> {

@@ -36,6 +36,7 @@ mod second_tangent;
 mod solved_part;
 mod solved_stages;
 mod stage_derivatives;
+mod stage_system;
 mod step_maps;
 pub(crate) mod step_tangent;
 mod switch;

@@ -56,7 +56,7 @@ pub(crate) struct SecondOrderRun<const N: usize> {
 /// Carries columns and second derivatives along a run.
 struct SecondColumns<'r, 'p, L, const N: usize> {
     plan: &'r Plan<'p, L, N>,
-    engine: Box<Engine<'p, L, N>>,
+    engine: Box<Engine<'p, N>>,
     of_two: SecondDerivatives<N>,
     columns: Vec<Column<N>>,
     /// The factors of the columns in each variable and in each direction.

@@ -56,26 +56,30 @@ impl<const N: usize> WholeStep<N> {
 }
 
 /// The tangent of the steps of an integrator, forward or as its adjoint.
-pub(crate) enum StepTangent<'a, L, const N: usize> {
+pub(crate) enum StepTangent<'a, const N: usize> {
     /// From the stages of contact Gauss collocation.
-    Collocation(Box<Engine<'a, L, N>>),
+    Collocation(Box<Engine<'a, N>>),
     /// From the sub-flows of a splitting, a rule or a composition.
     Flow(Box<FlowEngine<'a, N>>),
 }
 
-impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
+impl<'a, const N: usize> StepTangent<'a, N> {
     /// The tangent of the steps of a run.
     ///
     /// # Errors
     /// [`SensitivityError::NoTangent`] for an integrator without tangent; those of the steps of a splitting.
-    pub fn new(steps: &Discretization<'a, L, N>, direction: Direction) -> Result<Self, SensitivityError> {
+    pub fn new<L: Parametric<N>>(
+        steps: &Discretization<'a, L, N>,
+        direction: Direction,
+    ) -> Result<Self, SensitivityError> {
         let info = &steps.info;
         let refused = |case| Err(SensitivityError::NoTangent { method: info.name.clone(), case });
         if info.in_transformed_time || info.divides {
             return refused("");
         }
         if info.collocation.is_some() {
-            return Ok(Self::collocation(steps.problem, steps.stages(), steps.h, direction));
+            let engine = Engine::new(steps.problem, steps.stages(), steps.h, direction);
+            return Ok(StepTangent::Collocation(Box::new(engine)));
         }
         // Its steps near a surface would be those of another method.
         if steps.switches {
@@ -87,10 +91,6 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
             }
             None => refused(""),
         }
-    }
-
-    fn collocation(problem: &Problem<'a, L, N>, stages: usize, h: f64, direction: Direction) -> Self {
-        StepTangent::Collocation(Box::new(Engine::new(problem, stages, h, direction)))
     }
 
     /// The last step of a stepper, which started at the given time and state; `None` where its stages are not known.
@@ -145,11 +145,11 @@ impl<'a, L: Parametric<N>, const N: usize> StepTangent<'a, L, N> {
 }
 
 /// The tangent of shortened steps and of parts of steps, which is kept from one to the next.
-pub(crate) struct RowTangent<'a, L, const N: usize> {
-    collocation: Option<Engine<'a, L, N>>,
+pub(crate) struct RowTangent<'a, const N: usize> {
+    collocation: Option<Engine<'a, N>>,
 }
 
-impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
+impl<'a, const N: usize> RowTangent<'a, N> {
     pub fn new() -> Self {
         RowTangent { collocation: None }
     }
@@ -158,9 +158,9 @@ impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
-    pub fn push(
+    pub fn push<L: Parametric<N>>(
         &mut self,
-        steps: &mut StepTangent<'a, L, N>,
+        steps: &mut StepTangent<'a, N>,
         problem: &Problem<'a, L, N>,
         step: &WholeStep<N>,
         columns: &mut [Column<N>],
@@ -178,9 +178,9 @@ impl<'a, L: Parametric<N>, const N: usize> RowTangent<'a, L, N> {
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
-    pub fn pull(
+    pub fn pull<L: Parametric<N>>(
         &mut self,
-        steps: &mut StepTangent<'a, L, N>,
+        steps: &mut StepTangent<'a, N>,
         problem: &Problem<'a, L, N>,
         step: &WholeStep<N>,
         covectors: &mut [Covector<N>],

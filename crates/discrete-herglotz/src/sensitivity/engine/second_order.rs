@@ -11,9 +11,9 @@ use crate::sensitivity::SolvedStages;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::second_derivatives::{PointTangent, SecondDerivatives};
 use crate::sensitivity::stage_derivatives::{end_value, stage_values};
+use contact_geom::ChartVector;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::{ChartVector, Parametric};
 use pulp::{Simd, WithSimd};
 
 /// A tangent of a step: a combination of columns after the step, with their stages.
@@ -85,8 +85,8 @@ impl<const N: usize> SecondColumn<N> {
 }
 
 /// Second derivatives along a pair of tangents over a step, whose columns were carried over it.
-pub(crate) struct SecondPush<'e, 'a, L, const N: usize> {
-    pub engine: &'e mut Engine<'a, L, N>,
+pub(crate) struct SecondPush<'e, 'a, const N: usize> {
+    pub engine: &'e mut Engine<'a, N>,
     pub of_two: &'e mut SecondDerivatives<N>,
     pub step: &'e SolvedStages<N>,
     pub k: usize,
@@ -94,7 +94,7 @@ pub(crate) struct SecondPush<'e, 'a, L, const N: usize> {
     pub second: &'e mut SecondColumn<N>,
 }
 
-impl<L: Parametric<N>, const N: usize> SecondPush<'_, '_, L, N> {
+impl<const N: usize> SecondPush<'_, '_, N> {
     /// Carries the second derivatives from the start of the step to its end; returns the largest component.
     ///
     /// # Errors
@@ -105,7 +105,7 @@ impl<L: Parametric<N>, const N: usize> SecondPush<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> WithSimd for SecondPush<'_, '_, L, N> {
+impl<const N: usize> WithSimd for SecondPush<'_, '_, N> {
     type Output = Result<f64, StepError>;
 
     #[inline(always)]
@@ -144,7 +144,7 @@ impl<L: Parametric<N>, const N: usize> WithSimd for SecondPush<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Engine<'_, L, N> {
+impl<const N: usize> Engine<'_, N> {
     /// Sets the terms of the stage equations that are known: the second derivatives of the rates along the tangents, and
     /// the products of rates with derivatives of the step size.
     #[inline(always)]
@@ -182,7 +182,7 @@ impl<L: Parametric<N>, const N: usize> Engine<'_, L, N> {
         for i in 0..step.s {
             let (t, x) = self.at.point(i);
             let [of_a, of_b] = [a, b].map(|tangent| tangent.at_stage(i, k, c[i].0));
-            let of = of_two.at(self.lagrangian, (t, &x, self.at.rho.0[i]), &of_a, &of_b);
+            let of = self.system.second_at(of_two, (t, &x, self.at.rho.0[i]), &of_a, &of_b);
             for d in 0..N {
                 given.v_source[d].0[i] = of.momentum[d];
                 given.p_source[d].0[i] = of.force[d];
