@@ -235,12 +235,11 @@ impl<'a, const N: usize> Engine<'a, N> {
             subtract_product(&mut stretch, &w.p[d], &at.v[d]);
         }
         covector.step += end_value::<S>(&self.forward, &stretch) / step.h;
+        let weights = self.forward.weights;
         for index in 0..covector.parameters.len() {
-            covector.parameters[index] +=
-                self.derivative_in(Quantity::Parameter(index), &covector.rates, &self.forward.weights.clone());
+            covector.parameters[index] += self.derivative_in(Quantity::Parameter(index), &covector.rates, &weights);
         }
         if self.timed {
-            let weights = self.forward.weights;
             let time = self.derivative_in(Quantity::Time, &covector.rates, &weights);
             let moved = Stages(std::array::from_fn(|i| weights.0[i] * self.forward.times.0[i] / step.h));
             covector.time += time;
