@@ -249,15 +249,15 @@ fn checks_have_lyapunov_exponents() {
         serde_json::from_str(&succeed(&["check", &scene(name), "--places", "1", "--lyapunov", "--json"])).unwrap()
     };
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
-    let told = &of("double_pendulum")["lyapunov"];
-    assert_eq!((told["exponents"].as_array().unwrap().len(), told["pairs"].as_array().unwrap().len()), (5, 2));
-    let rate = number(&told["rate"]);
-    for pair in told["pairs"].as_array().unwrap() {
-        assert!((number(&pair[0]) + number(&pair[1]) - rate).abs() <= 1e-11, "{told}");
+    let lyapunov = &of("double_pendulum")["lyapunov"];
+    assert_eq!((lyapunov["exponents"].as_array().unwrap().len(), lyapunov["pairs"].as_array().unwrap().len()), (5, 2));
+    let rate = number(&lyapunov["rate"]);
+    for pair in lyapunov["pairs"].as_array().unwrap() {
+        assert!((number(&pair[0]) + number(&pair[1]) - rate).abs() <= 1e-11, "{lyapunov}");
     }
-    assert!(number(&told["pairing_defect"]) <= 1e-11 && number(&told["volume_defect"]) <= 1e-11, "{told}");
-    let told = &of("nonlinear")["lyapunov"];
-    assert!(told["pairing_defect"].is_null() && number(&told["volume_defect"]) <= 1e-10, "{told}");
+    assert!(number(&lyapunov["pairing_defect"]) <= 1e-11 && number(&lyapunov["volume_defect"]) <= 1e-11, "{lyapunov}");
+    let lyapunov = &of("nonlinear")["lyapunov"];
+    assert!(lyapunov["pairing_defect"].is_null() && number(&lyapunov["volume_defect"]) <= 1e-10, "{lyapunov}");
     let said = succeed(&["check", &scene("duffing"), "--places", "1", "--lyapunov"]);
     for part in ["Lyapunov exponents of ", "of the second half", "the sums of the pairs are ln(sigma_d)/h to "] {
         assert!(said.contains(part), "{part}: {said}");

@@ -249,3 +249,17 @@ def test_invalid_input(what):
     call, message = SAID[what]
     with pytest.raises(ValueError, match=f"(?s){message}"):
         call()
+
+
+@pytest.mark.parametrize(
+    "given, named, message",
+    [
+        ((), {}, "missing a required argument: 'L'"),
+        (("x'^2/2", [1.0], [0.0], 1.0, 2), {}, "too many positional arguments"),
+        (("x'^2/2", [1.0]), {"q0": [1.0]}, "multiple values for argument 'q0'"),
+        (("x'^2/2", [1.0], [0.0], 1.0), {"accurracy": 1e-8}, "unexpected keyword argument 'accurracy'"),
+    ],
+)
+def test_calls_that_solve_does_not_take_are_refused_by_name(given, named, message):
+    with pytest.raises(TypeError, match=message):
+        hz.value_and_grad("x")(*given, **named)

@@ -18,8 +18,7 @@ impl Spring {
     }
 
     /// The position at a time, from 1 at rest, for weak damping.
-    // Some targets do not use it.
-    #[allow(dead_code)]
+    #[allow(dead_code)] // Some test files do not use it.
     pub fn position(&self, t: f64) -> f64 {
         let (half, w) = (0.5 * self.c, (self.k - 0.25 * self.c * self.c).sqrt());
         (-half * t).exp() * ((w * t).cos() + half / w * (w * t).sin())
@@ -55,8 +54,7 @@ impl Parametric<1> for Spring {
 
 /// `L = m v^2/2 - k x^2/2`.
 #[derive(Clone, Copy, Debug)]
-// Some targets do not use it.
-#[allow(dead_code)]
+#[allow(dead_code)] // Some test files do not use it.
 pub struct Heavy {
     pub m: f64,
     pub k: f64,

@@ -43,11 +43,14 @@ fn exact_data_are_fitted_to_the_accuracy_of_the_motion() {
     let at = Directory::new("fit_exact");
     at.write("data.csv", &data(0.0));
     let file = at.write("scene.toml", SPRING);
-    let told = succeed(&["fit", &file, "--out", &at.path("out"), "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    assert_eq!((&told["converged"], &told["degrees_of_freedom"], &told["rank"]), (&true.into(), &99.into(), &2.into()));
+    let report = succeed(&["fit", &file, "--out", &at.path("out"), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(
+        (&report["converged"], &report["degrees_of_freedom"], &report["rank"]),
+        (&true.into(), &99.into(), &2.into())
+    );
     // As many as the task in another library's book is allowed to take, which takes 42.
-    assert!(told["iterations"].as_u64().unwrap() <= 10, "{told}");
+    assert!(report["iterations"].as_u64().unwrap() <= 10, "{report}");
     let fit = at.read("out/fit.csv");
     assert!(
         fit.starts_with("unknown,value,standard_error,bound,correlation with k,correlation with gamma\nk,"),
@@ -89,13 +92,16 @@ evaluations = 500
 "#;
     let text = SPRING.replace("unknowns = [\"k\", \"gamma\"]\n", options);
     let file = at.write("scene.toml", &text);
-    let told = succeed(&["fit", &file, "--out", &at.path("out"), "--plot"]);
+    let report = succeed(&["fit", &file, "--out", &at.path("out"), "--plot"]);
     assert!(
-        told.starts_with("converged: ")
-            && told.lines().any(|l| l.starts_with("start.x   1 ") && l.contains("held fixed")),
-        "{told}"
+        report.starts_with("converged: ")
+            && report.lines().any(|l| l.starts_with("start.x   1 ") && l.contains("held fixed")),
+        "{report}"
     );
-    assert!(told.contains("the pieces of the motion meet to") && told.contains("the cost from each start:"), "{told}");
+    assert!(
+        report.contains("the pieces of the motion meet to") && report.contains("the cost from each start:"),
+        "{report}"
+    );
     let fit = at.read("out/fit.csv");
     assert!(fit.lines().nth(3).unwrap().starts_with("start.x,1.0000000000000000e0,,fixed,"), "{fit}");
     let numbers = |row: usize| -> Vec<f64> {
@@ -122,8 +128,8 @@ evaluations = 500
 #[test]
 fn the_scene_of_a_fit_finds_its_values() {
     let at = Directory::new("fit_scene");
-    let told = succeed(&["fit", &scene("fit_spring"), "--out", &at.path("out")]);
-    assert!(told.starts_with("converged: "), "{told}");
+    let report = succeed(&["fit", &scene("fit_spring"), "--out", &at.path("out")]);
+    assert!(report.starts_with("converged: "), "{report}");
     let fit = at.read("out/fit.csv");
     // The data were made with these values and normal errors: four standard errors are exceeded once in 4000 fits.
     let truth = [2.0, -0.3, 1.0, 0.5];
@@ -140,19 +146,25 @@ fn what_the_data_do_not_determine_is_named() {
     let of_mass =
         SPRING.replace("x'^2/2", "m*x'^2/2").replace("k = 0.9", "k = 0.9, m = 1.0").replace("\"k\",", "\"k\", \"m\",");
     let file = at.write("mass.toml", &of_mass);
-    let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
-    assert!(code == Some(1) && told.contains("the Jacobian has rank 2 of 3; the model does not change with"), "{told}");
-    assert!(told.contains("the model does not change with `k` : `m` = 1.0000 : "), "{told}");
+    let (code, report) = fail(&["fit", &file, "--out", &at.path("out")]);
+    assert!(
+        code == Some(1) && report.contains("the Jacobian has rank 2 of 3; the model does not change with"),
+        "{report}"
+    );
+    assert!(report.contains("the model does not change with `k` : `m` = 1.0000 : "), "{report}");
     assert!(at.read("out/fit.csv").contains("\nk,"));
     at.write("data.csv", "t,x\n1,0.5\n");
     let file = at.write("few.toml", SPRING);
-    let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
-    assert_eq!(code, Some(2), "{told}");
-    assert!(told.contains("few.toml, line 13, column 7: 1 measured values cannot determine 2 parameters"), "{told}");
-    assert!(told.contains("the model does not change with `k` : `gamma` = 1.0000 :"), "{told}");
+    let (code, report) = fail(&["fit", &file, "--out", &at.path("out")]);
+    assert_eq!(code, Some(2), "{report}");
+    assert!(
+        report.contains("few.toml, line 13, column 7: 1 measured values cannot determine 2 parameters"),
+        "{report}"
+    );
+    assert!(report.contains("the model does not change with `k` : `gamma` = 1.0000 :"), "{report}");
     let file = at.write("none.toml", SPRING.split("[fit]").next().unwrap());
-    let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
-    assert!(code == Some(2) && told.contains("none.toml: the scene has no data; add [fit]"), "{told}");
+    let (code, report) = fail(&["fit", &file, "--out", &at.path("out")]);
+    assert!(code == Some(2) && report.contains("none.toml: the scene has no data; add [fit]"), "{report}");
 }
 
 #[test]
@@ -165,10 +177,11 @@ fn invalid_fits_are_refused_with_their_place() {
     at.write("start.csv", "t,x\n0,0.5\n0,0.6\n");
     at.write("sigma.csv", "t,x,s\n1,0.5,0.1\n2,0.5,-1\n");
     let with = SPRING.replace("csv = \"data.csv\"", "csv = \"data.csv\"\nobserve = [\"x\"]");
-    let told = |text: &str| {
+    let report = |text: &str| {
         let file = at.write("scene.toml", text);
-        let (code, told) = fail(&["fit", &file, "--out", &at.path("out")]);
-        (code == Some(2)).then(|| told.split_once("scene.toml, ").map_or(told.clone(), |(_, told)| told.to_owned()))
+        let (code, report) = fail(&["fit", &file, "--out", &at.path("out")]);
+        (code == Some(2))
+            .then(|| report.split_once("scene.toml, ").map_or(report.clone(), |(_, report)| report.to_owned()))
     };
     let changes = [
         (
@@ -268,5 +281,5 @@ fn invalid_fits_are_refused_with_their_place() {
         ("observe", "evaluations = 0\nobserve", "line 14, column 15: `evaluations` is 0"),
         ("time = 40.0", "time = -40.0", "line 12, column 1: a fit requires a motion forward in time"),
     ];
-    refuses_each(&with, &changes, told);
+    refuses_each(&with, &changes, report);
 }
