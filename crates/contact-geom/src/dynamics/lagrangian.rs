@@ -1,7 +1,7 @@
 //! Lagrangians L(t, q, v, z).
 
 use crate::switching::Control;
-use crate::{ChartVector, ForceStructure, Hessian, Scalar, Structure, VelocityPoint};
+use crate::{ChartVector, Defect, ForceStructure, Hessian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -24,6 +24,9 @@ pub struct Hints {
     pub interpreted: bool,
     /// Whether there may be an [applied force](Lagrangian::applied_force), as in [`Forced`](crate::Forced).
     pub forced: bool,
+    /// Whether it is given by a contact Hamiltonian, as [`OfHamiltonian`](crate::OfHamiltonian): its motions are computed
+    /// from the Hamiltonian and the momenta, and `W = L_vv` need not exist.
+    pub hamiltonian: bool,
 }
 
 impl Hints {
@@ -34,6 +37,7 @@ impl Hints {
         proved: false,
         interpreted: false,
         forced: false,
+        hamiltonian: false,
     };
 }
 
@@ -179,6 +183,23 @@ pub trait Lagrangian<const N: usize> {
     fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
         T::one()
     }
+
+    /// The contact Hamiltonian at a state with its derivatives `(H_q, H_p, H_z)`, where this Lagrangian is given by one;
+    /// see [`Hints::hamiltonian`]. By default it is not.
+    #[inline(always)]
+    fn hamiltonian_with_gradient<T: Scalar>(&self, _t: T, _x: &PhasePoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
+        None
+    }
+
+    /// The second derivatives of that contact Hamiltonian, with p in the place of v.
+    fn hamiltonian_hessian(&self, _t: f64, _x: &PhasePoint<N>) -> Option<Hessian<N>> {
+        None
+    }
+
+    /// The first claim on that contact Hamiltonian that is false at a state.
+    fn hamiltonian_defect(&self, _t: f64, _x: &PhasePoint<N>) -> Option<Defect> {
+        None
+    }
 }
 
 /// A Lagrangian without its closed derivatives: all derivatives are found by automatic differentiation, to compare the
@@ -187,7 +208,7 @@ pub trait Lagrangian<const N: usize> {
 pub struct WithoutClosedDerivatives<L>(pub L);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivatives<L> {
-    const HINTS: Hints = Hints { proved: false, interpreted: false, ..L::HINTS };
+    const HINTS: Hints = Hints { proved: false, interpreted: false, hamiltonian: false, ..L::HINTS };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
@@ -271,6 +292,20 @@ macro_rules! forward_lagrangian {
         #[inline(always)]
         fn dt_dtau<T: $crate::Scalar>(&$self, q: &SVector<T, N>) -> T {
             $to.dt_dtau(q)
+        }
+        #[inline(always)]
+        fn hamiltonian_with_gradient<T: $crate::Scalar>(
+            &$self,
+            t: T,
+            x: &$crate::PhasePoint<N, T>,
+        ) -> Option<(T, $crate::ChartVector<N, T>)> {
+            $to.hamiltonian_with_gradient(t, x)
+        }
+        fn hamiltonian_hessian(&$self, t: f64, x: &$crate::PhasePoint<N>) -> Option<$crate::Hessian<N>> {
+            $to.hamiltonian_hessian(t, x)
+        }
+        fn hamiltonian_defect(&$self, t: f64, x: &$crate::PhasePoint<N>) -> Option<$crate::Defect> {
+            $to.hamiltonian_defect(t, x)
         }
     };
     (of_force, $self:ident => $to:expr) => {

@@ -4,6 +4,7 @@
 mod action;
 pub(crate) mod blocks;
 mod breaks;
+mod contact_hamiltonian;
 mod control;
 mod derivatives;
 mod force;
@@ -23,6 +24,9 @@ mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
+pub use contact_hamiltonian::{
+    AsFunction, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, NoMomentum, OfHamiltonian, momentum,
+};
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
 pub use force::{Force, ForceStructure, Forced, VelocityDrag};
