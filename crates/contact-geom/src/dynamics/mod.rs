@@ -25,7 +25,8 @@ mod time_transformation;
 pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
 pub use contact_hamiltonian::{
-    AsFunction, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, NoMomentum, OfHamiltonian, momentum,
+    AsFunction, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, NoMomentum, OfHamiltonian,
+    ParametricHamiltonian, momentum,
 };
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};

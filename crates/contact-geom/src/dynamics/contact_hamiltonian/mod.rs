@@ -6,11 +6,13 @@ use nalgebra::SVector;
 mod derivatives;
 mod momentum;
 mod of_hamiltonian;
+mod parametric;
 mod structure;
 
 pub use derivatives::HamiltonianDerivatives;
 pub use momentum::{NoMomentum, momentum};
 pub use of_hamiltonian::OfHamiltonian;
+pub use parametric::ParametricHamiltonian;
 pub use structure::HamiltonianStructure;
 
 /// A contact Hamiltonian `H : R x T*Q x R -> R`, written once as a generic function of (t, q, p, z).

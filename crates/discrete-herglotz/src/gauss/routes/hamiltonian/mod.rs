@@ -22,7 +22,7 @@ use contact_geom::{Lagrangian, PhasePoint, numbers::max_or_nan};
 use newton::{FullNewton, SimplifiedNewton};
 use pulp::Simd;
 use std::array::from_fn;
-pub(crate) use tangent::step_jacobian;
+pub(crate) use tangent::{StepDerivatives, step_derivatives, step_jacobian};
 
 /// The state and the workspace of a step.
 ///
