@@ -27,7 +27,7 @@ pub fn cut<const N: usize>(system: &impl Lagrangian<N>, route: GaussRoute) -> St
         GaussRoute::Linear => all,
         GaussRoute::Condensed => Structure { quadratic: false, ..all },
         GaussRoute::ConstantMass => Structure { constant_mass: true, ..Structure::default() },
-        GaussRoute::General => Structure::default(),
+        GaussRoute::General | GaussRoute::Hamiltonian => Structure::default(),
     }
 }
 

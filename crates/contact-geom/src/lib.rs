@@ -52,7 +52,9 @@ pub mod numbers {
 /// Tools for the other crates of this project: derivatives by dual numbers, seeds, small linear systems, rounding.
 pub mod support {
     pub use crate::dynamics::nearest_name::nearest_name;
-    pub use crate::dynamics::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates};
+    pub use crate::dynamics::{
+        derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, rounding_at_state,
+    };
     pub use crate::forms::{conformality_with_jacobian, generic, seed};
     pub use crate::number::{KernelDual, legendre_polynomials, linear};
 }

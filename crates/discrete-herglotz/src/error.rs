@@ -96,6 +96,12 @@ pub enum InputError {
     /// The Lagrangian has no finite value or derivative at the start.
     #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
     Undefined,
+    /// A velocity has no momentum under a contact Hamiltonian.
+    #[error(
+        "the velocity at the start has no momentum: H_pp is singular, or no momentum was found with H_p = v; start from \
+         a momentum instead, with which every contact Hamiltonian can be run"
+    )]
+    NoMomentum,
     /// The number of stages of a collocation method is out of range.
     #[error("the number of stages is {found}; contact Gauss collocation has from 1 to 16")]
     Stages {

@@ -44,7 +44,7 @@ pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
 pub use parameters::{Parametric, ParametricForce, UnknownParameter};
 pub(crate) use parameters::{indexed_names, parametric_fields};
 pub use probe::check_closed_derivatives;
-pub use rounding::gradient_rounding;
+pub use rounding::{gradient_rounding, rounding_at_state};
 pub use structure::{Defect, Defects, Structure};
 pub use table::{Interpolation, Table, TableError};
 pub use time_transformation::TimeTransformation;

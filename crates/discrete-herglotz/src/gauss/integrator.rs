@@ -1,10 +1,13 @@
 //! Contact Gauss collocation as an integrator.
 
 use crate::gauss::checks::check_stages;
+use crate::gauss::routes::hamiltonian::step_jacobian;
 use crate::gauss::routes::transformed::StatedTransformation;
 use crate::gauss::{GaussStepper, TransformedStepper};
-use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
-use contact_geom::{Lagrangian, TimeTransformation};
+use crate::integration::{BatchKernel, StepFormula};
+use crate::{InputError, Integrator, MethodInfo, Problem, StepError, Stepper, StepperOptions};
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{Lagrangian, PhasePoint, TimeTransformation};
 
 /// Contact [`Gauss`](crate::gauss::Gauss) collocation with s = 1 to 16 stages, of order 2s, for every regular
 /// Lagrangian.
@@ -95,7 +98,26 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
-        Some(BatchKernel::Gauss { stages: self.stages })
+        // The batch evaluates L.
+        if const { L::HINTS.hamiltonian } { None } else { Some(BatchKernel::Gauss { stages: self.stages }) }
+    }
+
+    /// For a Lagrangian that is given by a contact Hamiltonian; all others have their tangents from the solved stages.
+    fn step_formula(&self) -> Option<StepFormula> {
+        if const { L::HINTS.hamiltonian } { Some(StepFormula::Jacobian) } else { None }
+    }
+
+    fn step_jacobian(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        (t, start, _): (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        if const { L::HINTS.hamiltonian } {
+            step_jacobian(problem, self.stages, h, (t, start)).map(Some)
+        } else {
+            Ok(None)
+        }
     }
 }
 

@@ -11,6 +11,7 @@ use crate::gauss::limits::{FIRST_NEWTON_PAUSE, MAX_LINEAR_DIMENSION};
 use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail;
 use crate::gauss::routes::general::General;
+use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::linear::Linear;
 use crate::gauss::routes::separable::SeparableStages;
 use crate::gauss::routes::{RouteState, StageRoute};
@@ -45,15 +46,23 @@ enum Route<'a, L, const N: usize> {
     Linear(Box<Linear<'a, L, N>>),
     Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
+    /// For a Lagrangian that is given by a contact Hamiltonian.
+    Hamiltonian(HamiltonianStages<'a, L, N>),
 }
 
-/// Evaluates an expression for the [`StageRoute`] of a run, compiled for each route.
+/// A route, the mass matrix of a condensed one, and the defect of its conformal factor.
+type SelectedRoute<'a, L, const N: usize> = (Route<'a, L, N>, Option<Box<SMatrix<f64, N, N>>>, f64);
+
+/// Evaluates an expression for the [`StageRoute`] of a run, compiled for each route that the Lagrangian can have: a
+/// Lagrangian that is given by a contact Hamiltonian has one of its own, and all others have the other three.
 macro_rules! with_route {
     ($route:expr, $run:ident => $value:expr) => {
         match $route {
-            Route::Linear($run) => $value,
-            Route::Condensed($run) => $value,
-            Route::General($run) => $value,
+            Route::Hamiltonian($run) if const { L::HINTS.hamiltonian } => $value,
+            Route::Linear($run) if const { !L::HINTS.hamiltonian } => $value,
+            Route::Condensed($run) if const { !L::HINTS.hamiltonian } => $value,
+            Route::General($run) if const { !L::HINTS.hamiltonian } => $value,
+            _ => unreachable!("the route is selected by the same constant"),
         }
     };
 }
@@ -119,8 +128,47 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         StepperOptions { action, check_resolution }: StepperOptions,
     ) -> Result<Self, InputError> {
         check_step(stages, h)?;
+        let Problem { lagrangian, t0, state, .. } = *problem;
+        let s = stages;
+        let (route, mass, of_sigma) = if const { L::HINTS.hamiltonian } {
+            let stages = HamiltonianStages::new(lagrangian, StageTable::new(s, h), &state, &problem.start.v);
+            (Route::Hamiltonian(stages), None, 0.0)
+        } else {
+            Self::route_of_lagrangian(problem, s, h, action)?
+        };
+        let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
+        Ok(GaussStepper {
+            lagrangian,
+            s,
+            h,
+            route: Box::new(route),
+            mass,
+            arch: Instructions::new(),
+            t0,
+            k: 0,
+            from,
+            solved: false,
+            newton: true,
+            solution: Solution::FixedPointIteration,
+            pause: 0,
+            pauses: FIRST_NEWTON_PAUSE,
+            newton_steps: 0,
+            of_sigma,
+            sequence: (s <= FEW_STAGES || check_resolution)
+                .then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
+            monitor: ResolutionMonitor::new(&state.q, &problem.start.v, h),
+        })
+    }
+
+    /// The least expensive route that the structure of L allows, with the mass matrix of a condensed route and the defect
+    /// of its conformal factor.
+    fn route_of_lagrangian(
+        problem: &Problem<'a, L, N>,
+        s: usize,
+        h: f64,
+        wants_z: bool,
+    ) -> Result<SelectedRoute<'a, L, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
-        let (s, wants_z) = (stages, action);
         let InitialMass { w, inverse } = InitialMass::of(problem)?;
         let condensed = is_separable(lagrangian, &structure) && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
@@ -147,28 +195,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let (physical, z_drives) = (Extension::new(Physical, t0, 0.0), depends_on_action(lagrangian, &structure));
             Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, z_drives, &state, &start.v))
         };
-        let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
-        Ok(GaussStepper {
-            lagrangian,
-            s,
-            h,
-            route: Box::new(route),
-            mass,
-            arch: Instructions::new(),
-            t0,
-            k: 0,
-            from,
-            solved: false,
-            newton: true,
-            solution: Solution::FixedPointIteration,
-            pause: 0,
-            pauses: FIRST_NEWTON_PAUSE,
-            newton_steps: 0,
-            of_sigma,
-            sequence: (s <= FEW_STAGES || check_resolution)
-                .then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
-            monitor: ResolutionMonitor::new(&state.q, &start.v, h),
-        })
+        Ok((route, mass, of_sigma))
     }
 
     /// Without Newton's method: a step whose fixed-point iteration does not converge fails with

@@ -17,6 +17,9 @@ pub enum GaussRoute {
     ConstantMass,
     /// As [`ConstantMass`](Self::ConstantMass), with W evaluated at the stages of each step.
     General,
+    /// L is given by a contact Hamiltonian: the iteration is in the positions, momenta, actions and integrating factors
+    /// of the stages.
+    Hamiltonian,
 }
 
 fn mass_matrix(constant: bool) -> PlanEntry {
@@ -55,6 +58,16 @@ pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
             ),
             newton,
             PlanEntry::skipped("action z", DECOUPLED),
+        ],
+        GaussRoute::Hamiltonian => vec![
+            PlanEntry::computed(
+                "iteration",
+                "determines the positions, momenta, actions and integrating factors of the stages to round-off",
+            ),
+            PlanEntry::skipped("mass matrix", "the steps evaluate the Hamiltonian, whatever the rank of H_pp"),
+            gradients,
+            newton,
+            action(drives),
         ],
         GaussRoute::ConstantMass | GaussRoute::General => vec![
             PlanEntry::computed(

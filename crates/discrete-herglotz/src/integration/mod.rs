@@ -1,6 +1,7 @@
 //! The problem, the integrator with its properties, its stepper, the table of splitting schemes, dense output,
 //! interruption and the entries of a plan.
 
+mod at_state;
 pub(crate) mod check_claims;
 pub(crate) mod dense_step;
 pub(crate) mod integrator;
@@ -13,6 +14,7 @@ mod reset;
 pub(crate) mod scheme;
 pub(crate) mod stepper;
 
+pub(crate) use at_state::{AtState, at_state};
 pub use check_claims::{check_claims, check_unforced};
 pub(crate) use check_claims::{check_kicks, depends_on_action, is_separable};
 pub use dense_step::DenseStep;

@@ -1,14 +1,15 @@
 //! Initial value problems: a Lagrangian with an initial state.
 
 use crate::integration::check_claims::check_claims;
+use crate::integration::{AtState, at_state};
 use crate::{
     DiscreteLagrangian, InputError, Interrupt, StepError,
     theory::{discrete_regularity, legendre_inverse, legendre_minus},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, legendre,
-    numbers::max_abs_or_nan,
+    ContactHamiltonian, Defect, Derivatives, DiscretePoint, GeometryError, Lagrangian, OfHamiltonian, PhasePoint,
+    Regularity, Structure, VelocityPoint, legendre, numbers::max_abs_or_nan,
 };
 
 /// The initial state of a motion.
@@ -82,6 +83,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        if const { L::HINTS.hamiltonian } {
+            return Self::given_by_hamiltonian(lagrangian, t0, start.into());
+        }
         let (start, state) = match start.into() {
             Start::Velocity(x) => {
                 PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
@@ -96,6 +100,38 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         let structure = check_claims(lagrangian, t0, &start)?;
         let from_momentum = state.is_some();
         let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
+        Ok(Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt: None })
+    }
+
+    /// The problem of a Lagrangian that is given by a contact Hamiltonian.
+    fn given_by_hamiltonian(lagrangian: &'a L, t0: f64, start: Start<N>) -> Result<Self, InputError> {
+        if const { L::HINTS.switching_functions } {
+            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
+            return Err(InputError::Hypothesis { hypothesis });
+        }
+        let (state, from_momentum) = match start {
+            Start::Velocity(x) => {
+                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
+                let state = legendre(lagrangian, t0, &x);
+                if !state.p.iter().all(|p| p.is_finite()) {
+                    return Err(InputError::NoMomentum);
+                }
+                (state, false)
+            }
+            Start::Momentum(x, _) => {
+                x.check()?;
+                (x, true)
+            }
+        };
+        let AtState { x: start, l, force, rate } =
+            at_state(lagrangian, t0, &state, &SVector::zeros()).map_err(|_| InputError::Undefined)?;
+        if !(l.is_finite() && rate.is_finite() && force.iter().all(|f| f.is_finite())) {
+            return Err(InputError::Undefined);
+        }
+        let structure = check_claims(lagrangian, t0, &start)?;
+        if let Some(Defect { claim, size }) = lagrangian.hamiltonian_defect(t0, &state) {
+            return Err(InputError::FalseClaim { claim, size });
+        }
         Ok(Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt: None })
     }
 
@@ -145,6 +181,40 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The initial state `(q, p, z)`.
     pub fn state(&self) -> &PhasePoint<N> {
         &self.state
+    }
+}
+
+impl<'a, H: ContactHamiltonian<N>, const N: usize> Problem<'a, OfHamiltonian<H>, N> {
+    /// The problem of a contact Hamiltonian from a state `(q, p, z)` at the time `t0`, whatever the rank of `H_pp`.
+    ///
+    /// ```
+    /// use contact_geom::{nalgebra::SVector, ContactHamiltonian, OfHamiltonian, PhasePoint, Scalar};
+    /// use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
+    /// /// `q' = -q^3`: H is linear in p.
+    /// struct Decay;
+    /// impl ContactHamiltonian<1> for Decay {
+    ///     #[inline(always)]
+    ///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, _z: T) -> T {
+    ///         -p[0] * q[0].powi(3)
+    ///     }
+    /// }
+    /// let decay = OfHamiltonian(Decay);
+    /// let problem = Problem::of_hamiltonian(&decay, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;
+    /// let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1));
+    /// let outcome = run.run(Until::Time(1.0))?;
+    /// assert!((outcome.q[0] - 1.0 / 3.0_f64.sqrt()).abs() < 1e-14);
+    /// # Ok::<(), discrete_herglotz::InputError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`InputError`]: a time or a state that is not finite, a state at which H or a derivative is not defined, a false
+    /// claim of structure.
+    pub fn of_hamiltonian(
+        hamiltonian: &'a OfHamiltonian<H>,
+        t0: f64,
+        start: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        Self::new(hamiltonian, t0, Start::Momentum(start, SVector::zeros()))
     }
 }
 

@@ -1,6 +1,7 @@
 //! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
+use crate::integration::{AtState, at_state};
 use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::motion::{Motion, NearbyVelocity};
@@ -12,7 +13,7 @@ use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
 
 /// The largest number of unknowns of a step for which the matrix of a linear motion is always computed. A collocation
 /// step is then multiplication by this matrix, which is computed in double-double precision.
@@ -132,6 +133,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
         self.advanced((*t0, from), &v, t - t0, (1, t), guess)
     }
 
+    /// A guess of the velocity. For a constant mass the velocity is unique.
+    fn guess(&self, near: NearbyVelocity<N>) -> SVector<f64, N> {
+        near.filter(|_| !self.problem.structure.constant_mass).unwrap_or(self.problem.start.v)
+    }
+
     /// The number of stages of a Gauss method, otherwise 1.
     pub fn stages(&self) -> usize {
         self.info.collocation.unwrap_or(1)
@@ -173,30 +179,28 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
     fn velocity(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<SVector<f64, N>, StepError> {
-        // For a constant mass the velocity is unique.
-        let near = near.filter(|_| !self.problem.structure.constant_mass);
-        legendre_inverse(self.problem.lagrangian, t, state, &near.unwrap_or(self.problem.start.v)).map(|x| x.v)
+        legendre_inverse(self.problem.lagrangian, t, state, &self.guess(near)).map(|x| x.v)
     }
 
     fn energy(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<f64, StepError> {
-        let v = self.velocity(t, state, near)?;
-        let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
+        let AtState { x, l, .. } = at_state(self.problem.lagrangian, t, state, &self.guess(near))?;
+        let energy = x.v.dot(&state.p) - l;
         if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
     }
 
     fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError> {
-        let v = self.velocity(t, state, near)?;
-        let (value, g) =
-            self.problem.lagrangian.with_gradient_and_force(t, &VelocityPoint { q: state.q, v, z: state.z });
-        Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
+        let AtState { x, l, force, rate } = at_state(self.problem.lagrangian, t, state, &self.guess(near))?;
+        Ok(PhasePoint { q: x.v, p: force + state.p * rate, z: l })
     }
 
     /// A digest of the start, of L there, of the steps, and of the requests.
     fn fingerprint(&self) -> u64 {
         let Problem { lagrangian, t0, start, state, .. } = self.problem;
-        let (value, slope) = lagrangian.with_gradient_and_force(*t0, start);
-        let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
-        let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
+        let none = ([f64::NAN; 2], SVector::zeros());
+        let ([value, rate], force) =
+            at_state(*lagrangian, *t0, state, &start.v).map_or(none, |at| ([at.l, at.rate], at.force));
+        let numbers = [*t0, self.t_end, self.h, start.z, value, rate];
+        let vectors = [&start.q, &start.v, &state.p, &force];
         let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
         let name = self.info.name.bytes().map(u64::from);
         let OutputRequest { action, conformal_factor, .. } = self.needs;

@@ -77,7 +77,8 @@ impl<'a, const N: usize> StepTangent<'a, N> {
         if info.in_transformed_time || info.divides {
             return refused("");
         }
-        if info.collocation.is_some() {
+        // The steps of a Lagrangian that is given by a contact Hamiltonian have a formula.
+        if info.collocation.is_some() && steps.integrator.step_formula().is_none() {
             let engine = Engine::new(steps.problem, steps.stages(), steps.h, direction);
             return Ok(StepTangent::Collocation(Box::new(engine)));
         }

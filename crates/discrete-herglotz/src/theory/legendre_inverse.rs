@@ -16,7 +16,8 @@ const MAX_STALLED_CORRECTIONS: u32 = 8;
 /// from a guess of the velocity; the inverse of [`legendre`](contact_geom::legendre).
 ///
 /// The guess selects a solution where several velocities have the same momentum; where the velocity is unique, 0 is a
-/// suitable guess.
+/// suitable guess. For a Lagrangian that is given by a contact Hamiltonian the velocity is `H_p`, whatever the rank of
+/// `H_pp`.
 ///
 /// # Errors
 /// [`StepError::Singular`] where `W = L_vv` is singular, [`StepError::NonFinite`] where L is not defined at the guess
@@ -36,6 +37,9 @@ pub fn legendre_inverse<const N: usize>(
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Result<VelocityPoint<N>, StepError> {
+    if let Some(x) = velocity_of_hamiltonian(lagrangian, t, state) {
+        return if x.v.iter().all(|v| v.is_finite()) { Ok(x) } else { Err(StepError::NonFinite) };
+    }
     let mut x = VelocityPoint { q: state.q, v: *guess, z: state.z };
     let (mut before, mut stalled) = (f64::INFINITY, 0);
     let mut momenta = lagrangian.gradient(t, &x).y;
@@ -79,6 +83,20 @@ pub fn legendre_inverse<const N: usize>(
         }
     }
     Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
+}
+
+/// The velocity `H_p` at a state, if L is given by a contact Hamiltonian.
+#[inline(always)]
+fn velocity_of_hamiltonian<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    t: f64,
+    state: &PhasePoint<N>,
+) -> Option<VelocityPoint<N>> {
+    if const { !L::HINTS.hamiltonian } {
+        return None;
+    }
+    let (_, d) = lagrangian.hamiltonian_with_gradient(t, state)?;
+    Some(VelocityPoint { q: state.q, v: d.y, z: state.z })
 }
 
 #[cfg(test)]

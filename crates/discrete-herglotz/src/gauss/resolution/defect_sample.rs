@@ -12,6 +12,7 @@ use crate::numbers::lanes::{Lanes, vector};
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use crate::resolution::thresholds::{MIN_EXACT_PRODUCT, VALUE_ROUND_OFF};
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -237,6 +238,24 @@ fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
 }
 
+/// L, with `L_q + f`, the velocity `H_p` and `L_z`, at states of a Lagrangian that is given by a contact Hamiltonian.
+#[inline(always)]
+fn of_hamiltonian<S: Simd, L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    t: Lanes<S>,
+    x: &VelocityPoint<N, Lanes<S>>,
+    p: &SVector<Lanes<S>, N>,
+) -> (Lanes<S>, ChartVector<N, Lanes<S>>) {
+    let state = PhasePoint { q: x.q, p: *p, z: x.z };
+    let none = || (Lanes::splat(f64::NAN), ChartVector { x: *p, y: *p, z: x.z });
+    let Some((h, d)) = lagrangian.hamiltonian_with_gradient(t, &state) else { return none() };
+    let mut force = -d.x;
+    if const { L::HINTS.forced } {
+        force += lagrangian.applied_force(t, &VelocityPoint { v: d.y, ..*x });
+    }
+    (p.dot(&d.y) - h, ChartVector { x: force, y: d.y, z: -d.z })
+}
+
 /// The evaluation of a defect sample, in SIMD lanes.
 pub(crate) struct Compare<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
@@ -271,6 +290,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
         }
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut defect, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
+        let (mut of_v, mut size_v) = (zero, zero);
         let mut other: Option<(Lanes<S>, ChartVector<N, Lanes<S>>)> = None;
         for r in 0..blocks::<S>(s) {
             let mut x = VelocityPoint {
@@ -285,8 +305,13 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
                 (slower, long) = (rate.recip(), long * rate);
                 x.v *= slower;
             }
+            let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
             let (value, g) = match other.take() {
                 Some(other) => other,
+                None if const { L::HINTS.hamiltonian } => {
+                    let p = vector(|d| y[d].block::<S>(r) * inverse);
+                    of_hamiltonian(lagrangian, between.points.block::<S>(r) * h + t, &x, &p)
+                }
                 None if const { L::HINTS.interpreted && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
                     let pair = VelocityPoint {
                         q: vector(|d| Two::<S>::of(&q[d], r)),
@@ -299,15 +324,24 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
                 }
                 None => lagrangian.with_gradient_and_force(between.points.block::<S>(r) * h + t, &x),
             };
-            let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
             let mut work = zero;
             let drag = (rate.block::<S>(r) * inverse * slower - g.z) * long;
             for d in 0..N {
                 let p = y[d].block::<S>(r) * inverse;
                 let force = f[d].block::<S>(r) * inverse * h;
                 let of_force = p.mul_add(drag, force - g.x[d] * long);
-                let of_momentum = p - g.y[d];
-                defect = defect.max(of_force.abs()).max(of_momentum.abs());
+                // For a Hamiltonian, `g.y` is `H_p`, which is compared with the velocity.
+                let of_momentum = if const { L::HINTS.hamiltonian } {
+                    let of_velocity = x.v[d] - g.y[d];
+                    of_v = of_v.max(of_velocity.abs());
+                    size_v = size_v.max(x.v[d].abs());
+                    defect = defect.max(of_force.abs());
+                    of_velocity
+                } else {
+                    let of_momentum = p - g.y[d];
+                    defect = defect.max(of_force.abs()).max(of_momentum.abs());
+                    of_momentum
+                };
                 size = size.max(p.abs()).max(force.abs());
                 all += of_force * 0.0 + of_momentum * 0.0;
                 work = p.mul_add(x.v[d], work);
@@ -320,6 +354,10 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             if curve.acts {
                 of_z = of_z.max((apart * long).abs());
                 size_z = size_z.max(z.block::<S>(r).abs()).max((value * long).abs());
+                if const { L::HINTS.hamiltonian } {
+                    // An action may vanish by cancellation of `p . v` and H.
+                    size_z = size_z.max((work * long).abs());
+                }
             }
         }
         // The maximum over lanes may hide a NaN. In `all` every value is multiplied by 0, which leaves a NaN for a NaN
@@ -334,8 +372,16 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             };
         }
         let relative = |defect: f64, size: f64| if defect > 0.0 { defect / size } else { 0.0 };
-        let (size, size_z) = (size.reduce_max(), size_z.reduce_max());
-        let (of_momenta, of_action) = (defect.reduce_max(), of_z.reduce_max());
+        let (mut size, size_z) = (size.reduce_max(), size_z.reduce_max());
+        let (mut of_momenta, of_action) = (defect.reduce_max(), of_z.reduce_max());
+        if const { L::HINTS.hamiltonian } {
+            // The defect of the velocities in the units of the momenta, or of the velocities where all momenta are 0.
+            let (of_v, size_v) = (of_v.reduce_max(), size_v.reduce_max());
+            if size == 0.0 {
+                size = size_v;
+            }
+            of_momenta = max_or_nan(of_momenta, relative(of_v, size_v) * size);
+        }
         let defect = relative(of_momenta, size) + relative(of_action, size_z);
         let of_value = beyond_rounding(of_value.reduce_max(), largest_l.reduce_max());
         // The coefficients do not depend on the sample points; set 0 alone returns the estimate from them.

@@ -5,16 +5,17 @@ use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::routes::StageRoute;
 use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::stepper::{GaussStepper, Route, with_route};
+use crate::integration::{AtState, SuspectInterval, at_state};
 use crate::resolution::monitor::{defect, sharper, size, value_rounding};
 use crate::resolution::thresholds::{
     COLLOCATION_ROUNDINGS, FEW_STAGES, MAX_STEP_DEFECT, MAX_STEP_DEFECT_OF_FEW_STAGES,
 };
-use crate::{Stepper, UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
+use crate::{Stepper, UnresolvedStep, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    Derivatives, Lagrangian,
+    Lagrangian,
     numbers::{max_abs_or_nan, max_or_nan},
-    support::gradient_rounding,
+    support::rounding_at_state,
 };
 use pulp::{Simd, WithSimd};
 
@@ -91,13 +92,12 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     #[inline(never)]
     pub(crate) fn is_at_rest(&self, t: f64) -> bool {
         let state = self.state();
-        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
-        let (mut force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
-        if const { L::HINTS.forced } {
-            force.x += self.lagrangian.applied_force(t, &x);
-        }
+        let Ok(AtState { x, force, rate, .. }) = at_state(self.lagrangian, t, &state, &SVector::zeros()) else {
+            return false;
+        };
+        let rounding = rounding_at_state(self.lagrangian, t, &x, &state).1;
         size(&x.v) * self.h.abs() <= self.monitor.floor
-            && size(&(force.x + state.p * force.z)) <= COLLOCATION_ROUNDINGS * size(&rounding.x)
+            && size(&(force + state.p * rate)) <= COLLOCATION_ROUNDINGS * size(&rounding.x)
     }
 
     /// Bounds on the round-off in the defects of the momenta and of the action in the last step, from the round-off of
@@ -108,7 +108,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let (t, state) = (self.time(), self.state());
         let near = self.last_velocity().unwrap_or_else(SVector::zeros);
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
-        let (l, g) = gradient_rounding(self.lagrangian, t, &x);
+        let (l, g) = rounding_at_state(self.lagrangian, t, &x, &state);
         // The stages of the integrating factor amplify round-off the more, the more the factor changes in the step.
         let (of, h) = (|part: &SVector<f64, N>| max_abs_or_nan(part.iter().copied()), self.h.abs());
         let carried = COLLOCATION_ROUNDINGS * (1.0 + self.sigma().ln().abs());

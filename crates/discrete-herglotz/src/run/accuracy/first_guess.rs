@@ -16,23 +16,42 @@ pub(crate) fn first_guess<L: Lagrangian<N>, const N: usize>(
     goal: f64,
 ) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
+    if const { L::HINTS.hamiltonian } {
+        let frequency = frequency_of_hamiltonian(request);
+        let count = span.abs() * frequency / radians(stages, goal).min(stages as f64 / 3.0).min(1.0);
+        return if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 };
+    }
     let h = lagrangian.hessian(*t0, start);
     // The frequencies of forces that depend on the position, and of forces that rotate the velocity like a magnetic
     // field.
     let [of_position, turning] = inverted(&h.vv).map_or([0.0; 2], |inverse| {
         [spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose()))]
     });
-    // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
-    let s = stages as f64;
-    let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
-    let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
-    let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
-    // For steps longer than half a period the fixed-point iteration does not contract.
-    let radians = 0.5 * radians;
+    let (s, radians) = (stages as f64, radians(stages, goal));
     // The fixed-point iteration for the velocity contracts by the angle of its rotation in a step.
     let count = span.abs() * max_or_nan(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
     // A motion that is free at its start may be fast later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 }
+}
+
+/// The number of radians of a step with a given error. The error of a step of x radians is about
+/// `x^(2s+1) s!^4 / (2s)!^3`; half of x is taken, since for steps longer than half a period the fixed-point iteration does
+/// not contract.
+fn radians(stages: usize, goal: f64) -> f64 {
+    let s = stages as f64;
+    let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
+    let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
+    0.5 * ((goal.ln() - constant) / (2.0 * s + 1.0)).exp()
+}
+
+/// The largest frequency of the motion of a contact Hamiltonian, linearised at its start: the rates of `H_pq`, and the
+/// root of the product of `H_pp` and `H_qq`.
+fn frequency_of_hamiltonian<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>) -> f64 {
+    let Problem { lagrangian, state, t0, .. } = request.problem;
+    let Some(h) = lagrangian.hamiltonian_hessian(*t0, state) else { return 0.0 };
+    let rate = lagrangian.hamiltonian_with_gradient(*t0, state).map_or(0.0, |(_, d)| d.z.abs());
+    let of_position = spectral_radius(h.vv * h.qq).sqrt();
+    max_or_nan(max_or_nan(of_position, spectral_radius(h.qv)), rate)
 }
 
 /// The largest absolute eigenvalue, estimated from the norm of the eighth power: too large by at most a factor

@@ -70,6 +70,9 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
     pub(crate) fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
         let Problem { lagrangian, start, state, t0, .. } = self.problem;
         let InputError::Accuracy { wanted, .. } = refused else { return refused };
+        if const { L::HINTS.hamiltonian } {
+            return refused; // The velocity is a function of the momentum.
+        }
         let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
             .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
         if rounding > wanted && rounding.is_finite() {

@@ -34,6 +34,10 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// ends: for a jump it does not depend on the distance of the points, for a smooth acceleration it decreases with
     /// the square of the distance. `None` if no velocity is known.
     fn jump(&self, SuspectInterval { step, steps, t, from, to }: &SuspectInterval<N>) -> Option<f64> {
+        if const { L::HINTS.hamiltonian } {
+            // Where H_pp is singular the acceleration is not a function of position and velocity.
+            return None;
+        }
         let Problem { lagrangian, start: first, .. } = *self.problem;
         let span = *steps as f64 * self.h;
         let start = legendre_inverse(lagrangian, *t, from, &first.v).ok()?;

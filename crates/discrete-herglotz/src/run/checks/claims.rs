@@ -64,7 +64,8 @@ impl<const N: usize> Constants<N> {
 impl<const N: usize> ClaimMonitor<N> {
     /// The monitor of a run whose Lagrangian claims that something is constant. `None` if the claims are proved.
     pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>) -> Option<Self> {
-        if const { L::HINTS.proved } {
+        // A Hamiltonian's own claims are verified at the start of the run.
+        if const { L::HINTS.proved || L::HINTS.hamiltonian } {
             return None;
         }
         let problem = steps.problem;

@@ -1,5 +1,6 @@
 //! The energy of an autonomous system, which decays with the conformal factor along the exact motion.
 
+use crate::integration::{AtState, at_state};
 use crate::resolution::thresholds::MIN_SUSPECT_DRIFT;
 use crate::run::accuracy::equilibrium_round_off::EquilibriumRoundOff;
 use crate::run::checks::energy_drift::{EnergyDrift, EnergySample, allowed};
@@ -7,7 +8,7 @@ use crate::run::discretization::Discretization;
 use crate::{Stepper, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
+    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::rounding_at_state,
 };
 
 /// The shortest distance of two energy checks in long runs, in steps: a check costs about three of the least expensive
@@ -48,7 +49,8 @@ impl<const N: usize> EnergyMonitor<N> {
         let Energies { total, kinetic, terms } =
             energies(problem.lagrangian, problem.t0, &problem.start, &problem.state)?;
         let counted = constant_rate || steps.needs.conformal_factor;
-        let rate = (!counted).then(|| problem.lagrangian.gradient(problem.t0, &problem.start).z);
+        let rate = || at_state(problem.lagrangian, problem.t0, &problem.state, &problem.start.v).map(|at| at.rate);
+        let rate = if counted { None } else { Some(rate().ok()?) };
         let start = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
         Some(EnergyMonitor {
             rate,
@@ -102,7 +104,8 @@ pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
     let rest = SVector::zeros();
     let Ok(x) = legendre_inverse(lagrangian, t0, from, &rest) else { return false };
     let Ok(y) = legendre_inverse(lagrangian, t, to, &x.v) else { return false };
-    let sigma = (lagrangian.gradient(t0, &x).z * (t - t0)).exp();
+    let Ok(AtState { rate, .. }) = at_state(lagrangian, t0, from, &x.v) else { return false };
+    let sigma = (rate * (t - t0)).exp();
     let (Some(a), Some(b)) = (energies(lagrangian, t0, &x, from), energies(lagrangian, t, &y, to)) else {
         return false;
     };
@@ -117,12 +120,17 @@ fn energies<L: Lagrangian<N>, const N: usize>(
     x: &VelocityPoint<N>,
     state: &PhasePoint<N>,
 ) -> Option<Energies> {
-    let (l, slope) = (lagrangian.value(t, &x.q, &x.v, x.z), lagrangian.gradient(t, x).z);
-    let w = lagrangian.mass_matrix(t, x);
+    let AtState { l, rate: slope, .. } = at_state(lagrangian, t, state, &x.v).ok()?;
     let mut kinetic = 0.0;
-    for i in 0..N {
-        for j in 0..N {
-            kinetic += 0.5 * (x.v[i] * w[(i, j)] * x.v[j]).abs();
+    if const { L::HINTS.hamiltonian } {
+        // The mass matrix need not exist.
+        kinetic = (0..N).map(|i| 0.5 * (state.p[i] * x.v[i]).abs()).sum();
+    } else {
+        let w = lagrangian.mass_matrix(t, x);
+        for i in 0..N {
+            for j in 0..N {
+                kinetic += 0.5 * (x.v[i] * w[(i, j)] * x.v[j]).abs();
+            }
         }
     }
     let total = state.p.dot(&x.v) - l;
@@ -139,7 +147,7 @@ fn rounding_of<L: Lagrangian<N>, const N: usize>(
     x: &VelocityPoint<N>,
     state: &PhasePoint<N>,
 ) -> f64 {
-    let (of_value, of_gradient) = gradient_rounding(lagrangian, t, x);
+    let (of_value, of_gradient) = rounding_at_state(lagrangian, t, x, state);
     let of_momentum = |i: usize| (f64::EPSILON * state.p[i] * x.v[i]).abs() + (of_gradient.y[i] * x.v[i]).abs();
     of_value + (0..N).map(of_momentum).sum::<f64>()
 }

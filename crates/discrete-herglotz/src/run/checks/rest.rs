@@ -16,7 +16,7 @@ pub(crate) const REST: &str = "rest";
 /// on time, its gradient in q and v vanishes there, the mass matrix is positive definite, the potential has a minimum,
 /// and the drag is dissipative. From a maximum of the potential, round-off would drive the motion away.
 pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Problem<'_, L, N>, z: f64) -> bool {
-    if !problem.structure.autonomous {
+    if const { L::HINTS.hamiltonian } || !problem.structure.autonomous {
         return false;
     }
     let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z };

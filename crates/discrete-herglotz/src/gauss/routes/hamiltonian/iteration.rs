@@ -1,0 +1,133 @@
+//! Fixed-point iteration of a step: the right-hand sides at the stages, and the stages of given right-hand sides.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::routes::hamiltonian::HamiltonianStages;
+use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::registers::{blocks, over_groups};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use pulp::Simd;
+
+/// The kinds of variables whose changes are compared with their largest values.
+const KINDS: usize = 4;
+
+/// The largest changes in an iteration, and the largest values: of positions, momenta, actions and integrating factors.
+struct Changes<S: Simd> {
+    change: [Lanes<S>; KINDS],
+    size: [Lanes<S>; KINDS],
+}
+
+impl<S: Simd> Changes<S> {
+    #[inline(always)]
+    fn see(&mut self, kind: usize, change: Lanes<S>, value: Lanes<S>) {
+        self.change[kind] = self.change[kind].max(change.abs());
+        self.size[kind] = self.size[kind].max(value.abs());
+    }
+
+    /// The largest change of a kind relative to its largest value, over all kinds; NaN if one of them is.
+    #[inline(always)]
+    fn largest(&self) -> f64 {
+        let mut largest = 0.0;
+        for kind in 0..KINDS {
+            let change = self.change[kind].reduce_max();
+            let relative = if change > 0.0 { change / self.size[kind].reduce_max() } else { change };
+            // `f64::max` would hide a NaN.
+            if relative > largest || relative.is_nan() {
+                largest = relative;
+            }
+        }
+        largest
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
+    /// Computes positions, momenta, actions and factors of the stages from the right-hand sides. Returns the largest
+    /// change of positions, momenta, actions and factors, each kind relative to its largest value. An action that
+    /// vanishes by cancellation, as that of a Hamiltonian of degree one in p, is as large as `h p . v` in this comparison.
+    #[inline(always)]
+    pub(super) fn move_stages<S: Simd>(&mut self) -> f64 {
+        let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
+        let mut seen = Changes { change: [zero; KINDS], size: [zero, zero, zero, one] };
+        over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_group::<S, K>(r, &mut seen));
+        seen.largest()
+    }
+
+    #[inline(always)]
+    fn move_group<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+        let (m, s, zero) = (self.table.m, self.table.s, Lanes::<S>::splat(0.0));
+        let start = Lanes::splat(self.z.value);
+        let [one_minus_rho, z] = m.rows([&self.rate, &self.l], s, [[zero; K], [start; K]], r);
+        let mut inverse = [zero; K];
+        for k in 0..K {
+            seen.see(3, one_minus_rho[k] - self.one_minus_rho_stages.block(r + k), zero);
+            seen.see(2, z[k] - self.z_stages.block(r + k), z[k]);
+            self.one_minus_rho_stages.set(r + k, one_minus_rho[k]);
+            self.z_stages.set(r + k, z[k]);
+            inverse[k] = (Lanes::splat(1.0) - one_minus_rho[k]).recip();
+        }
+        for d in 0..N {
+            let (q, p) = (Lanes::splat(self.q[d].value), Lanes::splat(self.p[d].value));
+            let [moved, pushed] = m.rows([&self.moved[d], &self.force[d]], s, [[zero; K], [p; K]], r);
+            for k in 0..K {
+                let (x, p) = (q + moved[k], pushed[k] * inverse[k]);
+                seen.see(0, x - self.x[d].block(r + k), x);
+                seen.see(1, p - self.p_stages[d].block(r + k), p);
+                seen.see(2, zero, p * self.v[d].block(r + k) * self.table.h);
+                self.x[d].set(r + k, x);
+                self.p_stages[d].set(r + k, p);
+            }
+        }
+    }
+
+    /// Evaluates H and its gradient at the stages, and from them the right-hand sides.
+    #[inline(always)]
+    pub(super) fn evaluate<S: Simd>(&mut self, t: f64) {
+        let m = blocks::<S>(self.table.s);
+        self.evaluations += self.table.s as u64;
+        let mut r = 0;
+        while r < m {
+            r = over_registers!(self.take_gradients(t, r); L, S, m - r);
+        }
+    }
+
+    /// The same at the blocks of stages that T holds, from the r-th on; returns the index of the next block.
+    #[inline(always)]
+    fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
+        let point = PhasePoint {
+            q: vector(|d| T::of(&self.x[d], r)),
+            p: vector(|d| T::of(&self.p_stages[d], r)),
+            z: T::of(&self.z_stages, r),
+        };
+        let time = T::of(&self.table.times, r) + t;
+        // `None` only for a Lagrangian that is not given by a Hamiltonian, which has no such steps.
+        let Some((h, mut d)) = self.lagrangian.hamiltonian_with_gradient(time, &point) else { return r + T::COUNT };
+        if const { L::HINTS.forced } {
+            let x = VelocityPoint { q: point.q, v: d.y, z: point.z };
+            d.x -= self.lagrangian.applied_force(time, &x);
+        }
+        for i in 0..T::COUNT {
+            let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
+            self.weigh(r + i, h.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+        }
+        r + T::COUNT
+    }
+
+    /// Stores the right-hand sides at one block of stages, multiplied by the weights.
+    #[inline(always)]
+    fn weigh<S: Simd>(&mut self, r: usize, h: Lanes<S>, d: &ChartVector<N, Lanes<S>>) {
+        let (weight, fallen) = (self.table.weights.block::<S>(r), self.one_minus_rho_stages.block::<S>(r));
+        let mut l = -h;
+        for i in 0..N {
+            let (v, slope) = (d.y[i], d.x[i]);
+            l = self.p_stages[i].block::<S>(r).mul_add(v, l);
+            self.v[i].set(r, v);
+            self.moved[i].set(r, weight * v);
+            self.force[i].set(r, weight * slope.mul_add(fallen, -slope));
+        }
+        self.l.set(r, weight * l);
+        self.rate.set(r, weight * d.z.mul_add(fallen, -d.z));
+    }
+}
