@@ -1,0 +1,1 @@
+//! Tests of pieces, splittings and generating functions.
