@@ -106,13 +106,13 @@ fn substeps(scheme: &SplittingScheme) -> Result<Vec<f64>, InputError> {
 
 /// A flow of a step: the map, and its time as a fraction of the step.
 #[derive(Clone, Debug)]
-struct PieceFlow<M> {
+pub(super) struct PieceFlow<M> {
     map: M,
     time: f64,
 }
 
 /// The flows of a step in their order; two flows of the first piece between substeps are combined.
-fn flows<P: PieceList<N>, const N: usize>(
+pub(super) fn flows<P: PieceList<N>, const N: usize>(
     pieces: &P,
     scheme: &SplittingScheme,
     h: f64,
@@ -142,7 +142,7 @@ fn flows<P: PieceList<N>, const N: usize>(
 }
 
 /// A step from the time t, over any scalar: the state and the conformal factor.
-fn step<P: PieceList<N>, T: Scalar, const N: usize>(
+pub(super) fn step<P: PieceList<N>, T: Scalar, const N: usize>(
     pieces: &P,
     flows: &[PieceFlow<P::Map>],
     (t, h): (f64, f64),
