@@ -23,8 +23,8 @@ use std::borrow::Cow;
 /// the pieces before the last have the time of the start of a substep on the way in and that of its end on the way out, and
 /// the last one has the time between, which is the splitting of the autonomous system with `t' = 1` as a further piece.
 ///
-/// The first piece has the fewest flows for a step, so that the piece with the most expensive flow should be the first or
-/// the last. Where the pieces do not sum to H, or a flow is not that of its piece, a typed error says so.
+/// The first and the last piece have one flow in a substep, the others two; those with the most expensive flows should be the
+/// first and the last. Where the pieces do not sum to H, or a flow is not that of its piece, a typed error says so.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, PhasePoint, Scalar, nalgebra::{SMatrix, SVector}};
