@@ -1,8 +1,8 @@
 //! Integrators for contact Hamiltonians `H(t, q, p, z)` that are given directly: splittings into pieces with closed
 //! contact flows, and generating functions of types II and III.
 //!
-//! `eta = dz - p dq`, `q' = H_p`, `p' = -H_q - p H_z`, `z' = p . H_p - H`, `sigma' = -H_z sigma`. Every map of this module is
-//! conformally contact by construction, `Phi* eta = sigma eta`, whatever the rank of `H_pp`.
+//! `eta = dz - p dq`, `q' = H_p`, `p' = -H_q - p H_z`, `z' = p . H_p - H`, `sigma' = -H_z sigma`. Every map of this
+//! module is conformally contact by construction, `Phi* eta = sigma eta`, whatever the rank of `H_pp`.
 
 mod generating;
 mod increment;

@@ -76,8 +76,8 @@ impl<const N: usize> Progress<N> {
         self.sums.sigma
     }
 
-    /// Takes steps by a function of the time at the start that adds the increments of a step. A step whose result is not
-    /// finite, or whose factor is not positive, fails and leaves the state before it.
+    /// Takes steps by a function of the time at the start that adds the increments of a step. A step whose result is
+    /// not finite, or whose factor is not positive, fails and leaves the state before it.
     pub fn advance(
         &mut self,
         steps: usize,

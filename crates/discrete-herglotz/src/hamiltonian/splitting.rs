@@ -19,12 +19,14 @@ use std::borrow::Cow;
 ///
 /// `S_h = phi1_(h/2) ... phi(k-1)_(h/2) phik_h phi(k-1)_(h/2) ... phi1_(h/2)`.
 ///
-/// Every step is conformally contact, with `sigma_d` the product of the factors of the flows. Pieces may depend on time:
-/// the pieces before the last have the time of the start of a substep on the way in and that of its end on the way out, and
-/// the last one has the time between, which is the splitting of the autonomous system with `t' = 1` as a further piece.
+/// Every step is conformally contact, with `sigma_d` the product of the factors of the flows. Pieces may depend on
+/// time: the pieces before the last have the time of the start of a substep on the way in and that of its end on the
+/// way out, and the last one has the time between, which is the splitting of the autonomous system with `t' = 1` as a
+/// further piece.
 ///
-/// The first and the last piece have one flow in a substep, the others two; those with the most expensive flows should be the
-/// first and the last. Where the pieces do not sum to H, or a flow is not that of its piece, a typed error says so.
+/// The first and the last piece have one flow in a substep, the others two; those with the most expensive flows should
+/// be the first and the last. Where the pieces do not sum to H, or a flow is not that of its piece, a typed error says
+/// so.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, PhasePoint, Scalar, nalgebra::{SMatrix, SVector}};
@@ -195,8 +197,8 @@ fn check_sum<const N: usize>(
     Ok(())
 }
 
-/// Returns an error unless the flow of each piece is that of its contact Hamiltonian at a state: the increments over short
-/// times agree with the vector field, and two flows over half a time with one over the whole.
+/// Returns an error unless the flow of each piece is that of its contact Hamiltonian at a state: the increments over
+/// short times agree with the vector field, and two flows over half a time with one over the whole.
 fn check_flows<P: PieceList<N>, const N: usize>(pieces: &P, t: f64, x: &PhasePoint<N>) -> Result<(), InputError> {
     for index in 0..pieces.count() {
         let Some(field) = pieces.field(index, t, x) else { continue };
@@ -243,8 +245,8 @@ impl<P: PieceList<N>, const N: usize> PieceStepper<P, N> {
     /// # Errors
     /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Geometry`] where the state is not finite;
     /// [`InputError::Hypothesis`] for a Runge-Kutta-Nyström scheme; [`InputError::Count`] without pieces;
-    /// [`InputError::Undefined`] where a piece has no finite vector field; [`InputError::PieceFlow`] where a flow is not
-    /// that of its piece.
+    /// [`InputError::Undefined`] where a piece has no finite vector field; [`InputError::PieceFlow`] where a flow is
+    /// not that of its piece.
     pub fn new(pieces: P, scheme: &SplittingScheme, h: f64, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
         let progress = Progress::new(h, t0, &state)?;
         let flows = flows(&pieces, scheme, h)?;

@@ -6,9 +6,9 @@ use contact_geom::{ChartVector, Hessian, PhasePoint, Scalar};
 
 /// The adjoint of a generating function: the function of the other type whose step is the inverse of a step with -h.
 ///
-/// The map of type II from `(t + h, x1)` with the step -h is `q0 = H+_p1(q1, p0, z1)` and so on, where the generating function is
-/// evaluated at the end position, the initial momentum and the end action. Its inverse is therefore of type III with
-/// `H-_h(t; p0, q1, z1) = -H+_(-h)(t + h; q1, p0, z1)`, that is `S3_h(t) = -S2_(-h)(t + h)`, and conversely.
+/// The map of type II from `(t + h, x1)` with the step -h is `q0 = H+_p1(q1, p0, z1)` and so on, where the generating
+/// function is evaluated at the end position, the initial momentum and the end action. Its inverse is therefore of type
+/// III with `H-_h(t; p0, q1, z1) = -H+_(-h)(t + h; q1, p0, z1)`, that is `S3_h(t) = -S2_(-h)(t + h)`, and conversely.
 #[derive(Clone, Copy, Debug)]
 pub struct Adjoint<G>(pub G);
 

@@ -9,8 +9,8 @@ use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hess
 ///
 /// Type II, at `(t0; q0, p1, z0)`: `q1 = q0 + h H_p`, `p1 = p0 - h (H_q + p0 H_z)`, `z1 = z0 + h (p1 . H_p - H)`,
 /// `sigma = 1 - h H_z`. Type III, at `(t1; q1, p0, z1)`: `q1 = q0 + h H_p`, `p1 = p0 - h (H_q + p1 H_z)`,
-/// `z1 = z0 + h (p0 . H_p - H)`, `sigma = 1/(1 + h H_z)`. Each is the adjoint of the other. For `H = T(p) + V(q)` both are
-/// explicit maps: a kick and a drift, or a drift and a kick.
+/// `z1 = z0 + h (p0 . H_p - H)`, `sigma = 1/(1 + h H_z)`. Each is the adjoint of the other. For `H = T(p) + V(q)` both
+/// are explicit maps: a kick and a drift, or a drift and a kick.
 #[derive(Clone, Copy, Debug)]
 pub struct Euler<H>(pub H);
 

@@ -10,9 +10,9 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 ///
 /// `H+ = sigma p1 . F^T q0 - sigma q0 . F E_pq q0/2 + p1 . E_qp F p1/2 + (1 - sigma) z0`,
 ///
-/// since then `H+_q0 = sigma F (p1 - E_pq q0) = sigma p0` and `H+_z0 = 1 - sigma`. It exists where `E_pp` is regular. The exact
-/// discrete Lagrangian exists where `E_qp` is regular: for the oscillator `p^2/2 + q^2/2` not at h = pi, a conjugate point,
-/// where `H+ = -p1 q0`. At h = pi/2 it is the other way round; H+ is NaN there.
+/// since then `H+_q0 = sigma F (p1 - E_pq q0) = sigma p0` and `H+_z0 = 1 - sigma`. It exists where `E_pp` is regular.
+/// The exact discrete Lagrangian exists where `E_qp` is regular: for the oscillator `p^2/2 + q^2/2` not at h = pi, a
+/// conjugate point, where `H+ = -p1 q0`. At h = pi/2 it is the other way round; a singular `E_pp` gives NaN.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, nalgebra::SMatrix};

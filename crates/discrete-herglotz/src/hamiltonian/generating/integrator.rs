@@ -9,8 +9,9 @@ use contact_geom::nalgebra::DMatrix;
 use contact_geom::{ContactHamiltonian, OfHamiltonian, PhasePoint};
 use std::borrow::Cow;
 
-/// Contact symplectic Euler, its adjoint, and symmetric compositions of both, for every contact Hamiltonian, whatever the
-/// rank of `H_pp`. Each step is conformally contact; orders 1, 2 and those of the compositions, to 10. See [`Euler`].
+/// Contact symplectic Euler, its adjoint, and symmetric compositions of both, for every contact Hamiltonian, whatever
+/// the rank of `H_pp`. Each step is conformally contact; orders 1, 2 and those of the compositions, to 10. See
+/// [`Euler`].
 ///
 /// ```
 /// use discrete_herglotz::{SplittingScheme, hamiltonian::{Arrangement, ContactEuler}};
@@ -22,8 +23,8 @@ pub struct ContactEuler {
     pub arrangement: Arrangement,
 }
 
-/// An integrator by a generating function of the user's, such as an exact one, in an [`Arrangement`]. It is a method for the
-/// contact Hamiltonian of which the increment S is `h H + O(h^2)`.
+/// An integrator by a generating function of the user's, such as an exact one, in an [`Arrangement`]. It is a method
+/// for the contact Hamiltonian of which the increment S is `h H + O(h^2)`.
 ///
 /// ```
 /// use contact_geom::nalgebra::SMatrix;

@@ -9,8 +9,8 @@ use contact_geom::{PhasePoint, Scalar, support::linear};
 pub(super) const MAX_ITERATIONS: u32 = 50;
 /// The largest number of corrections with the last matrix: each corrects one order of the differentials.
 pub(super) const MAX_CORRECTIONS: u32 = 12;
-/// Newton's method ends at corrections of this relative size: since it converges quadratically, the rest is round-off, which
-/// the corrections with the last matrix remove.
+/// Newton's method ends at corrections of this relative size: since it converges quadratically, the rest is round-off,
+/// which the corrections with the last matrix remove.
 pub(super) const NEWTON_TOLERANCE: f64 = 1e-8;
 /// The relative size of corrections that are round-off.
 pub(super) const ROUND_OFF: f64 = 4.0 * f64::EPSILON;

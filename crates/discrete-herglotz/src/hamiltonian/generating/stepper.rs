@@ -14,7 +14,8 @@ pub enum Arrangement {
     TypeTwo,
     /// One step of the adjoint, of type III.
     TypeThree,
-    /// The symmetric map of order 2, type II over half a step and then its adjoint over the other half, in a composition.
+    /// The symmetric map of order 2, type II over half a step and then its adjoint over the other half, in a
+    /// composition.
     Symmetric(SplittingScheme),
 }
 

@@ -7,18 +7,18 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hessian, PhasePoint, Scalar};
 
-/// A generating function of type III, `H-(p0, q1, z1) = -p0 . q1 + S(q1, p0, z1)`, of a step of length h from the time t. With
-/// the increment S it generates the map
+/// A generating function of type III, `H-(p0, q1, z1) = -p0 . q1 + S(q1, p0, z1)`, of a step of length h from the time
+/// t. With the increment S it generates the map
 ///
 /// `q1 = q0 + S_p`, `z1 = z0 + p0 . S_p - S`, `(1 + S_z) p1 = p0 - S_q`, `sigma = 1/(1 + S_z)`,
 ///
-/// that is `q0 = -H-_p0`, `p1 = -sigma H-_q1`, `z1 = z0 - p0 . q0 - H-`, `1/sigma = 1 + H-_z1`. Each such map is conformally
-/// contact: with `q0 = -H-_p0` the differential of the equation for z1 is
+/// that is `q0 = -H-_p0`, `p1 = -sigma H-_q1`, `z1 = z0 - p0 . q0 - H-`, `1/sigma = 1 + H-_z1`. Each such map is
+/// conformally contact: with `q0 = -H-_p0` the differential of the equation for z1 is
 ///
 /// `(1 + H-_z1) dz1 + H-_q1 dq1 = dz0 - p0 dq0`, hence `dz1 - p1 dq1 = sigma (dz0 - p0 dq0)`.
 ///
-/// It depends on the action at the end of the step, so that the inverse of a map of [type II](super::TypeTwo) has type III: see
-/// [`Adjoint`](super::Adjoint). It is a map where `sigma > 0` and `H-_(p0 q1) + H-_(p0 z1) p1^T` is regular.
+/// It depends on the action at the end of the step, so that the inverse of a map of [type II](super::TypeTwo) has type
+/// III: see [`Adjoint`](super::Adjoint). It is a map where `sigma > 0` and `H-_(p0 q1) + H-_(p0 z1) p1^T` is regular.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, PhasePoint, Scalar, nalgebra::SVector};

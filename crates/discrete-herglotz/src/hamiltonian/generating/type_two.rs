@@ -7,18 +7,19 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hessian, PhasePoint, Scalar};
 
-/// A generating function of type II, `H+(q0, p1, z0) = p1 . q0 + S(q0, p1, z0)`, of a step of length h from the time t. With
-/// the increment S it generates the map
+/// A generating function of type II, `H+(q0, p1, z0) = p1 . q0 + S(q0, p1, z0)`, of a step of length h from the time t.
+/// With the increment S it generates the map
 ///
 /// `q1 = q0 + S_p`, `p1 = p0 - S_q - p0 S_z`, `z1 = z0 + p1 . S_p - S`, `sigma = 1 - S_z`,
 ///
-/// that is `q1 = H+_p1`, `sigma p0 = H+_q0`, `z1 = z0 + p1 . q1 - H+`, `sigma = 1 - H+_z0`. Each such map is conformally contact:
+/// that is `q1 = H+_p1`, `sigma p0 = H+_q0`, `z1 = z0 + p1 . q1 - H+`, `sigma = 1 - H+_z0`. Each such map is
+/// conformally contact:
 ///
 /// `dz1 - p1 dq1 = dz0 + q1 dp1 - dH+ = (1 - H+_z0) dz0 - H+_q0 dq0 = sigma (dz0 - p0 dq0)`.
 ///
-/// It is a map where `sigma > 0` and `H+_(q0 p1) + p0 H+_(z0 p1)^T` is regular, the derivative of `sigma p0 = H+_q0` in p1. For
-/// a discrete Lagrangian `H+ = p1 . q1 - L_d` at the q1 with `p1 = D2 L_d`; then `H+_q0 = -D1 L_d = sigma p0` and
-/// `H+_z0 = -Dz L_d`. H+ may exist where L_d does not, as at a conjugate point.
+/// It is a map where `sigma > 0` and `H+_(q0 p1) + p0 H+_(z0 p1)^T` is regular, the derivative of `sigma p0 = H+_q0` in
+/// p1. For a discrete Lagrangian `H+ = p1 . q1 - L_d` at the q1 with `p1 = D2 L_d`; then `H+_q0 = -D1 L_d = sigma p0`
+/// and `H+_z0 = -Dz L_d`. H+ may exist where L_d does not, as at a conjugate point.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, Scalar, nalgebra::SVector};

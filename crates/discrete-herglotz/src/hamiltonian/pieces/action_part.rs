@@ -5,8 +5,8 @@ use crate::splitting::{ActionFlow, ActionMap};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// The part `z' = g(z)` of an [`ActionFlow`], as a [`PointFlow`]: `Prolonged(ActionPart(flow))` is the piece `-g(z)`, with
-/// `p1 = phi'(z0) p0` and `sigma = phi'(z0)`.
+/// The part `z' = g(z)` of an [`ActionFlow`], as a [`PointFlow`]: `Prolonged(ActionPart(flow))` is the piece `-g(z)`,
+/// with `p1 = phi'(z0) p0` and `sigma = phi'(z0)`.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, nalgebra::SVector};

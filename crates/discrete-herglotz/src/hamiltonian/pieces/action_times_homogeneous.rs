@@ -5,15 +5,15 @@ use crate::hamiltonian::ContactIncrement;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ContactHamiltonian, HamiltonianDerivatives, PhasePoint, Scalar};
 
-/// The piece `H = z T(p)`, where T is homogeneous of degree k: `p . T_p = k T`. It is given as a contact Hamiltonian `T(p)`
-/// with its degree.
+/// The piece `H = z T(p)`, where T is homogeneous of degree k: `p . T_p = k T`. It is given as a contact Hamiltonian
+/// `T(p)` with its degree.
 ///
 /// Along the flow `p' = -T p`, hence `T' = -k T^2`, `T = T0/u` with `u = 1 + k T0 tau`, and `z T_p` is constant:
 ///
 /// `q1 = q0 + tau z0 T_p(p0)`, `p1 = u^(-1/k) p0`, `z1 = u^(1 - 1/k) z0`, `sigma = u^(-1/k)`, as long as u is positive.
 ///
-/// For `k = 0` the powers are `p1 = e^(-T0 tau) p0`, `z1 = e^(-T0 tau) z0`. For `k = 1` it is a prolonged flow, and z is
-/// constant.
+/// For `k = 0` the powers are `p1 = e^(-T0 tau) p0`, `z1 = e^(-T0 tau) z0`. For `k = 1` it is a prolonged flow, and z
+/// is constant.
 #[derive(Clone, Copy, Debug)]
 pub struct ActionTimesHomogeneous<H> {
     /// T, which depends on p alone.

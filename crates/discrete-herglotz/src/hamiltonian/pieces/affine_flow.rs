@@ -5,9 +5,10 @@ use crate::hamiltonian::matrix_exponential::exponential_minus_one;
 use contact_geom::Scalar;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 
-/// The flow of the affine vector field `q' = A q + a z + b`, `z' = c . q + gamma z + d` by the exponential of its matrix.
-/// `Prolonged(AffineFlow { .. })` is the piece `H = p . (A q + a z + b) - c . q - gamma z - d`: the lift of a linear vector
-/// field on Q, with drag, and the product `z a . p`. The matrices of a map are computed once for a length of time.
+/// The flow of the affine vector field `q' = A q + a z + b`, `z' = c . q + gamma z + d` by the exponential of its
+/// matrix. `Prolonged(AffineFlow { .. })` is the piece `H = p . (A q + a z + b) - c . q - gamma z - d`: the lift of a
+/// linear vector field on Q, with drag, and the product `z a . p`. The matrices of a map are computed once for a length
+/// of time.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, nalgebra::SMatrix};

@@ -25,9 +25,9 @@ use contact_geom::{ContactHamiltonian, PhasePoint, Scalar};
 
 /// A contact Hamiltonian whose flow is known in closed form at each fixed time t: a piece of a splitting.
 ///
-/// The flow over a time tau is conformally contact, `phi* eta = sigma eta` with `ln sigma = -int H_z`. Where it depends on
-/// the state only through `(q, z)`, implement [`PointFlow`] instead: [`Prolonged`] derives the momenta. The flow of a
-/// z-free piece is a strict contact transformation, `sigma = 1`.
+/// The flow over a time tau is conformally contact, `phi* eta = sigma eta` with `ln sigma = -int H_z`. Where it depends
+/// on the state only through `(q, z)`, implement [`PointFlow`] instead: [`Prolonged`] derives the momenta. The flow of
+/// a z-free piece is a strict contact transformation, `sigma = 1`.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, nalgebra::SMatrix};

@@ -10,9 +10,9 @@ pub trait Polynomial<const N: usize> {
     fn coefficients<T: Scalar>(&self, t: T, q: &SVector<T, N>) -> [T; 3];
 }
 
-/// The piece `H = c0(t, q) + c1(t, q) z + c2(t, q) z^2` as a [`PointFlow`], to be used as `Prolonged(PolynomialInAction(c))`.
-/// The positions are constant along its flow, and z satisfies a Riccati equation: with `D = c1^2/4 - c0 c2` and
-/// `S = sinh(sqrt(D) tau)/sqrt(D)`,
+/// The piece `H = c0(t, q) + c1(t, q) z + c2(t, q) z^2` as a [`PointFlow`], to be used as
+/// `Prolonged(PolynomialInAction(c))`. The positions are constant along its flow, and z satisfies a Riccati equation:
+/// with `D = c1^2/4 - c0 c2` and `S = sinh(sqrt(D) tau)/sqrt(D)`,
 ///
 /// `z1 - z0 = -H S/(cosh(sqrt(D) tau) + (c1/2 + c2 z0) S)` as long as the denominator has no zero.
 ///

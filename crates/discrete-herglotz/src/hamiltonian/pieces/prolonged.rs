@@ -28,10 +28,10 @@ pub trait PointFlow<const N: usize> {
 ///
 /// `(D_q q1 + D_z q1 p0^T)^T p1 = D_q z1 + p0 D_z z1`, `sigma = D_z z1 - p1 . D_z q1`.
 ///
-/// This is the unique map over the point transformation with `dz1 - p1 dq1 = sigma (dz0 - p0 dq0)`: both sides are compared
-/// in dq0 and in dz0. It covers `f(z)`, `a(q) z`, `p . X(q)` and `z p . X(q)`. Jacobi brackets of such pieces with z-free ones
-/// give all contact Hamiltonians that are polynomials in p: Kevrekidis, "Local universal splitting integrators for
-/// contact Hamiltonian systems", arXiv 2605.09103.
+/// This is the unique map over the point transformation with `dz1 - p1 dq1 = sigma (dz0 - p0 dq0)`: both sides are
+/// compared in dq0 and in dz0. It covers `f(z)`, `a(q) z`, `p . X(q)` and `z p . X(q)`. Jacobi brackets of such pieces
+/// with z-free ones give all contact Hamiltonians that are polynomials in p: Kevrekidis, "Local universal splitting
+/// integrators for contact Hamiltonian systems", arXiv 2605.09103.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, Scalar, nalgebra::SVector};

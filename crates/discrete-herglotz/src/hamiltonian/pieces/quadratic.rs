@@ -14,8 +14,8 @@ use contact_geom::{ContactHamiltonian, PhasePoint, Scalar};
 ///
 /// `z1 = sigma z0 + x0 . M x0/2`, `M = E_p^T E_q - sigma e_p^T e_q`,
 ///
-/// where `E_q`, `E_p` are the rows of E for q and for p, and `e_q`, `e_p` those of the identity. M is symmetric because E is
-/// conformally symplectic.
+/// where `E_q`, `E_p` are the rows of E for q and for p, and `e_q`, `e_p` those of the identity. M is symmetric because
+/// E is conformally symplectic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadratic<const N: usize> {
     qq: SMatrix<f64, N, N>,

@@ -93,8 +93,8 @@ pub(super) fn distance<const N: usize>(a: &PhasePoint<N>, b: &PhasePoint<N>) -> 
     ChartVector::from(*a).minus(ChartVector::from(*b)).max_abs_or_nan()
 }
 
-/// The state and `ln sigma` after a time by the classical Runge-Kutta method of order 4 with this number of steps, which
-/// shares no code with the methods under test.
+/// The state and `ln sigma` after a time by the classical Runge-Kutta method of order 4 with this number of steps,
+/// which shares no code with the methods under test.
 pub(super) fn runge_kutta<const N: usize>(
     h: &impl ContactHamiltonian<N>,
     (t0, duration): (f64, f64),

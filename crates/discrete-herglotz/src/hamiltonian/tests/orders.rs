@@ -130,8 +130,8 @@ fn problems_take_a_splitting() {
         stepper.advance(1).unwrap();
         stepper.state()
     };
-    // The error of the quotient is 1e-8 in third derivatives.
+    // The error of the quotient is 1e-8 times third derivatives.
     let moved = |d: f64| end(PhasePoint { z: 0.2 + d, ..start() });
     let slope = (moved(1e-4).p[0] - moved(-1e-4).p[0]) / 2e-4;
-    assert!((jacobian[(1, 2)] - slope).abs() < 1e-8 && slope.abs() > 1e-3, "{slope} {jacobian}");
+    assert!((jacobian[(1, 2)] - slope).abs() < 1e-7 && slope.abs() > 1e-3, "{slope} {jacobian}");
 }

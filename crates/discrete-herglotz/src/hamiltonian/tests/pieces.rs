@@ -1,5 +1,5 @@
-//! Every kind of piece: its flow is conformally contact with its factor, solves the contact Hamiltonian equations, and is a
-//! group.
+//! Every kind of piece: its flow is conformally contact with its factor, solves the contact Hamiltonian equations, and
+//! is a group.
 
 use super::{Coefficients, Plane, Squares, distance, pullback, random_point, runge_kutta};
 use crate::hamiltonian::{
@@ -35,10 +35,10 @@ fn check<P: ContactPiece<2>>(name: &str, piece: &P) {
         let map = piece.over(tau);
         let change = piece.change(&map, t, &x);
         let (end, sigma) = (change.after(&x), 1.0 + change.sigma_minus_one);
-        // Contact, with the factor of the increment. The Jacobians are of size one.
+        // Contact, with the factor of the increment. The entries of the Jacobians are below 10.
         let (defect, factor) = pullback(&x, |x| Ok::<_, ()>(piece.change(&map, t, x).after(x)));
-        assert!(defect < 1e-14, "{name} {k}: defect {defect:e}");
-        assert!((factor - sigma).abs() < 1e-14 * sigma, "{name} {k}: factor {factor}, {sigma}");
+        assert!(defect < 1e-13, "{name} {k}: defect {defect:e}");
+        assert!((factor - sigma).abs() < 1e-13 * sigma, "{name} {k}: factor {factor}, {sigma}");
         // The error of the reference is some (tau/400)^4, 1e-13.
         let (exact, log) = runge_kutta(piece, (t, tau), &x, 600, true);
         assert!(distance(&end, &exact) < 2e-12, "{name} {k}: {end:?}, {exact:?}");
@@ -49,7 +49,7 @@ fn check<P: ContactPiece<2>>(name: &str, piece: &P) {
         let twice = piece.change(&half, t, &between).after(&between);
         let back = piece.change(&piece.over(-tau), t, &end).after(&end);
         let apart = [distance(&twice, &end), distance(&back, &x)];
-        assert!(apart.iter().all(|d| *d < 1e-14), "{name} {k}: {apart:?}");
+        assert!(apart.iter().all(|d| *d < 1e-13), "{name} {k}: {apart:?}");
     }
 }
 
@@ -59,7 +59,7 @@ fn every_piece_has_the_contact_flow_of_its_hamiltonian() {
     check("potential", &Potential(Plane::Potential));
     check("quadratic", &quadratic());
     check("affine", &Prolonged(affine()));
-    for sign in [1.0, -1.0, 0.0, 30.0, -15.0] {
+    for sign in [1.0, -1.0, 0.0, 2.0, -2.0] {
         check("polynomial in z", &Prolonged(PolynomialInAction(Coefficients(sign))));
     }
     check("action", &Prolonged(ActionPart(Riccati { b: -0.4, c: 0.3 })));
@@ -69,7 +69,8 @@ fn every_piece_has_the_contact_flow_of_its_hamiltonian() {
     }
 }
 
-/// Times of 1e-12 and 20: the matrix exponential and the entire functions have no cancellation, and no bound on the time.
+/// Times of 1e-12 and 20: the matrix exponential and the entire functions have no cancellation, and no bound on the
+/// time.
 #[test]
 fn flows_over_tiny_and_long_times() {
     let (x, one) = (random_point::<2>(3), SMatrix::<f64, 2, 2>::identity());
@@ -81,7 +82,16 @@ fn flows_over_tiny_and_long_times() {
         assert!((change.z / tau - field.z).abs() < 4.0 * tau.abs() + 1e-14, "{tau}: {}, {}", change.z / tau, field.z);
         assert!((change.q[0] / tau - field.x[0]).abs() < 4.0 * tau.abs() + 1e-14);
     }
-    // The damped oscillator in closed form: w = sqrt(1 - gamma^2/4), q(t) = e^(gamma t/2) (cos w t - gamma/(2 w) sin w t).
+    // Both closed forms of the Riccati equation for arguments beyond 1: c2 = -15 and c2 = 15.
+    for (sign, z) in [(30.0, -0.5), (-30.0, 1.0)] {
+        let (x, riccati) =
+            (PhasePoint { q: [0.0, 0.4].into(), z, ..x }, Prolonged(PolynomialInAction(Coefficients(sign))));
+        let end = riccati.change(&0.3, 0.0, &x).after(&x);
+        let (exact, _) = runge_kutta(&riccati, (0.0, 0.3), &x, 3000, true);
+        assert!(distance(&end, &exact) < 1e-11, "{sign}: {end:?}, {exact:?}");
+    }
+    // The damped oscillator in closed form: w = sqrt(1 - gamma^2/4), q(t) = e^(gamma t/2) (cos w t - gamma/(2 w) sin w
+    // t).
     let (gamma, tau) = (-0.1f64, 20.0f64);
     let damped = Quadratic::new(one, one * 0.0, one, gamma);
     let start = PhasePoint::new([1.0, 0.0], [0.0, 0.0], 0.0);
@@ -91,8 +101,8 @@ fn flows_over_tiny_and_long_times() {
     assert!((end.q[0] - exact).abs() < 1e-13, "{} {exact}", end.q[0]);
 }
 
-/// Where a flow ends, its increment is NaN: z' = z^2 from z = 1 at time 1, also after the next branch of the closed form
-/// begins; a projected graph at a caustic.
+/// Where a flow ends, its increment is NaN: z' = z^2 from z = 1 at time 1, also after the next branch of the closed
+/// form begins; a projected graph at a caustic.
 #[test]
 fn flows_beyond_their_domain_are_undefined() {
     let x = PhasePoint::new([0.0, 0.0], [0.5, 0.0], 1.0);
