@@ -12,6 +12,8 @@ mod common;
 
 #[path = "hamiltonians/catalogue.rs"]
 mod catalogue;
+#[path = "hamiltonians/runs.rs"]
+mod runs;
 #[path = "hamiltonians/steps.rs"]
 mod steps;
 #[path = "hamiltonians/systems.rs"]

@@ -29,18 +29,25 @@ fn end<H: ContactHamiltonian<N>, const N: usize>(
     outcome.state()
 }
 
-fn order<H: ContactHamiltonian<N>, const N: usize>(name: &str, hamiltonian: H, start: PhasePoint<N>) {
+fn order<H: ContactHamiltonian<N>, const N: usize>(
+    name: &str,
+    hamiltonian: H,
+    start: PhasePoint<N>,
+    span: f64,
+    fewest: f64,
+) {
     let hamiltonian = &OfHamiltonian(hamiltonian);
-    let exact = end(hamiltonian, start, 12, 0.05, 4.0);
-    for stages in 1..=4 {
+    let exact = end(hamiltonian, start, 12, 0.05, span);
+    for stages in 1..=most {
         let counts: &[f64] = match stages {
             1 => &[32.0, 64.0, 128.0],
             2 => &[16.0, 32.0, 64.0],
             3 => &[8.0, 12.0, 18.0],
-            _ => &[5.0, 6.0, 8.0],
+            // Above round-off there are few steps.
+            _ => &[4.0, 5.0, 6.0],
         };
         let of =
-            |count: &f64| (1.0 / count, relative_distance(end(hamiltonian, start, stages, 1.0 / count, 4.0), exact));
+            |count: &f64| (1.0 / count, relative_distance(end(hamiltonian, start, stages, 1.0 / count, span), exact));
         let points: Vec<_> = counts.iter().map(of).collect();
         // Above the round-off of the two runs.
         assert!(points.iter().all(|(_, error)| *error > 3e-14), "{name}, {stages} stages: {points:?}");
@@ -51,11 +58,11 @@ fn order<H: ContactHamiltonian<N>, const N: usize>(name: &str, hamiltonian: H, s
 
 #[test]
 fn the_order_is_twice_the_number_of_stages() {
-    order("nonlinear", One::Nonlinear, one());
-    order("linear in p", One::Linear, one());
-    order("homogeneous", One::Homogeneous, one());
-    order("ray", Two::Ray, two());
-    order("two coordinates", Two::Nonlinear, two());
+    order("nonlinear", One::Nonlinear, one(), 4.0, 4);
+    order("linear in p", One::Linear, one(), 1.0, 3);
+    order("homogeneous", One::Homogeneous, one(), 2.0, 4);
+    order("ray", Two::Ray, two(), 2.0, 4);
+    order("two coordinates", Two::Nonlinear, two(), 2.0, 4);
 }
 
 /// The pullback of `dz - p dq` by a step is `sigma_d` times it, whatever the rank of `H_pp` and the step size. The bound

@@ -5,6 +5,7 @@ use contact_geom::systems::{OneCoordinate, System, TwoCoordinates};
 use contact_geom::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
 
 /// Contact Hamiltonians with one coordinate.
+#[derive(Clone, Copy, Debug)]
 pub enum One {
     /// The Hamiltonian of a system of the catalogue.
     Of(OneCoordinate),
@@ -17,6 +18,10 @@ pub enum One {
     Homogeneous,
     /// Stiff relaxation to a slow motion: `-1000 p (q - cos t)`.
     Stiff,
+    /// `p ln q`, which is not defined for q < 0.
+    Undefined,
+    /// `p^3`, with the false claim to be quadratic in p.
+    FalseClaim,
 }
 
 impl ContactHamiltonian<1> for One {
@@ -31,12 +36,15 @@ impl ContactHamiltonian<1> for One {
             One::Linear => y * (x.cos() + z * 0.2) + (x * x * 0.5 + z * 0.1) * z,
             One::Homogeneous => y * (x.sin().powi(2) * 0.25 + 1.0) + z * 0.1,
             One::Stiff => y * (x - t.cos()) * -1000.0,
+            One::Undefined => y * x.ln(),
+            One::FalseClaim => y.powi(3),
         }
     }
     fn structure(&self) -> HamiltonianStructure {
         let none = HamiltonianStructure::default();
         match self {
-            One::Of(_) | One::Stiff => none,
+            One::Of(_) | One::Stiff | One::Undefined => none,
+            One::FalseClaim => HamiltonianStructure { degree: Some(2), ..none },
             One::Nonlinear => HamiltonianStructure { autonomous: true, degree: Some(4), ..none },
             One::Linear => HamiltonianStructure { autonomous: true, degree: Some(1), ..none },
             One::Homogeneous => {
@@ -47,6 +55,7 @@ impl ContactHamiltonian<1> for One {
 }
 
 /// Contact Hamiltonians with two coordinates.
+#[derive(Clone, Copy, Debug)]
 pub enum Two {
     /// The Hamiltonian of a system of the catalogue.
     Of(TwoCoordinates),

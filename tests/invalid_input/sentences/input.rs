@@ -6,7 +6,8 @@ use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
-    DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityDrag, VelocityPoint,
+    ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
+    TimeTransformation, VelocityDrag, VelocityPoint,
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
@@ -48,6 +49,15 @@ struct Stopped;
 impl TimeTransformation<2> for Stopped {
     fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
         q[0] * 0.0
+    }
+}
+
+/// `H = 2 p`, whose motion has one velocity only.
+struct Shift;
+
+impl ContactHamiltonian<1> for Shift {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, p: &SVector<T, 1>, _z: T) -> T {
+        p[0] * 2.0
     }
 }
 
@@ -153,6 +163,10 @@ fn input_errors() {
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
         }, ["t = 7.25", "row 1", "outside of the span of the run", "in the direction of the run"];
         InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
+        InputError::NoMomentum => {
+            let start = VelocityPoint::new([0.0], [1.0], 0.0);
+            Problem::new(&OfHamiltonian(Shift), 0.0, start).err().unwrap()
+        }, ["has no momentum", "H_pp is singular", "start from a momentum"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
         InputError::TimeTransformation { .. } => {
             let gauss = Gauss::new(kepler, 3, 0.1).unwrap();

@@ -4,16 +4,25 @@ use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::step_control::StepControl;
 use crate::run::Interruption;
 use crate::{
-    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper, StepperOptions,
-    Until,
+    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, StepError, Stepper,
+    StepperOptions, Until,
     integration::{BatchKernel, StepFormula},
 };
-use contact_geom::Lagrangian;
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// The integrator of an ensemble, for the lifetime of the run of one member.
 pub(crate) struct OfMember<'i, 'a, L, const N: usize> {
     pub integrator: &'i (dyn Integrator<'a, L, N> + Sync + 'a),
     pub lagrangian: &'a L,
+}
+
+impl<'a, L, const N: usize> OfMember<'_, 'a, L, N> {
+    /// A problem for the lifetime of the members.
+    fn own(&self, problem: &Problem<'_, L, N>) -> Problem<'a, L, N> {
+        let Problem { t0, start, state, from_momentum, structure, .. } = *problem;
+        Problem { lagrangian: self.lagrangian, t0, start, state, from_momentum, structure, interrupt: None }
+    }
 }
 
 impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> for OfMember<'i, 'a, L, N> {
@@ -31,12 +40,7 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        let Problem { t0, start, state, from_momentum, structure, .. } = *problem;
-        self.integrator.stepper(
-            &Problem { lagrangian: self.lagrangian, t0, start, state, from_momentum, structure, interrupt: None },
-            h,
-            options,
-        )
+        self.integrator.stepper(&self.own(problem), h, options)
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
@@ -45,6 +49,15 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 
     fn step_formula(&self) -> Option<StepFormula> {
         self.integrator.step_formula()
+    }
+
+    fn step_jacobian(
+        &self,
+        problem: &Problem<'p, L, N>,
+        h: f64,
+        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        self.integrator.step_jacobian(&self.own(problem), h, step)
     }
 }
 

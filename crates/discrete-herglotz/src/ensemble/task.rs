@@ -38,9 +38,11 @@ impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
 
     pub(crate) fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
         match self {
-            Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, options),
-            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, options),
+            Kernel::Splitting(packs) if const { !L::HINTS.hamiltonian } => {
+                packs.run(instructions, lanes, action, options);
+            }
+            Kernel::Gauss(packs) if const { !L::HINTS.hamiltonian } => packs.run(instructions, lanes, action, options),
+            _ => {}
         }
     }
 }
@@ -87,6 +89,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     ) -> Kernel<'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
         // With switching functions, steps end on kinks, at different times for each member.
+        // The kernels evaluate L.
+        if const { L::HINTS.hamiltonian } {
+            return Kernel::OneByOne;
+        }
         let start = VelocityPoint { q: state.q, v: state.p, z: state.z };
         if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
