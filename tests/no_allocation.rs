@@ -16,12 +16,12 @@ mod gauss_steppers;
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
+use contact_geom::{ContactHamiltonian, Lagrangian, OfHamiltonian, PhasePoint, Scalar, VelocityPoint, legendre};
 use counting_allocator::{allocations, peak};
 use discrete_herglotz::{
-    DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, Steps, Until,
+    DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, StepperOptions, Steps, Until,
     boundary::{BoundaryPath, End},
-    gauss::{Gauss, GaussRoute},
+    gauss::{Gauss, GaussRoute, GaussStepper},
     rules::{Flow, LeftMidpoint, Method},
     sensitivity::{EndState, Loss},
 };
@@ -97,6 +97,28 @@ fn collocation() {
     run(&Kepler::<3>::default(), 0.05, GaussRoute::Condensed);
     run(&QuadraticInZ::default(), 0.1, GaussRoute::ConstantMass);
     run(&DoublePendulum::default(), 0.02, GaussRoute::General);
+}
+
+/// Steps for a contact Hamiltonian: by fixed-point iteration, and so long that Newton's method is used.
+#[test]
+fn collocation_for_a_hamiltonian() {
+    /// `p (cos q + z/5) + (q^2/2 + z/10) z + k p (q - 1)`: linear in p, with a relaxation of rate k.
+    struct Linear(f64);
+    impl ContactHamiltonian<1> for Linear {
+        #[inline(always)]
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+            p[0] * (q[0].cos() + z * 0.2 - (q[0] - 1.0) * self.0) + (q[0] * q[0] * 0.5 + z * 0.1) * z
+        }
+    }
+    for (rate, h, by_newton) in [(0.0, 0.1, false), (300.0, 0.1, true)] {
+        let hamiltonian = OfHamiltonian(Linear(rate));
+        let problem = Problem::of_hamiltonian(&hamiltonian, 0.0, PhasePoint::new([1.0], [1e-9], 0.1)).unwrap();
+        let mut stepper = GaussStepper::new(&problem, 4, h, StepperOptions::default()).unwrap();
+        assert_eq!(stepper.advance(1), Ok(()));
+        let mut outcome = Ok(());
+        let count = allocations(|| outcome = stepper.advance(7));
+        assert_eq!((outcome, count, stepper.newton_steps() > 0), (Ok(()), 0, by_newton), "rate {rate}");
+    }
 }
 
 /// The exact discrete Lagrangian, its jets and steps, by each route to the motion between two points.

@@ -92,6 +92,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod degrees;
 mod derivatives;
 mod derived;
 mod drag;
@@ -103,6 +104,7 @@ mod forces;
 mod formula;
 mod functions;
 mod graph;
+mod hamiltonian;
 mod hints;
 mod impacts;
 mod lagrangian;
@@ -128,7 +130,9 @@ pub use expression::Expression;
 pub use expression_gradient::ExpressionGradient;
 pub use formula::Formula;
 pub use graph::Graph;
+pub use hamiltonian::FormulaHamiltonian;
 pub use lagrangian::FormulaLagrangian;
+pub use names::FormulaNames;
 pub use node::{Function, Id, Node, Operation};
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
 pub use resets::{Direction, Reset, ResetNodes, Variable};

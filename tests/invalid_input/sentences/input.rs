@@ -3,13 +3,15 @@
 use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
-    DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityDrag, VelocityPoint,
+    ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
+    TimeTransformation, VelocityDrag, VelocityPoint,
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
+use discrete_herglotz::hamiltonian::{HamiltonianSplitting, Kinetic, PieceStepper, Quadratic};
 use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint, Rectangle};
 use discrete_herglotz::splitting::Strang;
 use discrete_herglotz::theory::DiscretePath;
@@ -51,6 +53,15 @@ impl TimeTransformation<2> for Stopped {
     }
 }
 
+/// `H = 2 p`, whose motion has one velocity only.
+struct Shift;
+
+impl ContactHamiltonian<1> for Shift {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, p: &SVector<T, 1>, _z: T) -> T {
+        p[0] * 2.0
+    }
+}
+
 struct Nothing;
 
 impl Lagrangian<0> for Nothing {
@@ -70,6 +81,12 @@ impl DiscreteLagrangian<1> for Length {
         let d = x.q1[0] - x.q0[0];
         Ok(d * d.sqrt() - x.z0 * 0.01)
     }
+}
+
+/// The contact Hamiltonian of an oscillator with drag.
+fn spring() -> Quadratic<1> {
+    let one = SMatrix::identity();
+    Quadratic::new(one, one * 0.0, one, -0.1)
 }
 
 /// An integrator with the required functions alone.
@@ -153,6 +170,10 @@ fn input_errors() {
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
         }, ["t = 7.25", "row 1", "outside of the span of the run", "in the direction of the run"];
         InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
+        InputError::NoMomentum => {
+            let start = VelocityPoint::new([0.0], [1.0], 0.0);
+            Problem::new(&OfHamiltonian(Shift), 0.0, start).err().unwrap()
+        }, ["has no momentum", "H_pp is singular", "start from a momentum"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
         InputError::TimeTransformation { .. } => {
             let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
@@ -184,6 +205,16 @@ fn input_errors() {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
         }, ["requires a composition", "another method"];
+        InputError::PieceSum { .. } => {
+            let hamiltonian = OfHamiltonian(spring());
+            let problem = Problem::new(&hamiltonian, 0.0, pendulum_at(0.5)).unwrap();
+            let splitting = HamiltonianSplitting { pieces: (spring(), spring()), scheme: SplittingScheme::STRANG };
+            splitting.stepper(&problem, 0.1, StepperOptions::default()).err().unwrap()
+        }, ["do not sum", "differ by", "add the missing piece"];
+        InputError::PieceFlow { .. } => {
+            let pieces = (spring(), Kinetic(spring()));
+            PieceStepper::new(pieces, &SplittingScheme::STRANG, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
+        }, ["piece 1", "differ by", "correct the flow"];
         InputError::NoTimeTransformation => {
             AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
         }, ["declares a time transformation", "another integrator"];
