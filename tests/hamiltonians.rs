@@ -14,6 +14,8 @@ mod common;
 mod catalogue;
 #[path = "hamiltonians/derivatives.rs"]
 mod derivatives;
+#[path = "hamiltonians/modified.rs"]
+mod modified;
 #[path = "hamiltonians/runs.rs"]
 mod runs;
 #[path = "hamiltonians/steps.rs"]
