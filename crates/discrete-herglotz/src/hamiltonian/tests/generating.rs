@@ -74,7 +74,8 @@ fn check_order(system: Plane, arrangement: Arrangement, duration: f64, exact: &P
     });
 }
 
-/// The high orders need more evaluations and longer steps, and do not depend on the system.
+/// The high orders need more evaluations and longer steps, and do not depend on the system. For the composition of order
+/// 10, which is the reference, too few steps are long enough for errors above round-off and short enough for a slope.
 #[test]
 fn compositions_have_their_high_orders() {
     let (duration, system) = (4.0 * DURATION, Plane::Coupled);
@@ -82,7 +83,7 @@ fn compositions_have_their_high_orders() {
     let mut fine = stepper(system, Arrangement::Symmetric(SplittingScheme::SOFRONIOU_SPALETTA_10), duration / 200.0);
     fine.advance(200).unwrap();
     assert!(distance(&fine.state(), &exact) < 1e-11, "{:?}, {exact:?}", fine.state());
-    for scheme in [SplittingScheme::KAHAN_LI_6, SplittingScheme::KAHAN_LI_8, SplittingScheme::SOFRONIOU_SPALETTA_10] {
+    for scheme in [SplittingScheme::KAHAN_LI_6, SplittingScheme::KAHAN_LI_8] {
         check_order(system, Arrangement::Symmetric(scheme), duration, &fine.state());
     }
 }
