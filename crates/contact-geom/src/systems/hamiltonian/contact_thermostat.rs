@@ -70,3 +70,6 @@ impl<E: ContactHamiltonian<N>, const N: usize> ContactHamiltonian<N> for Contact
         HamiltonianStructure { autonomous: self.energy.structure().autonomous, ..HamiltonianStructure::default() }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<E: ContactHamiltonian<N>, const N: usize> crate::ParametricHamiltonian<N> for ContactThermostat<E> {}
