@@ -109,7 +109,7 @@ fn both_laws_on_random_systems() {
             entropy = now;
             steps += 1;
         });
-        assert_eq!(outcome.status, Status::Complete, "case {case}: {system:?}");
+        assert_eq!(outcome.status, Status::Completed, "case {case}: {system:?}");
     }
     assert!(steps >= 40_000 && gained > 100.0, "{steps} {gained}");
 }

@@ -25,7 +25,7 @@ fn bregman_dynamics_converges_at_its_rate() {
                 let decay = f64::from(power) * (t0 / t).ln();
                 assert!((log_factor - decay).abs() < 1e-11, "{log_factor} {decay} at {t}");
             });
-            assert_eq!(outcome.status, Status::Complete);
+            assert_eq!(outcome.status, Status::Completed);
             assert!(excess < 1e-3 && last < 0.9 * first, "{kinetic:?}, {power}: {excess} {last}");
         }
     }
@@ -50,7 +50,7 @@ fn relativistic_descent_is_slower_than_light() {
         before = (t, x.q);
         assert!((log_factor + 0.5 * t).abs() < 1e-12 * (1.0 + t));
     });
-    assert_eq!(outcome.status, Status::Complete);
+    assert_eq!(outcome.status, Status::Completed);
     assert!(fastest > 0.45 && fastest < 0.5, "{fastest}");
     assert!(system.objective.value(&outcome.q) < 1e-3, "{outcome:?}");
 }

@@ -26,7 +26,7 @@ fn a_satellite_is_captured_into_the_synchronous_resonance() {
             assert!((x.p[0] - 1.0 - 2.0 * (-1e-3 * t).exp()).abs() < 0.1, "{} at {t}", x.p[0]);
         }
     });
-    assert_eq!(outcome.status, Status::Complete);
+    assert_eq!(outcome.status, Status::Completed);
     let since = captured.unwrap();
     assert!(since > 1_500.0 && since < 4_000.0, "{since}");
     // It turns once in each orbit.

@@ -30,7 +30,7 @@ macro_rules! one_type {
                 match self { $($name::$variant(of) => of.value(t, q, p, z),)* }
             }
             fn structure(&self) -> HamiltonianStructure {
-                match self { $($name::$variant(of) => of.structure(),)* }
+                match self { $($name::$variant(of) => ContactHamiltonian::<$n>::structure(of),)* }
             }
             #[inline(always)]
             fn closed_with_gradient<T: Scalar>(
@@ -125,7 +125,7 @@ pub fn end<H: ContactHamiltonian<N>, const N: usize>(
     end: f64,
 ) -> PhasePoint<N> {
     let outcome = run(hamiltonian, start, method, end, |_, _, _| ());
-    assert_eq!(outcome.status, Status::Complete, "{outcome:?}");
+    assert_eq!(outcome.status, Status::Completed, "{outcome:?}");
     outcome.state()
 }
 

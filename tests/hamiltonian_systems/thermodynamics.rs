@@ -67,7 +67,7 @@ fn energy_error(system: Piston, method: (usize, f64), t: f64) -> (f64, f64) {
         last = hamiltonian.value(t, &x.q, &x.p, x.z).abs();
         largest = if last <= largest { largest } else { last };
     });
-    assert_eq!(outcome.status, Status::Complete);
+    assert_eq!(outcome.status, Status::Completed);
     (largest, last)
 }
 

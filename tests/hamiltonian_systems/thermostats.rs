@@ -28,7 +28,7 @@ fn the_density_times_the_volume_is_constant() {
         largest = if change <= largest { largest } else { change };
         range = if log_factor.abs() <= range { range } else { log_factor.abs() };
     });
-    assert_eq!(outcome.status, Status::Complete);
+    assert_eq!(outcome.status, Status::Completed);
     assert!(largest < 2e-13, "{largest:e}");
     assert!(range > 1.0, "ln sigma reaches {range} only");
 }
@@ -48,7 +48,7 @@ fn averages_are_those_of_the_canonical_ensemble() {
         sums[block][1] += 4.0 * x.q[0] * x.q[0];
         counts[block] += 1.0;
     });
-    assert_eq!(outcome.status, Status::Complete, "{outcome:?}");
+    assert_eq!(outcome.status, Status::Completed, "{outcome:?}");
     for i in 0..2 {
         let means: Vec<f64> = sums.iter().zip(counts).map(|(sum, count)| sum[i] / count).collect();
         let mean = means.iter().sum::<f64>() / BLOCKS as f64;

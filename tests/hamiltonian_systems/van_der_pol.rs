@@ -30,11 +30,11 @@ fn the_action_is_the_velocity() {
     let contact = |t| run(One::from(system), (0.0, PhasePoint::new([2.0], [0.3], 0.0)), (6, 0.02), t, |_, _, _| ());
     let (h, method) = (PhasePoint::new([2.0, 0.0], [0.0, 0.0], 0.0), (6, 0.02));
     let outcome = contact(0.4);
-    assert_eq!(outcome.status, Status::Complete);
+    assert_eq!(outcome.status, Status::Completed);
     let lifted = end(Two::from(Lifted(system)), (0.0, h), method, 0.4);
     assert!((outcome.q[0] - lifted.q[0]).abs() < 1e-14 && (outcome.z.unwrap() - lifted.q[1]).abs() < 1e-14);
     assert_eq!((lifted.p.norm(), lifted.z), (0.0, 0.0));
     let outcome = contact(40.0);
-    assert_ne!(outcome.status, Status::Complete);
+    assert_ne!(outcome.status, Status::Completed);
     assert!(outcome.t > 0.4 && outcome.t < 40.0 && outcome.state().check().is_ok(), "{outcome:?}");
 }

@@ -31,7 +31,8 @@ pub struct SpinOrbit {
     pub amplitude: f64,
     /// The angular frequency omega of the moment of inertia.
     pub omega: f64,
-    coefficients: [f64; HARMONICS],
+    /// The coefficients `W_k` for k from -5 to 9, by default those of the orbit.
+    pub coefficients: [f64; HARMONICS],
 }
 
 impl Default for SpinOrbit {
