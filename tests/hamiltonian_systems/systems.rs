@@ -3,7 +3,7 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::hamiltonian::{
     Bregman, ContactThermostat, Containers, HeatedOscillator, NoseHoover, NosePoincare, Piston, Quartic, Ray,
-    RelativisticDescent, SpinOrbit,
+    RelativisticDescent, SpinOrbit, TimeOfEnergy,
 };
 use contact_geom::systems::{LaneEmden, System, VanDerPol};
 use contact_geom::{
@@ -66,6 +66,7 @@ one_type! {
         Descent: RelativisticDescent<Quartic>,
         NosePoincare: NosePoincare<HeatedOscillator, 1>,
         NoseHoover: NoseHoover<HeatedOscillator, 1>,
+        Thermostat: InTransformedTime<ContactThermostat<HeatedOscillator>, TimeOfEnergy<HeatedOscillator>, 1>,
         Transformed: InTransformedTime<AtEnergy<HeatedOscillator>, HeatedOscillator, 1>,
     }
 }

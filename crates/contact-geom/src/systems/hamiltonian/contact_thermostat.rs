@@ -1,6 +1,6 @@
 //! Contact density dynamics.
 
-use crate::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
+use crate::{ContactHamiltonian, HamiltonianStructure, InTransformedTime, PhasePoint, Scalar};
 use nalgebra::SVector;
 
 /// The density f of the action z in the ensemble of a [`ContactThermostat`].
@@ -39,6 +39,9 @@ impl Bath {
 /// the paper is -z. Bravetti and Tapias, "Thermostat algorithm for generating target ensembles", Phys. Rev. E 93 (2016);
 /// the logistic bath is that of Tapias, Sanders and Bravetti, "Geometric integrator for simulations in the canonical
 /// ensemble", J. Chem. Phys. 145 (2016).
+///
+/// Since h varies by orders of magnitude, runs of equal steps are better [in the time of the
+/// energy](Self::in_time_of_energy).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactThermostat<E> {
     /// The energy; it is evaluated at `z = 0`.
@@ -58,6 +61,16 @@ impl<E> ContactThermostat<E> {
     {
         self.bath.log_density(x.z) - self.energy.value(t, &x.q, &x.p, T::zero()) * self.beta
     }
+
+    /// The same motion in the time with the rate `g = (n + 1)/(beta h)`, in which it is `q' = E_p`,
+    /// `p' = -E_q + (f'/(beta f)) p`, `z' = p . E_p - (n + 1)/beta`. The time of h is the last coordinate. Averages in the
+    /// time of h are those with the weights g at equal steps.
+    pub fn in_time_of_energy<const N: usize>(self) -> InTransformedTime<Self, TimeOfEnergy<E>, N>
+    where
+        E: ContactHamiltonian<N> + Clone,
+    {
+        InTransformedTime { hamiltonian: self.clone(), rate: TimeOfEnergy(self) }
+    }
 }
 
 impl<E: ContactHamiltonian<N>, const N: usize> ContactHamiltonian<N> for ContactThermostat<E> {
@@ -73,3 +86,18 @@ impl<E: ContactHamiltonian<N>, const N: usize> ContactHamiltonian<N> for Contact
 
 /// Without parameters: its motions are differentiated in the start and in the times.
 impl<E: ContactHamiltonian<N>, const N: usize> crate::ParametricHamiltonian<N> for ContactThermostat<E> {}
+
+/// The rate `g = (n + 1)/(beta h)` of the time of the energy of a [`ContactThermostat`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeOfEnergy<E>(pub ContactThermostat<E>);
+
+impl<E: ContactHamiltonian<N>, const N: usize> ContactHamiltonian<N> for TimeOfEnergy<E> {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
+        self.0.value(t, q, p, z).recip() * ((N as f64 + 1.0) / self.0.beta)
+    }
+
+    fn structure(&self) -> HamiltonianStructure {
+        ContactHamiltonian::<N>::structure(&self.0)
+    }
+}

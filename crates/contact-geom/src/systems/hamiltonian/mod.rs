@@ -17,7 +17,7 @@ mod relativistic_descent;
 mod spin_orbit;
 
 pub use bregman::{Bregman, Kinetic};
-pub use contact_thermostat::{Bath, ContactThermostat};
+pub use contact_thermostat::{Bath, ContactThermostat, TimeOfEnergy};
 pub use containers::{Containers, ThermalCoordinates};
 pub use gas::Gas;
 pub use heated_oscillator::HeatedOscillator;

@@ -69,7 +69,9 @@ fn declared_structures_hold() {
     }
     declared(RelativisticDescent { objective: quartic, mass: 0.5, speed: 2.0, gamma: -0.3 }, two());
     for bath in [Bath::Logistic { scale: 2.0 }, Bath::Gaussian { variance: 0.7 }] {
-        declared(ContactThermostat { energy: oscillator(), beta: 0.1, bath }, one());
+        let thermostat = ContactThermostat { energy: oscillator(), beta: 0.1, bath };
+        declared(thermostat, one());
+        declared(thermostat.in_time_of_energy::<1>(), two());
     }
     let nose = Nose::<_, 1> { energy: oscillator(), temperature: 2.0, mass: 0.5, degrees: 1.0 };
     declared(nose, two());
@@ -242,20 +244,12 @@ fn contact_density_dynamics_has_the_density() {
 
 #[test]
 fn nose_hoover_is_contact_density_dynamics_in_a_transformed_time() {
-    /// The rate `n T/h`.
-    struct Rate(ContactThermostat<HeatedOscillator>, f64);
-    impl ContactHamiltonian<1> for Rate {
-        #[inline(always)]
-        fn value<T: crate::Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
-            self.0.value(t, q, p, z).recip() * self.1
-        }
-    }
     let (temperature, mass) = (2.0, 0.5);
     let system = NoseHoover::<_, 1> { energy: oscillator(), temperature, mass };
     // `h = exp(F)` is the density of the inverse temperature 2/T and the variance Q T/2.
     let bath = Bath::Gaussian { variance: 0.5 * mass * temperature };
     let thermostat = ContactThermostat { energy: oscillator(), beta: 2.0 / temperature, bath };
-    let transformed = InTransformedTime::<_, _, 1> { hamiltonian: thermostat, rate: Rate(thermostat, temperature) };
+    let transformed = thermostat.in_time_of_energy::<1>();
     for (_, x) in points(one(), 1.0) {
         let (start, same): (PhasePoint<2>, PhasePoint<2>) = (system.start(&x), transformed.start(0.0, &x));
         close(start.p[1], same.p[1]);
