@@ -194,7 +194,13 @@ fn scenes_have_hamiltonians() -> Result {
     // m' = -m/2.
     assert!((outcome.p[1] - 3.0 * (-1.0_f64).exp()).abs() < 1e-8, "{:?}", outcome.p);
     let drag = SCENE.replace("momenta = [\"l\", \"m\"]\n", "").replace("l^2/2 + m*x", "p_x^2/2 + p_y*x");
-    let drag = Scene::read(&drag.replace("\nl =", "\np_x =").replace("\nm =", "\np_y =").replace("2*l", "2*p_x").replace("start.l", "start.p_x"))?;
+    let drag = Scene::read(
+        &drag
+            .replace("\nl =", "\np_x =")
+            .replace("\nm =", "\np_y =")
+            .replace("2*l", "2*p_x")
+            .replace("start.l", "start.p_x"),
+    )?;
     assert!(drag.system.plan(&drag.motion())?.text.starts_with("z is the action and acts as drag"));
     Ok(())
 }
@@ -207,7 +213,11 @@ fn invalid_scenes_are_refused_with_the_remedy() {
         ("momenta = [\"l\", \"m\"]", "momenta = []", "there are names of 0 momenta for 2 coordinates"),
         ("momenta = [\"l\", \"m\"]", "momenta = [\"l\", \"x\"]", "the name \"x\" is given twice"),
         ("momenta = [\"l\", \"m\"]", "momenta = [\"l\", \"z\"]", "the name \"z\" is that of the action"),
-        ("momenta = [\"l\", \"m\"]", "momenta = [\"l\", \"m\"]\naction = \"x\"", "the name \"x\" is that of the action"),
+        (
+            "momenta = [\"l\", \"m\"]",
+            "momenta = [\"l\", \"m\"]\naction = \"x\"",
+            "the name \"x\" is that of the action",
+        ),
         ("hamiltonian = \"l^2/2 + m*x + g*z\"", "lagrangian = \"x'^2 + y'^2 + g*z\"", "`momenta` are names for"),
         ("l^2/2", "x'^2/2", "a Hamiltonian depends on momenta, not on velocities; write `l`"),
         ("m = 3.0\n", "", "the momentum `m` has no value at the start; add `m = 0.0` to [start]"),
