@@ -12,6 +12,10 @@ mod common;
 
 #[path = "hamiltonians/catalogue.rs"]
 mod catalogue;
+#[path = "hamiltonians/derivatives.rs"]
+mod derivatives;
+#[path = "hamiltonians/modified.rs"]
+mod modified;
 #[path = "hamiltonians/runs.rs"]
 mod runs;
 #[path = "hamiltonians/steps.rs"]

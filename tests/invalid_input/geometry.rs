@@ -2,6 +2,8 @@
 
 #[path = "geometry/forms.rs"]
 mod forms;
+#[path = "geometry/hamiltonian_systems.rs"]
+mod hamiltonian_systems;
 #[path = "geometry/lagrangians.rs"]
 mod lagrangians;
 #[path = "geometry/scalars.rs"]
@@ -26,6 +28,14 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Duffing::forced", "takes no number"),
     ("Lienard::initial", "takes no number"),
     ("VanDerPol::initial", "takes no number"),
+    ("Containers::initial", "takes no number"),
+    ("HeatedOscillator::initial", "takes no number"),
+    ("Piston::initial", "takes no number"),
+    ("SpinOrbit::initial", "takes no number"),
+    ("SpinOrbit::coefficient", "takes the number of a harmonic"),
+    ("Gas::ideal", "takes no number"),
+    ("Gas::van_der_waals", "stores its arguments; every start checks them"),
+    ("VectorField::is_autonomous", "the implementor's, and takes no number"),
     ("Structure::has_constant_rate", "takes no number"),
     ("Structure::is_affine_in_z", "takes no number"),
     ("Forced::new", "stores its arguments; every start checks them"),
@@ -42,4 +52,5 @@ pub const EXCEPTIONS: Exceptions = &[
     ("$name::new", "stores its arguments; check() and every start check them"),
 ];
 
-pub const TESTS: &[&[InputTest]] = &[forms::TESTS, lagrangians::TESTS, scalars::TESTS, switching::TESTS];
+pub const TESTS: &[&[InputTest]] =
+    &[forms::TESTS, hamiltonian_systems::TESTS, lagrangians::TESTS, scalars::TESTS, switching::TESTS];

@@ -3,10 +3,12 @@
 use crate::common::gauss::GaussSteppers;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use contact_geom::{
+    ContactHamiltonian, DiscretePoint, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityPoint,
+};
 use discrete_herglotz::{
-    AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, Stepper, Steps, Until,
-    gauss::Gauss,
+    AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, Stepper, StepperOptions, Steps, Until,
+    gauss::{Gauss, GaussStepper},
     rules::{Composition, Flow, Method, Midpoint, Rectangle},
 };
 use std::fs;
@@ -152,4 +154,26 @@ fn chaos_outgrows_any_accuracy() {
     };
     let apart = (run(2.5) - run(2.5 + 4.0 * f64::EPSILON)).amax();
     assert!(apart > 1e-9, "{apart:e}");
+}
+
+#[test]
+fn a_momentum_ends_a_run_whose_positions_continue() {
+    struct VanDerPol;
+    impl ContactHamiltonian<1> for VanDerPol {
+        #[inline(always)]
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+            z * (p[0] + q[0] * q[0] - 1.0) + q[0]
+        }
+    }
+    let hamiltonian = OfHamiltonian(VanDerPol);
+    let problem = Problem::of_hamiltonian(&hamiltonian, 0.0, PhasePoint::new([2.0], [0.0], 0.0)).unwrap();
+    let options = StepperOptions { action: true, check_resolution: false };
+    let mut stepper = GaussStepper::new(&problem, 8, 0.01, options).unwrap();
+    let failure = stepper.advance(2000).unwrap_err();
+    let state = stepper.state();
+    // The momentum has grown, and the motion is on its way to the limit cycle.
+    assert!(
+        failure.taken < 2000 && state.p[0].abs() > 10.0 && state.q[0].abs() < 3.0 && state.z.abs() < 3.0,
+        "{state:?}"
+    );
 }

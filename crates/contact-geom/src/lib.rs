@@ -70,11 +70,12 @@ pub mod switching {
 }
 
 pub use dynamics::{
-    AsFunction, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced,
-    HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, Lagrangian, Legendre, LiftedAction,
-    NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup, Parametric, ParametricForce, Quotient, Regularity,
-    Structure, Symmetry, TimeTransformation, UnknownParameter, VelocityDrag, WithoutClosedDerivatives,
-    check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, momentum, regularity,
+    AsFunction, AtEnergy, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced,
+    HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, InTransformedTime, Lagrangian,
+    Legendre, Lifted, LiftedAction, NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup, Parametric,
+    ParametricForce, ParametricHamiltonian, Quotient, Regularity, Structure, Symmetry, TimeTransformation, TimesRate,
+    UnknownParameter, VectorField, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field,
+    legendre, legendre_jacobian, momentum, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{

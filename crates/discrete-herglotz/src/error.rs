@@ -185,6 +185,26 @@ pub enum InputError {
         /// The hypothesis.
         hypothesis: &'static str,
     },
+    /// The pieces of a splitting do not sum to the contact Hamiltonian.
+    #[error(
+        "the pieces of the splitting do not sum to the contact Hamiltonian: near the start they differ by {size:e}, \
+         relative to the size of the terms; add the missing piece, or correct one"
+    )]
+    PieceSum {
+        /// The difference, relative to the sum of the magnitudes of H and of the pieces.
+        size: f64,
+    },
+    /// The flow of a piece of a splitting is not that of its contact Hamiltonian.
+    #[error(
+        "the flow of piece {index} of the splitting is not that of its contact Hamiltonian: near the start they differ by \
+         {size:e}; correct the flow, or choose a kind of piece that has this form"
+    )]
+    PieceFlow {
+        /// The index of the piece, from 0.
+        index: usize,
+        /// The difference, relative to the size of the state.
+        size: f64,
+    },
     /// The method needs a time transformation, which the Lagrangian does not state.
     #[error(
         "the method requires a Lagrangian that declares a time transformation (`Hints::time_transformation`, `dt_dtau`); choose another integrator or another Lagrangian"

@@ -3,7 +3,7 @@
 use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
@@ -11,6 +11,7 @@ use contact_geom::{
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
+use discrete_herglotz::hamiltonian::{HamiltonianSplitting, Kinetic, PieceStepper, Quadratic};
 use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint, Rectangle};
 use discrete_herglotz::splitting::Strang;
 use discrete_herglotz::theory::DiscretePath;
@@ -80,6 +81,12 @@ impl DiscreteLagrangian<1> for Length {
         let d = x.q1[0] - x.q0[0];
         Ok(d * d.sqrt() - x.z0 * 0.01)
     }
+}
+
+/// The contact Hamiltonian of an oscillator with drag.
+fn spring() -> Quadratic<1> {
+    let one = SMatrix::identity();
+    Quadratic::new(one, one * 0.0, one, -0.1)
 }
 
 /// An integrator with the required functions alone.
@@ -198,6 +205,16 @@ fn input_errors() {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
         }, ["requires a composition", "another method"];
+        InputError::PieceSum { .. } => {
+            let hamiltonian = OfHamiltonian(spring());
+            let problem = Problem::new(&hamiltonian, 0.0, pendulum_at(0.5)).unwrap();
+            let splitting = HamiltonianSplitting { pieces: (spring(), spring()), scheme: SplittingScheme::STRANG };
+            splitting.stepper(&problem, 0.1, StepperOptions::default()).err().unwrap()
+        }, ["do not sum", "differ by", "add the missing piece"];
+        InputError::PieceFlow { .. } => {
+            let pieces = (spring(), Kinetic(spring()));
+            PieceStepper::new(pieces, &SplittingScheme::STRANG, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
+        }, ["piece 1", "differ by", "correct the flow"];
         InputError::NoTimeTransformation => {
             AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
         }, ["declares a time transformation", "another integrator"];

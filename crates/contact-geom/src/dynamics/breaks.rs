@@ -2,7 +2,7 @@
 
 use crate::dynamics::lagrangian::forward_lagrangian;
 use crate::switching::Control;
-use crate::{GeometryError, Hints, Lagrangian, Parametric, Scalar, VelocityPoint};
+use crate::{GeometryError, Hints, Lagrangian, Parametric, PhasePoint, Scalar, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// A Lagrangian, or a Lagrangian with a force, that has a kink or a jump in time at each of these times: steps end
@@ -80,6 +80,10 @@ impl<const N: usize, L: Parametric<N>> Parametric<N> for Breaks<L> {
     #[inline(always)]
     fn force_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         self.lagrangian.force_at(theta, t, x)
+    }
+    #[inline(always)]
+    fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
+        self.lagrangian.hamiltonian_at(theta, t, x)
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         self.lagrangian.switching_function_at(theta, index, t, x)

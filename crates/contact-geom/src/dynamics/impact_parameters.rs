@@ -2,7 +2,7 @@
 
 use crate::dynamics::impact::{Impact, Impacts, Surface, normal_of};
 use crate::dynamics::law_derivatives::AtParameters;
-use crate::{Parametric, Scalar, VelocityPoint};
+use crate::{Parametric, PhasePoint, Scalar, VelocityPoint};
 use nalgebra::SVector;
 
 impl Impact {
@@ -84,6 +84,10 @@ impl<const N: usize, L: Parametric<N>, S: Surface<N> + Clone> Parametric<N> for 
     #[inline(always)]
     fn force_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         self.lagrangian.force_at(&theta[..self.lagrangian.parameter_count()], t, x)
+    }
+    #[inline(always)]
+    fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
+        self.lagrangian.hamiltonian_at(&theta[..self.lagrangian.parameter_count()], t, x)
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         let Parts { lagrangian, surface, .. } = self.parts::<_, N>(theta)?;

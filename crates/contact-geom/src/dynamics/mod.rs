@@ -4,7 +4,7 @@
 mod action;
 pub(crate) mod blocks;
 mod breaks;
-mod contact_hamiltonian;
+pub(crate) mod contact_hamiltonian;
 mod control;
 mod derivatives;
 mod force;
@@ -25,7 +25,8 @@ mod time_transformation;
 pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
 pub use contact_hamiltonian::{
-    AsFunction, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, NoMomentum, OfHamiltonian, momentum,
+    AsFunction, AtEnergy, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, InTransformedTime, Lifted,
+    NoMomentum, OfHamiltonian, ParametricHamiltonian, TimesRate, VectorField, momentum,
 };
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};

@@ -1,6 +1,7 @@
 //! Parameters of Lagrangians and of forces, with respect to which motions can be differentiated.
 
-use crate::{Force, Forced, Lagrangian, Scalar, VelocityDrag, VelocityPoint, dynamics::nearest_name::nearest_name};
+use crate::dynamics::nearest_name::nearest_name;
+use crate::{Force, Forced, Lagrangian, PhasePoint, Scalar, VelocityDrag, VelocityPoint};
 use nalgebra::SVector;
 use thiserror::Error;
 
@@ -88,6 +89,13 @@ pub trait Parametric<const N: usize>: Lagrangian<N> {
     #[inline(always)]
     fn force_at<T: Scalar>(&self, _theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         self.applied_force(t, x)
+    }
+
+    /// The contact Hamiltonian `H(t, q, p, z; theta)` by which this Lagrangian is given; see
+    /// [`Hints::hamiltonian`](crate::Hints::hamiltonian). `None`, the default, where it is not given by one.
+    #[inline(always)]
+    fn hamiltonian_at<T: Scalar>(&self, _theta: &[T], _t: T, _x: &PhasePoint<N, T>) -> Option<T> {
+        None
     }
 
     /// The [switching function](Lagrangian::switching_functions) with this index, for any values of the parameters.
@@ -243,6 +251,10 @@ impl<const N: usize, L: Parametric<N>, F: ParametricForce<N>> Parametric<N> for 
             return force + self.lagrangian.force_at(own, t, x);
         }
         force
+    }
+    #[inline(always)]
+    fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
+        self.lagrangian.hamiltonian_at(&theta[..self.lagrangian.parameter_count()], t, x)
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         self.lagrangian.switching_function_at(&theta[..self.lagrangian.parameter_count()], index, t, x)

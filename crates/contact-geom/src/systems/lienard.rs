@@ -1,6 +1,7 @@
 //! Liénard systems as contact Hamiltonian systems without a Lagrangian.
 
-use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
+use crate::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar, VectorField};
+use nalgebra::SVector;
 
 /// A forced Liénard system `q'' + f(q) q' + F(q, t) = 0` as the contact Hamiltonian `H = p z + f(q) z + F(q, t)` on
 /// T\*R x R. Dimensionless.
@@ -38,12 +39,40 @@ impl Lienard {
     }
 }
 
-impl SmoothFunction<1> for Lienard {
+impl Lienard {
+    /// The restoring and the damping force, and the forcing, at a velocity: `-q''`.
     #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, x: &ChartVector<1, T>) -> T {
-        let (q, p, z) = (x.x[0], x.y[0], x.z);
+    fn deceleration<T: Scalar>(&self, t: T, q: T, velocity: T) -> T {
         let forcing = (t * self.omega).cos() * self.amplitude;
-        z * (p + horner(&self.damping, q)) + horner(&self.restoring, q) - forcing
+        velocity * horner(&self.damping, q) + horner(&self.restoring, q) - forcing
+    }
+
+    fn is_autonomous(&self) -> bool {
+        self.amplitude == 0.0 || self.omega == 0.0
+    }
+}
+
+impl ContactHamiltonian<1> for Lienard {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+        p[0] * z + self.deceleration(t, q[0], z)
+    }
+
+    fn structure(&self) -> HamiltonianStructure {
+        HamiltonianStructure { autonomous: self.is_autonomous(), degree: Some(1), ..HamiltonianStructure::default() }
+    }
+}
+
+/// The first-order system `q' = v`, `v' = q''` in the coordinates (q, v). [`Lifted`](crate::Lifted), it runs on where the
+/// momentum of the contact Hamiltonian above blows up.
+impl VectorField<2> for Lienard {
+    #[inline(always)]
+    fn at<T: Scalar>(&self, t: T, x: &SVector<T, 2>) -> SVector<T, 2> {
+        SVector::from([x[1], -self.deceleration(t, x[0], x[1])])
+    }
+
+    fn is_autonomous(&self) -> bool {
+        Lienard::is_autonomous(self)
     }
 }
 
@@ -53,14 +82,19 @@ fn horner<T: Scalar>(coefficients: &[f64], q: T) -> T {
     coefficients.iter().rev().fold(T::zero(), |sum, c| sum * q + *c)
 }
 
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for Lienard {}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{AsFunction, ChartVector, SmoothFunction};
 
     #[test]
     fn the_contact_hamiltonian_equations_are_lienards() {
         let system =
             Lienard { damping: [0.3, -0.2, 0.7], restoring: [0.1, 1.0, -0.4, 0.6], amplitude: 0.5, omega: 1.2 };
+        let system = AsFunction(&system);
         for (t, q, p, z) in [(0.0, 1.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
             let x = ChartVector { x: [q].into(), y: [p].into(), z };
             let (h, d) = (system.value(t, &x), system.differential(t, &x));

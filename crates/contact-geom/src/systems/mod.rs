@@ -13,6 +13,7 @@ mod coupled_plane;
 mod double_pendulum;
 mod duffing;
 mod free_particle;
+pub mod hamiltonian;
 mod harmonic_oscillator;
 mod kepler;
 mod lane_emden;

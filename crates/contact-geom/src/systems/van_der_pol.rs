@@ -1,6 +1,7 @@
 //! Van der Pol's oscillator as a contact Hamiltonian system.
 
-use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
+use crate::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar, VectorField};
+use nalgebra::SVector;
 
 /// Van der Pol's oscillator `q'' + mu (q^2 - 1) q' + q = amplitude cos(omega t)` as the contact Hamiltonian
 /// `H = p z + mu (q^2 - 1) z + q - amplitude cos(omega t)` on T\*R x R. Dimensionless: time in units of the inverse
@@ -31,24 +32,57 @@ impl VanDerPol {
     }
 }
 
-impl SmoothFunction<1> for VanDerPol {
+impl VanDerPol {
+    /// The restoring and the damping force, and the forcing, at a velocity: `-q''`.
     #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, x: &ChartVector<1, T>) -> T {
-        let (q, p, z) = (x.x[0], x.y[0], x.z);
-        z * (p + (q * q - 1.0) * self.mu) + q - (t * self.omega).cos() * self.amplitude
+    fn deceleration<T: Scalar>(&self, t: T, q: T, velocity: T) -> T {
+        velocity * (q * q - 1.0) * self.mu + q - (t * self.omega).cos() * self.amplitude
+    }
+
+    fn is_autonomous(&self) -> bool {
+        self.amplitude == 0.0 || self.omega == 0.0
     }
 }
+
+impl ContactHamiltonian<1> for VanDerPol {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+        p[0] * z + self.deceleration(t, q[0], z)
+    }
+
+    fn structure(&self) -> HamiltonianStructure {
+        HamiltonianStructure { autonomous: self.is_autonomous(), degree: Some(1), ..HamiltonianStructure::default() }
+    }
+}
+
+/// The first-order system `q' = v`, `v' = q''` in the coordinates (q, v). [`Lifted`](crate::Lifted), it runs on where the
+/// momentum of the contact Hamiltonian above blows up.
+impl VectorField<2> for VanDerPol {
+    #[inline(always)]
+    fn at<T: Scalar>(&self, t: T, x: &SVector<T, 2>) -> SVector<T, 2> {
+        SVector::from([x[1], -self.deceleration(t, x[0], x[1])])
+    }
+
+    fn is_autonomous(&self) -> bool {
+        VanDerPol::is_autonomous(self)
+    }
+}
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for VanDerPol {}
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::systems::Lienard;
+    use crate::{AsFunction, ChartVector, SmoothFunction};
 
     #[test]
     fn it_is_a_lienard_system() {
         let system = VanDerPol { mu: 1.5, amplitude: 0.4, omega: 1.1 };
         let general =
             Lienard { damping: [-1.5, 0.0, 1.5], restoring: [0.0, 1.0, 0.0, 0.0], amplitude: 0.4, omega: 1.1 };
+        let (system, general) = (AsFunction(&system), AsFunction(&general));
         for (t, q, p, z) in [(0.0, 2.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
             let x = ChartVector { x: [q].into(), y: [p].into(), z };
             let difference = system.differential(t, &x).minus(general.differential(t, &x));

@@ -104,7 +104,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
 
     /// For a Lagrangian that is given by a contact Hamiltonian; all others have their tangents from the solved stages.
     fn step_formula(&self) -> Option<StepFormula> {
-        if const { L::HINTS.hamiltonian } { Some(StepFormula::Jacobian) } else { None }
+        if const { L::HINTS.hamiltonian } { Some(StepFormula::Collocation { stages: self.stages }) } else { None }
     }
 
     fn step_jacobian(

@@ -131,6 +131,11 @@ pub enum StepFormula {
     Rule(&'static [Node]),
     /// Steps of the symmetric rule with these nodes, over the fractions of a step that are the substeps of a scheme.
     Composition(&'static [Node], SplittingScheme),
+    /// Contact Gauss collocation on the contact Hamiltonian by which the Lagrangian is given.
+    Collocation {
+        /// The number of stages.
+        stages: usize,
+    },
     /// A step whose derivative in the state is the matrix [`Integrator::step_jacobian`]; that in parameters and in the step
     /// size is not known.
     Jacobian,

@@ -4,7 +4,7 @@ use crate::Problem;
 use crate::StepError;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, Scalar, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, PhasePoint, Scalar, VelocityPoint};
 
 /// The state at the end of a run over a [`Scalar`]: the argument of a [`Loss`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,9 +95,13 @@ impl<const N: usize> EndState<N> {
 }
 
 /// The dependence of the velocity on the state `(q, p, z)` at a point:
-/// `W dv = dp - L_vq dq - L_vz dz - L_vtheta dtheta - L_vt dt`.
+/// `W dv = dp - L_vq dq - L_vz dz - L_vtheta dtheta - L_vt dt`; for a Lagrangian that is given by a contact Hamiltonian
+/// `dv = H_pp dp + H_pq dq + H_pz dz + H_ptheta dtheta + H_pt dt`, whatever the rank of `H_pp`.
 pub(crate) struct VelocityDependence<const N: usize> {
+    /// `W^-1`; 1 for a Hamiltonian, whose derivatives have the opposite sign of those of L below.
     inverse: SMatrix<f64, N, N>,
+    /// The factor of dp: 1, or `H_pp`.
+    of_p: SMatrix<f64, N, N>,
     qv: SMatrix<f64, N, N>,
     vz: SVector<f64, N>,
     /// `L_vtheta` for each parameter, and `L_vt`.
@@ -106,14 +110,39 @@ pub(crate) struct VelocityDependence<const N: usize> {
 }
 
 impl<const N: usize> VelocityDependence<N> {
-    pub fn at<L: Parametric<N>>(problem: &Problem<'_, L, N>, t: f64, x: &VelocityPoint<N>) -> Result<Self, StepError> {
+    /// At a point and its momentum.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where `L_vv` is singular; [`StepError::NonFinite`] for a Hamiltonian that is not defined there.
+    pub fn at<L: Parametric<N>>(
+        problem: &Problem<'_, L, N>,
+        t: f64,
+        x: &VelocityPoint<N>,
+        p: &SVector<f64, N>,
+    ) -> Result<Self, StepError> {
         let lagrangian = problem.lagrangian;
+        if const { L::HINTS.hamiltonian } {
+            let state = PhasePoint { q: x.q, p: *p, z: x.z };
+            let Hessian { qv, vv, vz, .. } = lagrangian.hamiltonian_hessian(t, &state).ok_or(StepError::NonFinite)?;
+            let mut of = ParameterDerivatives::new(lagrangian);
+            let mut explicit = |quantity| -of.of_hamiltonian(lagrangian, quantity, t, &state).gradient.y;
+            let parameters = (0..lagrangian.parameter_count()).map(|k| explicit(Quantity::Parameter(k))).collect();
+            let time = explicit(Quantity::Time);
+            return Ok(VelocityDependence {
+                inverse: SMatrix::identity(),
+                of_p: vv,
+                qv: -qv,
+                vz: -vz,
+                parameters,
+                time,
+            });
+        }
         let Hessian { qv, vv, vz, .. } = lagrangian.hessian(t, x);
         let inverse = vv.try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
         let mut of = ParameterDerivatives::new(lagrangian);
         let parameters = (0..of.count()).map(|k| of.at(lagrangian, Quantity::Parameter(k), t, x).gradient.y).collect();
         let time = of.at(lagrangian, Quantity::Time, t, x).gradient.y;
-        Ok(VelocityDependence { inverse, qv, vz, parameters, time })
+        Ok(VelocityDependence { inverse, of_p: SMatrix::identity(), qv, vz, parameters, time })
     }
 
     /// The derivative of the velocity along a tangent of the state.
@@ -126,13 +155,17 @@ impl<const N: usize> VelocityDependence<N> {
         dt: f64,
     ) -> SVector<f64, N> {
         let explicit = parameter.and_then(|k| self.parameters.get(k).copied()).unwrap_or_else(SVector::zeros);
-        self.inverse * (p - self.qv.transpose() * q - self.vz * z - explicit - self.time * dt)
+        self.inverse * (self.of_p * p - self.qv.transpose() * q - self.vz * z - explicit - self.time * dt)
     }
 
     /// The derivatives in `(q, p, z)`, in the parameters and in the time, of a number with these partial derivatives.
     pub fn pull(&self, of: &EndCovector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
-        let of_p = self.inverse.transpose() * of.v;
-        let state = ChartVector { x: of.q - self.qv * of_p, y: of.p + of_p, z: of.z - self.vz.dot(&of_p) };
-        (state, self.parameters.iter().map(|l| -l.dot(&of_p)).collect(), of.t - self.time.dot(&of_p))
+        let of_v = self.inverse.transpose() * of.v;
+        let state = ChartVector {
+            x: of.q - self.qv * of_v,
+            y: of.p + self.of_p.transpose() * of_v,
+            z: of.z - self.vz.dot(&of_v),
+        };
+        (state, self.parameters.iter().map(|l| -l.dot(&of_v)).collect(), of.t - self.time.dot(&of_v))
     }
 }

@@ -228,7 +228,8 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
         let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
         let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
         let x = VelocityPoint { q: end.q, v: end.v, z: end.z };
-        let of_velocity = VelocityDependence::at(problem, end.t, &x).map_err(|e| failed(self.outcome.steps, e))?;
+        let of_velocity =
+            VelocityDependence::at(problem, end.t, &x, &end.p).map_err(|e| failed(self.outcome.steps, e))?;
         // The derivatives in the end time for a fixed state (q, p, z).
         let mut explicit_times = Vec::with_capacity(of_end.len());
         let mut all: Vec<Covector<N>> = Vec::with_capacity(of_end.len());
@@ -346,7 +347,8 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
             return Ok(None);
         };
         (self.times, self.of_rows) = (times, of_rows);
-        let (of_state, parameters, _) = VelocityDependence::at(self.steps.problem, at.t, &at.point())?.pull(covector);
+        let (of_state, parameters, _) =
+            VelocityDependence::at(self.steps.problem, at.t, &at.point(), &at.state.p)?.pull(covector);
         Ok(Some(Covector::new(&of_state, parameters)))
     }
 }
@@ -373,15 +375,16 @@ fn gradient<L: Parametric<N>, const N: usize>(
     if !problem.from_momentum {
         // p = L_v(t, q, v, z; theta).
         let (lagrangian, x) = (problem.lagrangian, &problem.start);
+        let at = (x, &problem.state.p);
         let Hessian { qv, vv, vz, .. } = lagrangian.hessian(problem.t0, x);
         gradient.q += qv * covector.p;
         gradient.rate = vv * covector.p;
         gradient.z += vz.dot(&covector.p);
         let mut of = ParameterDerivatives::new(lagrangian);
         for (k, sum) in gradient.parameters.iter_mut().enumerate() {
-            *sum += of.at(lagrangian, Quantity::Parameter(k), problem.t0, x).gradient.y.dot(&covector.p);
+            *sum += of.of_momentum(lagrangian, Quantity::Parameter(k), problem.t0, at).dot(&covector.p);
         }
-        gradient.t0 += of.at(lagrangian, Quantity::Time, problem.t0, x).gradient.y.dot(&covector.p);
+        gradient.t0 += of.of_momentum(lagrangian, Quantity::Time, problem.t0, at).dot(&covector.p);
     }
     gradient
 }

@@ -27,7 +27,7 @@ mod kept_states;
 mod linear_stages;
 mod loss_hessian;
 mod lyapunov;
-mod parameter_derivatives;
+pub(crate) mod parameter_derivatives;
 mod ridders;
 mod row_times;
 mod second_derivatives;

@@ -6,7 +6,7 @@ use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use contact_geom::nalgebra::{ArrayStorage, SVector};
 use contact_geom::support::{KernelDual, seed};
-use contact_geom::{ChartVector, Dual, Parametric, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Dual, Parametric, PhasePoint, VelocityPoint};
 use num_traits::{One, Zero};
 use pulp::Simd;
 
@@ -83,35 +83,92 @@ impl<const N: usize> ParameterDerivatives<N> {
         t: f64,
         x: &VelocityPoint<N>,
     ) -> QuantityDerivatives<N> {
-        let one = SVector::<Dual<f64, ChartVector<N>>, 1>::from_element(Dual::from(1.0));
         let y = seed(&ChartVector::from(*x));
         let (q, v, z) = (y.x.map(Dual::constant), y.y.map(Dual::constant), Dual::constant(y.z));
-        let mut time = WithGradient::from(t);
-        if let Quantity::Parameter(k) = quantity {
-            self.with_gradient[k].d = one;
-        } else {
-            time.d = one;
-        }
+        let time = self.move_along(quantity, t);
         let l = lagrangian.value_at(&self.with_gradient, time, &q, &v, z).d[0];
+        self.rest(quantity);
+        QuantityDerivatives { l: l.re, gradient: l.d, force: self.force(lagrangian, quantity, t, x, &SVector::zeros()) }
+    }
+
+    /// Those of the contact Hamiltonian by which a Lagrangian is given, at a state: `H_theta` in the place of `L_theta`,
+    /// `(H_qtheta, H_ptheta, H_ztheta)`, and the derivative of the force with that of the velocity `H_p`. NaN for a
+    /// Lagrangian that is not given by one.
+    #[inline(never)]
+    pub fn of_hamiltonian<L: Parametric<N>>(
+        &mut self,
+        lagrangian: &L,
+        quantity: Quantity,
+        t: f64,
+        state: &PhasePoint<N>,
+    ) -> QuantityDerivatives<N> {
+        let y: PhasePoint<N, _> = seed(&ChartVector::from(*state)).into();
+        let (q, p, z) = (y.q.map(Dual::constant), y.p.map(Dual::constant), Dual::constant(y.z));
+        let time = self.move_along(quantity, t);
+        let h = lagrangian.hamiltonian_at(&self.with_gradient, time, &PhasePoint { q, p, z });
+        self.rest(quantity);
+        let Some(WithGradient { re: h, d }) = h else {
+            let none = SVector::from_element(f64::NAN);
+            return QuantityDerivatives {
+                l: f64::NAN,
+                gradient: ChartVector { x: none, y: none, z: f64::NAN },
+                force: none,
+            };
+        };
+        let x = VelocityPoint { q: state.q, v: h.d.y, z: state.z };
+        let force = self.force(lagrangian, quantity, t, &x, &d[0].d.y);
+        QuantityDerivatives { l: d[0].re, gradient: d[0].d, force }
+    }
+
+    /// The derivative of the momentum `L_v` of a given velocity, at a state that has this velocity.
+    pub fn of_momentum<L: Parametric<N>>(
+        &mut self,
+        lagrangian: &L,
+        quantity: Quantity,
+        t: f64,
+        (x, p): (&VelocityPoint<N>, &SVector<f64, N>),
+    ) -> SVector<f64, N> {
+        if const { L::HINTS.hamiltonian } {
+            // From `H_p = v`, with `L_vv = H_pp^-1`.
+            let state = PhasePoint { q: x.q, p: *p, z: x.z };
+            return -(lagrangian.hessian(t, x).vv * self.of_hamiltonian(lagrangian, quantity, t, &state).gradient.y);
+        }
+        self.at(lagrangian, quantity, t, x).gradient.y
+    }
+
+    /// Seeds the derivative in a quantity; returns the time.
+    fn move_along(&mut self, quantity: Quantity, t: f64) -> WithGradient<N> {
+        let one = SVector::<Dual<f64, ChartVector<N>>, 1>::from_element(Dual::from(1.0));
+        let mut time = WithGradient::from(t);
+        match quantity {
+            Quantity::Parameter(k) => self.with_gradient[k].d = one,
+            Quantity::Time => time.d = one,
+        }
+        time
+    }
+
+    /// Removes the seed.
+    fn rest(&mut self, quantity: Quantity) {
         if let Quantity::Parameter(k) = quantity {
             self.with_gradient[k].d = SVector::<_, 1>::from_element(Dual::from(0.0));
         }
-        QuantityDerivatives { l: l.re, gradient: l.d, force: self.force(lagrangian, quantity, t, x) }
     }
 
-    /// `f_theta` at a point; 0 without a force.
+    /// `f_theta` at a point whose velocity has the derivative `dv`; 0 without a force.
     fn force<L: Parametric<N>>(
         &mut self,
         lagrangian: &L,
         quantity: Quantity,
         t: f64,
         x: &VelocityPoint<N>,
+        dv: &SVector<f64, N>,
     ) -> SVector<f64, N> {
         if const { !L::HINTS.forced } {
             return SVector::zeros();
         }
         let one = SVector::<f64, 1>::from_element(1.0);
-        let y = VelocityPoint { q: x.q.map(Dual::from), v: x.v.map(Dual::from), z: Dual::from(x.z) };
+        let moving = SVector::<Dual<f64, SVector<f64, 1>>, N>::from_fn(|i, _| Dual { re: x.v[i], d: [dv[i]].into() });
+        let y = VelocityPoint { q: x.q.map(Dual::from), v: moving, z: Dual::from(x.z) };
         let mut time = Dual::from(t);
         if let Quantity::Parameter(k) = quantity {
             self.simple[k].d = one;
@@ -148,7 +205,7 @@ impl<const N: usize> ParameterDerivatives<N> {
         if let Quantity::Parameter(k) = quantity {
             self.along_two[k].d = SVector::<_, 1>::from_element(Dual::from(0.0));
         }
-        let force = self.force(lagrangian, quantity, t, x);
+        let force = self.force(lagrangian, quantity, t, x, &SVector::zeros());
         w_rho * l.re + rho * (l.d[0] + force.dot(&w.x))
     }
 

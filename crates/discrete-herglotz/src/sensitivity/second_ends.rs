@@ -132,7 +132,7 @@ impl<const N: usize> EndAlong<N> {
     ) -> Result<Self, StepError> {
         let CarriedDerivatives { mut of_two, columns, directions, second: pairs, largest, steps } = carried;
         let (lagrangian, x) = (problem.lagrangian, VelocityPoint { q: state.q, v: state.v, z: state.z });
-        let of_velocity = VelocityDependence::at(problem, state.t, &x)?;
+        let of_velocity = VelocityDependence::at(problem, state.t, &x, &state.p)?;
         let parameters = lagrangian.parameter_count();
         let columns: Vec<EndTangent<N>> = columns
             .iter()

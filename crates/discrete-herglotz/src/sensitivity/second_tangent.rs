@@ -113,7 +113,8 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for SecondColumns<'_, '_, L, 
 
 /// The error of a run whose integrator has no second derivatives.
 fn no_second_tangent<L: Parametric<N>, const N: usize>(plan: &Plan<'_, L, N>) -> SensitivityError {
-    SensitivityError::NoSecondTangent { method: plan.steps.info.name.clone() }
+    let case = if const { L::HINTS.hamiltonian } { " for contact Hamiltonians" } else { "" };
+    SensitivityError::NoSecondTangent { method: plan.steps.info.name.clone(), case }
 }
 
 impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
@@ -136,7 +137,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     ///
     /// # Errors
     /// Those of [`tangent`](Self::tangent), and [`SensitivityError::NoSecondTangent`] for all integrators but contact Gauss
-    /// collocation.
+    /// collocation, and for contact Hamiltonians.
     pub fn second_tangent(self, variables: &[Variable], until: Until) -> Result<SecondTangent<N>, SensitivityError> {
         Ok(self.second_order(variables, Directions::Variables, until)?.into())
     }

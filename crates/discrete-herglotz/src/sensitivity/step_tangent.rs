@@ -78,7 +78,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
             return refused("");
         }
         // The steps of a Lagrangian that is given by a contact Hamiltonian have a formula.
-        if info.collocation.is_some() && steps.integrator.step_formula().is_none() {
+        if const { !L::HINTS.hamiltonian } && info.collocation.is_some() && steps.integrator.step_formula().is_none() {
             let engine = Engine::new(steps.problem, steps.stages(), steps.h, direction);
             return Ok(StepTangent::Collocation(Box::new(engine)));
         }
@@ -167,6 +167,8 @@ impl<'a, const N: usize> RowTangent<'a, N> {
         columns: &mut [Column<N>],
     ) -> Result<(), StepError> {
         match step {
+            // Such steps of a Lagrangian that is given by a contact Hamiltonian are sub-flows.
+            WholeStep::Collocation(_) if const { L::HINTS.hamiltonian } => Err(StepError::NonFinite),
             WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Forward);
                 engine.push(step, 0, columns).map(|_| ())
@@ -187,6 +189,7 @@ impl<'a, const N: usize> RowTangent<'a, N> {
         covectors: &mut [Covector<N>],
     ) -> Result<(), StepError> {
         match step {
+            WholeStep::Collocation(_) if const { L::HINTS.hamiltonian } => Err(StepError::NonFinite),
             WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Backward);
                 engine.pull(step, 0, covectors)

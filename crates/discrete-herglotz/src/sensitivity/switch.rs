@@ -132,7 +132,8 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
             }
         }
         let field = herglotz_field(lagrangian, t, &x).map_err(|_| self.failed(StepError::NonFinite))?;
-        let of_velocity = VelocityDependence::at(self.problem, t, &x).map_err(|cause| self.failed(cause))?;
+        let of_velocity =
+            VelocityDependence::at(self.problem, t, &x, &self.at.state.p).map_err(|cause| self.failed(cause))?;
         let (state, mut parameters, time) = of_velocity.pull(&of);
         parameters.iter_mut().zip(explicit).for_each(|(sum, explicit)| *sum += explicit);
         Ok(SwitchGradient {
@@ -177,7 +178,8 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         let (lagrangian, t) = (self.problem.lagrangian, self.at.t);
         let images = arguments(N, lagrangian.parameter_count()).map(|along| self.state_along(along));
         let images = images.collect::<Result<Vec<_>, _>>()?;
-        let before = VelocityDependence::at(self.problem, t, &self.at.point()).map_err(|cause| self.failed(cause))?;
+        let before = VelocityDependence::at(self.problem, t, &self.at.point(), &self.at.state.p)
+            .map_err(|cause| self.failed(cause))?;
         let to = replaced(lagrangian.at_switch(self.index, t, &self.at.point(), self.rising));
         let to = to.ok_or_else(|| self.unknown("the state is not replaced there"))?;
         let mut of = ParameterDerivatives::new(lagrangian);

@@ -167,7 +167,7 @@ pub(super) fn row<L: Parametric<N>, const N: usize>(
     dt: impl Fn(&Column<N>) -> f64,
 ) -> Result<TangentRow<N>, StepError> {
     let x = VelocityPoint { q: state.q, v: state.v, z: state.z };
-    let of_velocity = VelocityDependence::at(problem, state.t, &x)?;
+    let of_velocity = VelocityDependence::at(problem, state.t, &x, &state.p)?;
     let derivative = |column: &Column<N>| {
         let Column { q, p, z, parameter, .. } = *column;
         StateDerivative { q, v: of_velocity.along(&q, &p, z, parameter, dt(column)), p, z }

@@ -82,7 +82,7 @@ impl Variable {
             if problem.from_momentum {
                 return zero;
             }
-            ParameterDerivatives::new(lagrangian).at(lagrangian, quantity, problem.t0, x).gradient.y
+            ParameterDerivatives::new(lagrangian).of_momentum(lagrangian, quantity, problem.t0, (x, &problem.state.p))
         };
         let [velocity, momentum] = ["velocity", "momentum"];
         Ok(match self {

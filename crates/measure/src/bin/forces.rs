@@ -1,4 +1,4 @@
-//! Run time against error of motions with forces, beside dop853: `cargo run --release --bin forces`.
+//! Run time against error of motions with forces, beside dop853: `cargo run --release --features timings --bin forces`.
 //!
 //! Two problems: a projectile in the plane with quadratic drag, and a driven double pendulum with friction in both joints.
 //! For each method and each error level the table has the least time of the settings that reach the level. Errors are

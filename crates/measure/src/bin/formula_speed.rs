@@ -1,7 +1,7 @@
 //! Run time of Lagrangians given as formulas, relative to Rust types of the same Lagrangians.
 //!
 //! ```text
-//! cargo run --release --bin formula_speed -- [--out DIR] [--rounds 15]
+//! cargo run --release --features timings --bin formula_speed -- [--out DIR] [--rounds 15]
 //! ```
 //!
 //! The formula and the type of each system run alternately, `--rounds` times, and the medians of the run times are

@@ -1,5 +1,5 @@
 //! Run time of the value and the full gradient of a loss of the end of a run, beside the run itself:
-//! `cargo run --release --bin gradients`.
+//! `cargo run --release --features timings --bin gradients`.
 //!
 //! P2, P3 and P6 are the problems of `docs/performance.md`; the others are the double pendulum, and a sun with one planet.
 //! The gradient is that in the start, all parameters and both times. The least time of some repetitions counts; it

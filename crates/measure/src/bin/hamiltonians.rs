@@ -1,5 +1,5 @@
 //! Run time of contact Gauss collocation for a contact Hamiltonian beside the same steps for its Lagrangian, and beside
-//! dop853: `cargo run --release --bin hamiltonians`.
+//! dop853: `cargo run --release --features timings --bin hamiltonians`.
 //!
 //! The steps are taken by the steppers alone, without the checks of a run. The least time of some repetitions counts.
 //! Lines with a Lagrangian compare equal steps; lines with dop853 compare the time to an error at the end.

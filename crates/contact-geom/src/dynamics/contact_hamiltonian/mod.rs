@@ -3,14 +3,22 @@
 use crate::{ChartVector, Hessian, PhasePoint, Scalar, SmoothFunction};
 use nalgebra::SVector;
 
+mod at_energy;
 mod derivatives;
+pub(crate) mod in_transformed_time;
+mod lifted;
 mod momentum;
 mod of_hamiltonian;
+mod parametric;
 mod structure;
 
+pub use at_energy::AtEnergy;
 pub use derivatives::HamiltonianDerivatives;
+pub use in_transformed_time::{InTransformedTime, TimesRate};
+pub use lifted::{Lifted, VectorField};
 pub use momentum::{NoMomentum, momentum};
 pub use of_hamiltonian::OfHamiltonian;
+pub use parametric::ParametricHamiltonian;
 pub use structure::HamiltonianStructure;
 
 /// A contact Hamiltonian `H : R x T*Q x R -> R`, written once as a generic function of (t, q, p, z).
@@ -31,11 +39,11 @@ pub use structure::HamiltonianStructure;
 /// impl ContactHamiltonian<1> for VanDerPol {
 ///     #[inline(always)]
 ///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
-///         p[0] * z - q[0] + (q[0] * q[0] - 1.0) * z
+///         p[0] * z + q[0] + (q[0] * q[0] - 1.0) * z
 ///     }
 /// }
 /// let (_, d) = VanDerPol.with_gradient(0.0, &PhasePoint::new([2.0], [0.0], 0.5));
-/// assert_eq!((d.x[0], d.y[0], d.z), (1.0, 0.5, 3.0)); // (H_q, H_p, H_z)
+/// assert_eq!((d.x[0], d.y[0], d.z), (3.0, 0.5, 3.0)); // (H_q, H_p, H_z)
 /// ```
 pub trait ContactHamiltonian<const N: usize> {
     /// Whether the [structure](Self::structure) and all closed derivatives are derived from the formula of H, as by the

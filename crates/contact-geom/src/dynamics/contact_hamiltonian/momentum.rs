@@ -76,17 +76,29 @@ pub fn momentum<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>(
     if !converged {
         return Err(NoMomentum::NotConverged { residual: size(&residual) });
     }
-    let inverse = {
-        let mut inverse = nalgebra::SMatrix::<f64, N, N>::zeros();
-        for j in 0..N {
-            let unit = SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == j)));
-            inverse.set_column(j, &solve(&p, unit)?);
-        }
-        inverse
-    };
-    let mut lifted = p.map(T::from);
+    lift(hamiltonian, time, &PhasePoint { q, p, z }, |p| {
+        hamiltonian.with_gradient(t, &PhasePoint { q: x.q, p: *p, z: x.z }).1.y - x.v
+    })
+}
+
+/// The momentum over a scalar with differentials, from its real part: corrections by `H_pp^-1` until the residual
+/// `H_p - v`, given as a function of the momentum, vanishes with its differentials.
+pub(super) fn lift<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>(
+    hamiltonian: &H,
+    t: f64,
+    at: &PhasePoint<N>,
+    residual: impl Fn(&SVector<T, N>) -> SVector<T, N>,
+) -> Result<SVector<T, N>, NoMomentum> {
+    let w = hamiltonian.hessian(t, at).vv;
+    let mut inverse = nalgebra::SMatrix::<f64, N, N>::zeros();
+    for j in 0..N {
+        let mut unit = SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == j)));
+        linear::solve(&mut w.clone_owned(), &mut unit).map_err(|e| NoMomentum::Singular { pivot: e.pivot })?;
+        inverse.set_column(j, &unit);
+    }
+    let mut lifted = at.p.map(T::from);
     for _ in 0..MAX_CORRECTIONS {
-        let residual = hamiltonian.with_gradient(t, &PhasePoint { q: x.q, p: lifted, z: x.z }).1.y - x.v;
+        let residual = residual(&lifted);
         let change =
             SVector::<T, N>::from_fn(|i, _| (0..N).fold(T::zero(), |sum, j| sum + residual[j] * inverse[(i, j)]));
         let largest = max_abs_or_nan(change.iter().map(|e| e.extent()));

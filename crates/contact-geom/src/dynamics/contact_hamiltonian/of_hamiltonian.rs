@@ -1,9 +1,10 @@
 //! The Lagrangian of a contact Hamiltonian.
 
+use crate::dynamics::contact_hamiltonian::parametric::lagrangian_at;
 use crate::support::linear;
 use crate::{
-    ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hessian, Hints, Lagrangian, Parametric, PhasePoint,
-    Scalar, Structure, VelocityPoint, momentum,
+    ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hessian, Hints, Lagrangian, Parametric,
+    ParametricHamiltonian, PhasePoint, Scalar, Structure, VelocityPoint, momentum,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -108,5 +109,33 @@ impl<const N: usize, H: ContactHamiltonian<N>> Lagrangian<N> for OfHamiltonian<H
     }
 }
 
-/// Without parameters.
-impl<const N: usize, H: ContactHamiltonian<N>> Parametric<N> for OfHamiltonian<H> {}
+/// The parameters are those of the Hamiltonian. Where `H_pp` is singular the Lagrangian is NaN; derivatives of runs are then
+/// those of the Hamiltonian.
+impl<const N: usize, H: ParametricHamiltonian<N>> Parametric<N> for OfHamiltonian<H> {
+    fn parameter_names(&self) -> Vec<String> {
+        self.0.parameter_names()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        self.0.parameters()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.0.parameters().len()
+    }
+
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        self.0.with_parameters(theta).map(OfHamiltonian)
+    }
+
+    fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        if theta.is_empty() {
+            return self.value(t, q, v, z);
+        }
+        lagrangian_at(&self.0, theta, t, &VelocityPoint { q: *q, v: *v, z })
+    }
+
+    fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
+        Some(self.0.value_at(theta, t, &x.q, &x.p, x.z))
+    }
+}

@@ -1,4 +1,5 @@
-//! Tangents and adjoints of steps that are compositions of sub-flows: splittings, quadrature rules and compositions of rules.
+//! Tangents and adjoints of steps that are compositions of sub-flows: splittings, quadrature rules, compositions of rules,
+//! and contact Gauss collocation on a contact Hamiltonian, whose step is one sub-flow.
 //!
 //! The derivative of each sub-flow in the state, in the parameters, in the time and in its duration has a closed form, or
 //! follows from the linearised equations of the rule. The tangent of a step is their product; its adjoint is the product of
@@ -6,6 +7,7 @@
 
 mod action_map;
 mod coefficients;
+mod collocation;
 mod discrete;
 mod drift;
 mod exponential_integrals;
@@ -22,6 +24,7 @@ use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::{Integrator, Problem, StepError};
+use collocation::HamiltonianSteps;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{Parametric, PhasePoint};
 use discrete::DiscreteSteps;
@@ -95,6 +98,13 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
             StepFormula::Composition(nodes, scheme) => {
                 let lengths = scheme.substeps().unwrap_or_else(|| vec![1.0]);
                 Box::new(Rules { lagrangian, nodes, lengths })
+            }
+            StepFormula::Collocation { stages } => {
+                if const { L::HINTS.hamiltonian } {
+                    Box::new(HamiltonianSteps { lagrangian, stages })
+                } else {
+                    return Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" });
+                }
             }
             StepFormula::Jacobian => Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone() }),
         };

@@ -137,10 +137,10 @@ pub(super) struct Stage<const N: usize> {
 }
 
 impl<const N: usize> Stage<N> {
-    fn rho(&self) -> f64 {
+    pub fn rho(&self) -> f64 {
         1.0 - self.one_minus_rho
     }
-    fn phase_point(&self) -> PhasePoint<N> {
+    pub fn phase_point(&self) -> PhasePoint<N> {
         PhasePoint { q: self.q, p: self.scaled_p / self.rho(), z: self.z }
     }
 }

@@ -1,0 +1,118 @@
+//! Modified Hamiltonians: the contact Hamiltonian of which a step is the exact flow, up to a power of the step size.
+
+use crate::{InputError, Integrator, Problem, StepError, StepperOptions};
+use contact_geom::hamiltonian::DarbouxBracket;
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, SmoothFunction};
+
+/// The largest order of an interpolated modified Hamiltonian: beyond it the differences of states are round-off.
+pub const MAX_MODIFIED_ORDER: usize = 8;
+
+/// The value of the modified Hamiltonian `H~_k` at the middle one, of index k/2, of k + 1 states that consecutive steps of
+/// length h connect.
+///
+/// A conformally contact map `Phi_h` near the identity is formally the flow over h of a contact Hamiltonian vector field
+/// `X~`. The derivative at the middle node of the polynomial through the states is `X~_k = X~ + O(h^k)`, and
+/// `H~_k = -eta(X~_k) = p . q~ - z~` for its components `q~`, `z~`. So one step has
+/// `H~_k o Phi = sigma_d H~_k + O(h^(k+1))`.
+///
+/// See Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), chapter IX, for the series. `None` for fewer than
+/// two states, and for more than [`MAX_MODIFIED_ORDER`] + 1.
+///
+/// ```
+/// use contact_geom::PhasePoint;
+/// use discrete_herglotz::hamiltonian::modified_hamiltonian;
+/// // Steps of length 0.1 along q' = 1, z' = p - H with H = p.
+/// let states = [0.0, 0.1, 0.2].map(|q| PhasePoint::new([q], [2.0], 0.0));
+/// assert!((modified_hamiltonian(&states, 0.1).unwrap() - 2.0).abs() < 1e-14);
+/// ```
+pub fn modified_hamiltonian<const N: usize>(states: &[PhasePoint<N>], h: f64) -> Option<f64> {
+    let k = states.len().checked_sub(1).filter(|k| (1..=MAX_MODIFIED_ORDER).contains(k))?;
+    let middle = k / 2;
+    let here = states.get(middle)?;
+    let apart = |i: usize, j: usize| i as f64 - j as f64;
+    // The derivatives of the Lagrange polynomials at the middle node; their sum is 0.
+    let weight = |j: usize| {
+        let over = (0..=k).filter(|m| *m != middle && *m != j).map(|m| apart(middle, m)).product::<f64>();
+        over / (0..=k).filter(|m| *m != j).map(|m| apart(j, m)).product::<f64>()
+    };
+    let mut field = ChartVector::from_fn(|_| 0.0);
+    for (j, state) in states.iter().enumerate().filter(|(j, _)| *j != middle) {
+        field = field.plus(ChartVector::from(*state).minus((*here).into()).scale(weight(j) / h));
+    }
+    Some(here.p.dot(&field.x) - field.z)
+}
+
+/// How far one step is from the flow of its modified Hamiltonian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModifiedDefect {
+    /// The order k of the modified Hamiltonian.
+    pub k: usize,
+    /// The step size.
+    pub h: f64,
+    /// `|H~_k(x1) - sigma_d H~_k(x0)|`, relative to `|H~_k(x0)|`, where x0 is the state after k/2 steps.
+    pub defect: f64,
+}
+
+/// The defects `H~_k o Phi - sigma_d H~_k` of a step of a method near the start of a problem, for several step sizes, and for the orders k from
+/// 1 to `most`: a table for a plot of the defect against the order and the step size. They decrease as `h^(k+1)`; for
+/// fixed h the smallest one over k decreases as `exp(-c/h)` for an analytic H.
+///
+/// # Errors
+/// [`InputError::Unclaimed`] for a Lagrangian that does not claim to be autonomous, since the modified Hamiltonian then
+/// depends on time; [`InputError::Count`] for an order of 0 or beyond [`MAX_MODIFIED_ORDER`]; those of the stepper, and
+/// [`InputError::FirstStep`] where a step fails.
+pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
+    problem: &Problem<'a, L, N>,
+    integrator: &impl Integrator<'a, L, N>,
+    steps: &[f64],
+    most: usize,
+) -> Result<Vec<ModifiedDefect>, InputError> {
+    if !problem.structure.autonomous {
+        return Err(InputError::Unclaimed { claim: "autonomous" });
+    }
+    if !(1..=MAX_MODIFIED_ORDER).contains(&most) {
+        let what = "the order of the modified Hamiltonian, at most 8,";
+        return Err(InputError::Count { what, least: 1, found: most });
+    }
+    integrator.check(problem.lagrangian)?;
+    let mut found = Vec::with_capacity(most * steps.len());
+    for &h in steps {
+        let mut stepper = integrator.stepper(problem, h, StepperOptions { action: true, check_resolution: false })?;
+        let (mut states, mut sigmas) = (vec![stepper.state()], Vec::new());
+        for _ in 0..=most {
+            stepper.advance(1).map_err(|failure| InputError::FirstStep(failure.cause))?;
+            states.push(stepper.state());
+            sigmas.push(stepper.sigma());
+        }
+        for k in 1..=most {
+            let value = |from: usize| states.get(from..=from + k).and_then(|states| modified_hamiltonian(states, h));
+            let (Some(before), Some(after), Some(sigma)) = (value(0), value(1), sigmas.get(k / 2)) else { continue };
+            let defect = ((after - sigma * before) / before).abs();
+            if !defect.is_finite() {
+                return Err(InputError::FirstStep(StepError::NonFinite));
+            }
+            found.push(ModifiedDefect { k, h, defect });
+        }
+    }
+    Ok(found)
+}
+
+/// The first correction of the modified Hamiltonian of the Strang splitting `phi^A_(h/2) o phi^B_h o phi^A_(h/2)`:
+/// `H~ = A + B + h^2 ({B, {B, A}} / 12 - {A, {A, B}} / 24) + O(h^4)` with the Jacobi bracket, since `X_{f,g} = [X_f, X_g]`
+/// and the Baker-Campbell-Hausdorff series consists of brackets.
+#[derive(Clone, Copy, Debug)]
+pub struct StrangCorrection<'a, A, B> {
+    /// The Hamiltonian of the first and last flow.
+    pub a: &'a A,
+    /// The Hamiltonian of the flow between them.
+    pub b: &'a B,
+}
+
+impl<const N: usize, A: SmoothFunction<N>, B: SmoothFunction<N>> SmoothFunction<N> for StrangCorrection<'_, A, B> {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
+        let (a, b) = (self.a, self.b);
+        let (ab, ba) = (DarbouxBracket { f: a, g: b }, DarbouxBracket { f: b, g: a });
+        let (aab, bba) = (DarbouxBracket { f: a, g: &ab }, DarbouxBracket { f: b, g: &ba });
+        bba.value(t, x) / 12.0 - aab.value(t, x) / 24.0
+    }
+}
