@@ -58,11 +58,11 @@ fn a_hamiltonian_moves_as_its_lagrangian() {
         ChargedParticle::default().into(),
     ];
     let mut compared = 0;
-    for system in one.into_iter().filter(|system| has_hamiltonian(system)) {
+    for system in one.into_iter().filter(has_hamiltonian) {
         compare(&system, One::Of(system));
         compared += 1;
     }
-    for system in two.into_iter().filter(|system| has_hamiltonian(system)) {
+    for system in two.into_iter().filter(has_hamiltonian) {
         compare(&system, Two::Of(system));
         compared += 1;
     }

@@ -61,7 +61,7 @@ fn unused_coordinates_stay_at_rest() -> Result<(), FormulaError> {
 
 #[test]
 fn structure_is_proved() -> Result<(), FormulaError> {
-    let of = |text: &str| Ok::<_, FormulaError>(parse(text, &["x", "y"], &[("g", -0.1)])?.hamiltonian::<2>()?);
+    let of = |text: &str| parse(text, &["x", "y"], &[("g", -0.1)])?.hamiltonian::<2>();
     let base = HamiltonianStructure { autonomous: true, ..HamiltonianStructure::default() };
     let affine = HamiltonianStructure { z_affine: true, constant_rate: true, ..base };
     let cases = [
