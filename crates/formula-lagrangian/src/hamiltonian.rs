@@ -26,7 +26,7 @@ use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianStructure, Hessia
 /// ```
 #[derive(Clone, Debug)]
 pub struct FormulaHamiltonian<const N: usize> {
-    derived: Derived,
+    pub(crate) derived: Derived,
 }
 
 impl<const N: usize> FormulaHamiltonian<N> {

@@ -2,7 +2,8 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    ChartVector, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, OfHamiltonian, PhasePoint, Scalar,
+    ChartVector, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, OfHamiltonian,
+    ParametricHamiltonian, PhasePoint, Scalar,
 };
 use formula_lagrangian::{Direction, Formula, FormulaError, FormulaNames, Reset, Symbols};
 
@@ -201,4 +202,18 @@ fn invalid_input_is_refused_with_the_remedy() -> Result<(), FormulaError> {
     assert_eq!(l.hamiltonian::<1>().map(drop), Err(FormulaError::IsLagrangian));
     assert_eq!(h.hamiltonian::<2>().map(drop), Err(FormulaError::OtherDimension { found: 1, asked: 2 }));
     Ok(())
+}
+
+/// The value for other parameters is that of the formula with these parameters.
+#[test]
+fn the_value_at_parameters() {
+    let formula = parse("k*p_x*sin(x) + c*z*x", &["x"], &[("k", 1.5), ("c", 0.2)]).unwrap();
+    let of = formula.hamiltonian::<1>().unwrap();
+    assert_eq!((of.parameter_names(), of.parameters()), (vec!["k".to_owned(), "c".to_owned()], vec![1.5, 0.2]));
+    let (theta, t, q, p, z) = ([0.7, -0.4], 0.1, [0.3].into(), [0.9].into(), 0.6);
+    let other = of.with_parameters(&theta).unwrap();
+    let (found, expected) = (of.value_at(&theta, t, &q, &p, z), 0.7 * 0.9 * 0.3_f64.sin() - 0.4 * 0.6 * 0.3);
+    assert!((found - expected).abs() <= 2.0 * f64::EPSILON, "{found} and {expected}");
+    assert!((other.value(t, &q, &p, z) - expected).abs() <= 2.0 * f64::EPSILON);
+    assert!(of.with_parameters(&[1.0]).is_none() && of.with_parameters(&[1.0, f64::NAN]).is_none());
 }

@@ -82,6 +82,9 @@ fn horner<T: Scalar>(coefficients: &[f64], q: T) -> T {
     coefficients.iter().rev().fold(T::zero(), |sum, c| sum * q + *c)
 }
 
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for Lienard {}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -68,6 +68,9 @@ impl VectorField<2> for VanDerPol {
     }
 }
 
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for VanDerPol {}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,12 +7,13 @@ use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, SmoothFunction};
 /// The largest order of an interpolated modified Hamiltonian: beyond it the differences of states are round-off.
 pub const MAX_MODIFIED_ORDER: usize = 8;
 
-/// The value of the modified Hamiltonian `H~_k` at the first of k + 1 states that consecutive steps of length h connect.
+/// The value of the modified Hamiltonian `H~_k` at the middle one, of index k/2, of k + 1 states that consecutive steps of
+/// length h connect.
 ///
-/// A conformally contact map `Phi_h` near the identity is formally the flow over h of a contact Hamiltonian vector field,
-/// `X~ = log(Phi_h) / h`. With the differences `D = Phi_h - 1` of states,
-/// `X~_k = (1/h) sum_(j = 1..k) (-1)^(j+1) D^j / j`, and `H~_k = -eta(X~_k) = p . q~ - z~` for its components `q~`, `z~`. It
-/// differs from the formal series by `O(h^k)`, so that one step has `H~_k o Phi = sigma_d H~_k + O(h^(k+1))`.
+/// A conformally contact map `Phi_h` near the identity is formally the flow over h of a contact Hamiltonian vector field
+/// `X~`. The derivative at the middle node of the polynomial through the states is `X~_k = X~ + O(h^k)`, and
+/// `H~_k = -eta(X~_k) = p . q~ - z~` for its components `q~`, `z~`. So one step has
+/// `H~_k o Phi = sigma_d H~_k + O(h^(k+1))`.
 ///
 /// See Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), chapter IX, for the series. `None` for fewer than
 /// two states, and for more than [`MAX_MODIFIED_ORDER`] + 1.
@@ -20,27 +21,25 @@ pub const MAX_MODIFIED_ORDER: usize = 8;
 /// ```
 /// use contact_geom::PhasePoint;
 /// use discrete_herglotz::hamiltonian::modified_hamiltonian;
-/// // Steps of length 0.1 along q' = 1, z' = p - H with H = p: the differences are exact.
+/// // Steps of length 0.1 along q' = 1, z' = p - H with H = p.
 /// let states = [0.0, 0.1, 0.2].map(|q| PhasePoint::new([q], [2.0], 0.0));
 /// assert!((modified_hamiltonian(&states, 0.1).unwrap() - 2.0).abs() < 1e-14);
 /// ```
 pub fn modified_hamiltonian<const N: usize>(states: &[PhasePoint<N>], h: f64) -> Option<f64> {
     let k = states.len().checked_sub(1).filter(|k| (1..=MAX_MODIFIED_ORDER).contains(k))?;
-    let mut differences: [ChartVector<N>; MAX_MODIFIED_ORDER] =
-        std::array::from_fn(|i| match (states.get(i), states.get(i + 1)) {
-            (Some(a), Some(b)) => ChartVector::from(*b).minus((*a).into()),
-            _ => ChartVector::from_fn(|_| 0.0),
-        });
+    let middle = k / 2;
+    let here = states.get(middle)?;
+    let apart = |i: usize, j: usize| i as f64 - j as f64;
+    // The derivatives of the Lagrange polynomials at the middle node; their sum is 0.
+    let weight = |j: usize| {
+        let over = (0..=k).filter(|m| *m != middle && *m != j).map(|m| apart(middle, m)).product::<f64>();
+        over / (0..=k).filter(|m| *m != j).map(|m| apart(j, m)).product::<f64>()
+    };
     let mut field = ChartVector::from_fn(|_| 0.0);
-    for j in 1..=k {
-        let sign = if j % 2 == 1 { 1.0 } else { -1.0 };
-        field = field.plus(differences[0].scale(sign / (j as f64 * h)));
-        // The differences of the next order.
-        for i in 0..k - j {
-            differences[i] = differences[i + 1].minus(differences[i]);
-        }
+    for (j, state) in states.iter().enumerate().filter(|(j, _)| *j != middle) {
+        field = field.plus(ChartVector::from(*state).minus((*here).into()).scale(weight(j) / h));
     }
-    Some(states.first()?.p.dot(&field.x) - field.z)
+    Some(here.p.dot(&field.x) - field.z)
 }
 
 /// How far one step is from the flow of its modified Hamiltonian.
@@ -50,11 +49,11 @@ pub struct ModifiedDefect {
     pub k: usize,
     /// The step size.
     pub h: f64,
-    /// `|H~_k(x1) - sigma_d H~_k(x0)|`, relative to `|H~_k(x0)|`.
+    /// `|H~_k(x1) - sigma_d H~_k(x0)|`, relative to `|H~_k(x0)|`, where x0 is the state after k/2 steps.
     pub defect: f64,
 }
 
-/// The defects `H~_k o Phi - sigma_d H~_k` of the first step of a method for several step sizes, and for the orders k from
+/// The defects `H~_k o Phi - sigma_d H~_k` of a step of a method near the start of a problem, for several step sizes, and for the orders k from
 /// 1 to `most`: a table for a plot of the defect against the order and the step size. They decrease as `h^(k+1)`; for
 /// fixed h the smallest one over k decreases as `exp(-c/h)` for an analytic H.
 ///
@@ -79,17 +78,15 @@ pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
     let mut found = Vec::with_capacity(most * steps.len());
     for &h in steps {
         let mut stepper = integrator.stepper(problem, h, StepperOptions { action: true, check_resolution: false })?;
-        let (mut states, mut sigma) = (vec![stepper.state()], 1.0);
-        for taken in 0..=most {
+        let (mut states, mut sigmas) = (vec![stepper.state()], Vec::new());
+        for _ in 0..=most {
             stepper.advance(1).map_err(|failure| InputError::FirstStep(failure.cause))?;
             states.push(stepper.state());
-            if taken == 0 {
-                sigma = stepper.sigma();
-            }
+            sigmas.push(stepper.sigma());
         }
         for k in 1..=most {
             let value = |from: usize| states.get(from..=from + k).and_then(|states| modified_hamiltonian(states, h));
-            let (Some(before), Some(after)) = (value(0), value(1)) else { continue };
+            let (Some(before), Some(after), Some(sigma)) = (value(0), value(1), sigmas.get(k / 2)) else { continue };
             let defect = ((after - sigma * before) / before).abs();
             if !defect.is_finite() {
                 return Err(InputError::FirstStep(StepError::NonFinite));

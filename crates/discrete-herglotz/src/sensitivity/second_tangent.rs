@@ -137,7 +137,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     ///
     /// # Errors
     /// Those of [`tangent`](Self::tangent), and [`SensitivityError::NoSecondTangent`] for all integrators but contact Gauss
-    /// collocation.
+    /// collocation, and for contact Hamiltonians.
     pub fn second_tangent(self, variables: &[Variable], until: Until) -> Result<SecondTangent<N>, SensitivityError> {
         Ok(self.second_order(variables, Directions::Variables, until)?.into())
     }

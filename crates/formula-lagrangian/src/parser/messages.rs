@@ -37,9 +37,7 @@ impl<'a> Parser<'a> {
         let instead = match name {
             "q" | "v" if !is_function => Some(self.all_of(name)),
             _ if is_function => instead_of_function(name).map(str::to_owned),
-            ACTION if self.names.nearest(name, &locals).is_none() => {
-                Some(format!("the action is `{}` here", self.names.action))
-            }
+            ACTION if self.names.action != ACTION => Some(format!("the action is `{}` here", self.names.action)),
             _ => instead_of_name(name).map(str::to_owned),
         };
         match instead {

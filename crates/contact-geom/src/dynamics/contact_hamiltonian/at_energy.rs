@@ -67,3 +67,6 @@ impl<const N: usize, H: ContactHamiltonian<N>> ContactHamiltonian<N> for AtEnerg
         self.hamiltonian.closed_hessian(t, x)
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<const N: usize, H: ContactHamiltonian<N>> crate::ParametricHamiltonian<N> for AtEnergy<H> {}

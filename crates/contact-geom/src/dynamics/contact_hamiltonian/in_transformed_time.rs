@@ -119,6 +119,12 @@ pub(crate) fn extended<const N: usize, const M: usize>(x: &PhasePoint<N>, q: f64
     PhasePoint { q: with(&x.q, q), p: with(&x.p, p), z: x.z }
 }
 
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> crate::ParametricHamiltonian<N>
+    for TimesRate<K, G>
+{
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

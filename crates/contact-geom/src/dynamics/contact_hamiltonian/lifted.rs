@@ -74,3 +74,6 @@ impl<const N: usize, X: VectorField<N>> ContactHamiltonian<N> for Lifted<X> {
         Some((h, d))
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<const N: usize, X: VectorField<N>> crate::ParametricHamiltonian<N> for Lifted<X> {}

@@ -98,3 +98,6 @@ impl<F: Objective<N>, const N: usize> ContactHamiltonian<N> for Bregman<F> {
         HamiltonianStructure { z_affine: true, degree, ..HamiltonianStructure::default() }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<F: Objective<N>, const N: usize> crate::ParametricHamiltonian<N> for Bregman<F> {}

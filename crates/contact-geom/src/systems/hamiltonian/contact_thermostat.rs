@@ -84,6 +84,9 @@ impl<E: ContactHamiltonian<N>, const N: usize> ContactHamiltonian<N> for Contact
     }
 }
 
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<E: ContactHamiltonian<N>, const N: usize> crate::ParametricHamiltonian<N> for ContactThermostat<E> {}
+
 /// The rate `g = (n + 1)/(beta h)` of the time of the energy of a [`ContactThermostat`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeOfEnergy<E>(pub ContactThermostat<E>);

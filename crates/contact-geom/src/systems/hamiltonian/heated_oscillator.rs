@@ -66,3 +66,6 @@ impl ContactHamiltonian<1> for HeatedOscillator {
         }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for HeatedOscillator {}

@@ -123,3 +123,12 @@ impl<E: ContactHamiltonian<N>, const N: usize, const M: usize> ContactHamiltonia
         HamiltonianStructure { autonomous: true, ..HamiltonianStructure::default() }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<const M: usize> crate::ParametricHamiltonian<M> for ScaleOfTime {}
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<E: ContactHamiltonian<N>, const N: usize, const M: usize> crate::ParametricHamiltonian<M> for Nose<E, N> {}
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<E: ContactHamiltonian<N>, const N: usize, const M: usize> crate::ParametricHamiltonian<M> for NoseHoover<E, N> {}

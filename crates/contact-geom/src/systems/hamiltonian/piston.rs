@@ -71,3 +71,6 @@ impl ContactHamiltonian<1> for Piston {
         }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl crate::ParametricHamiltonian<1> for Piston {}

@@ -95,3 +95,6 @@ impl<const N: usize> ContactHamiltonian<N> for Ray<N> {
         }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<const N: usize> crate::ParametricHamiltonian<N> for Ray<N> {}

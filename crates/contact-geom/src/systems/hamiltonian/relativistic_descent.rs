@@ -47,3 +47,6 @@ impl<F: Objective<N>, const N: usize> ContactHamiltonian<N> for RelativisticDesc
         }
     }
 }
+
+/// Without parameters: its motions are differentiated in the start and in the times.
+impl<F: Objective<N>, const N: usize> crate::ParametricHamiltonian<N> for RelativisticDescent<F> {}

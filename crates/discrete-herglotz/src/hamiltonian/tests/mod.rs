@@ -151,13 +151,13 @@ pub(super) fn assert_order<S: Stepper<N>, const N: usize>(
     stepper: impl Fn(f64) -> S,
 ) {
     let mut points: Vec<(f64, f64)> = Vec::new();
-    let mut n = 6;
+    let mut n = 8;
     while n < 400 {
         let mut motion = stepper(duration / n as f64);
         motion.advance(n).unwrap();
         let error = distance(&motion.state(), exact);
-        // The reference has some hundred units of round-off.
-        if error < 1e-12 {
+        // The round-off of a reference is some 1e-14.
+        if error < 2e-13 {
             break;
         }
         points.push(((n as f64).ln(), error.ln()));

@@ -17,12 +17,15 @@ use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, numbers::max_or_nan};
 use newton::{FullNewton, SimplifiedNewton};
 use pulp::Simd;
 use std::array::from_fn;
 pub(crate) use tangent::{StepDerivatives, step_derivatives, step_jacobian};
+
+/// The number of steps for which `H_pp` is kept: its evaluation by dual numbers costs up to as much as a step.
+const PP_AGE: u32 = 8;
 
 /// The state and the workspace of a step.
 ///
@@ -56,6 +59,9 @@ pub(crate) struct HamiltonianStages<'a, L, const N: usize> {
     pub z: CompensatedSum,
     /// `1 - rho` at the end of the last step.
     one_minus_rho: f64,
+    /// `H_pp` at an earlier state, by which velocities follow momenta within an iteration, and the number of steps since.
+    pp: Box<SMatrix<f64, N, N>>,
+    pp_age: u32,
     /// Whether the right-hand sides are those of the last step.
     warm: bool,
     /// Whether the right-hand sides are the solution of the next step.
@@ -93,6 +99,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
             p: from_fn(|d| state.p[d].into()),
             z: state.z.into(),
             one_minus_rho: 0.0,
+            pp: Box::new(SMatrix::zeros()),
+            pp_age: PP_AGE,
             warm: false,
             solved: false,
             newton: None,
@@ -114,32 +122,40 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
     pub fn take_step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
-        let solved = std::mem::take(&mut self.solved);
-        let warm = std::mem::take(&mut self.warm);
-        if solved {
-            self.move_stages::<S>();
-            self.evaluate::<S>(t);
-            let outcome = self.finish::<S>();
-            self.assess_resolution::<S>(f64::INFINITY);
-            return outcome;
-        }
-        if warm {
-            self.extrapolate::<S>();
-            self.move_stages::<S>();
-        } else {
-            self.rest_stages();
-        }
-        if self.newton.is_some() {
-            self.keep_iterate(warm);
-        }
-        self.evaluate::<S>(t);
-        let mut iteration = FixedPointIteration::until(1.0, 0.25);
-        loop {
+        let (solved, warm) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.warm));
+        if !solved {
+            self.renew_pp(t);
+            if warm {
+                self.extrapolate::<S>();
+            }
             if self.newton.is_some() {
+                self.keep_iterate(warm);
+            }
+        }
+        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        let mut first = true;
+        // H is evaluated at one place in the code, so that it is inlined into this loop and compiled for its instruction
+        // set.
+        loop {
+            let by_newton = !first && self.newton.is_some();
+            if by_newton {
                 self.correct();
             }
-            let change = self.move_stages::<S>();
+            let change = if first && !solved && !warm {
+                self.rest_stages();
+                f64::INFINITY
+            } else {
+                self.move_stages::<S>(!first && !by_newton)
+            };
             self.evaluate::<S>(t);
+            if solved {
+                let outcome = self.finish::<S>();
+                self.assess_resolution::<S>(f64::INFINITY);
+                return outcome;
+            }
+            if std::mem::take(&mut first) {
+                continue;
+            }
             match iteration.assess(change, 1.0) {
                 IterationOutcome::Continue => {}
                 IterationOutcome::Done => {
@@ -154,6 +170,24 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
                 refused => return refused,
             }
         }
+    }
+
+    /// Evaluates `H_pp` at the state, where it is old.
+    #[inline(always)]
+    fn renew_pp(&mut self, t: f64) {
+        self.pp_age += 1;
+        if self.pp_age > PP_AGE {
+            self.pp_age = 0;
+            self.evaluate_pp(t);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn evaluate_pp(&mut self, t: f64) {
+        let pp = self.lagrangian.hamiltonian_hessian(t, &self.phase_point()).map_or(SMatrix::zeros(), |h| h.vv);
+        // Where it is not finite, velocities follow in the next evaluation.
+        *self.pp = if pp.iter().all(|e| e.is_finite()) { pp } else { SMatrix::zeros() };
     }
 
     /// The stages of a motion at rest, from which the iteration of a first step starts.

@@ -97,7 +97,7 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for HamiltonianStages<'_, L
 }
 
 saved!([L, const N: usize] HamiltonianStages<'_, L, N> {
-    moved, force, l, rate, v, x, p_stages, z_stages, one_minus_rho_stages, q, p, z, one_minus_rho, warm, solved, age,
+    moved, force, l, rate, pp, pp_age, v, x, p_stages, z_stages, one_minus_rho_stages, q, p, z, one_minus_rho, warm, solved, age,
     defect, known, evaluations,
 } and save_newton, load_newton);
 
