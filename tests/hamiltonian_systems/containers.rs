@@ -42,7 +42,7 @@ fn the_first_law_in_entropies() {
         });
         largest
     };
-    for (stages, counts) in [(1, [20.0, 40.0, 80.0]), (2, [8.0, 16.0, 32.0]), (3, [6.0, 9.0, 14.0])] {
+    for (stages, counts) in [(1, [20.0, 40.0, 80.0]), (2, [16.0, 32.0, 64.0]), (3, [16.0, 24.0, 36.0])] {
         let points = counts.map(|n| (1.0 / n, error(stages, 1.0 / n, 5.0)));
         let order = slope(&points);
         assert!((order - 2.0 * stages as f64).abs() < 0.15, "{stages} stages: {order}, {points:?}");

@@ -17,13 +17,13 @@ fn logistic() -> (ContactThermostat<HeatedOscillator>, PhasePoint<1>) {
 }
 
 /// `ln rho + 2 ln sigma_d` is constant: the density times the volume, which a step multiplies by the square of sigma_d
-/// exactly. The bound is the rounding of 2000 steps whose terms are below 20.
+/// exactly. The bound is the rounding of 5000 steps whose terms are below 20.
 #[test]
 fn the_density_times_the_volume_is_constant() {
     let (system, start) = logistic();
     let at_start = system.log_density(0.0, &start);
     let (mut largest, mut range): (f64, f64) = (0.0, 0.0);
-    let outcome = run(One::from(system), (0.0, start), (8, 0.02), 40.0, |t, x, log_factor| {
+    let outcome = run(One::from(system), (0.0, start), (8, 0.002), 10.0, |t, x, log_factor| {
         let change = (system.log_density(t, x) + 2.0 * log_factor - at_start).abs();
         largest = if change <= largest { largest } else { change };
         range = if log_factor.abs() <= range { range } else { log_factor.abs() };
@@ -39,13 +39,13 @@ fn the_density_times_the_volume_is_constant() {
 #[test]
 fn averages_are_those_of_the_canonical_ensemble() {
     const BLOCKS: usize = 50;
-    const LENGTH: f64 = 100.0;
+    const LENGTH: f64 = 30.0;
     let (system, start) = logistic();
     let moving = system.in_time_of_energy::<1>();
     let start = moving.start(0.0, &start);
     let mut sums = [[0.0; 3]; BLOCKS];
     let (mut conserved, mut largest): (Option<f64>, f64) = (None, 0.0);
-    let outcome = run(Two::from(moving), (0.0, start), (6, 0.1), LENGTH * BLOCKS as f64, |tau, x, log_factor| {
+    let outcome = run(Two::from(moving), (0.0, start), (8, 0.02), LENGTH * BLOCKS as f64, |tau, x, log_factor| {
         let (q, p) = (x.q[0], x.p[0]);
         let of_h = PhasePoint::new([q], [p], x.z);
         let weight = moving.rate.value(tau, &of_h.q, &of_h.p, of_h.z);
@@ -58,8 +58,8 @@ fn averages_are_those_of_the_canonical_ensemble() {
         largest = if change <= largest { largest } else { change };
     });
     assert_eq!(outcome.status, Status::Completed, "{outcome:?}");
-    // The error of fifty thousand steps.
-    assert!(largest < 1e-8, "{largest:e}");
+    // The error of 75000 steps, in some of which z passes several scales of the bath.
+    assert!(largest < 1e-6, "{largest:e}");
     for i in 0..2 {
         // The average is a quotient of means; its error is that of the residuals of the blocks.
         let total: f64 = sums.iter().map(|sum| sum[2]).sum();

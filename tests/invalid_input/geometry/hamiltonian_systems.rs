@@ -4,8 +4,8 @@ use crate::InputTest;
 use crate::numbers::Report;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::hamiltonian::{
-    Bregman, Containers, Gas, HeatedOscillator, Kinetic, Medium, Nose, NoseHoover, Objective, Piston, Quartic, Ray,
-    RelativisticDescent, SpinOrbit, ThermalCoordinates,
+    Bath, Bregman, ContactThermostat, Containers, Gas, HeatedOscillator, Kinetic, Medium, Nose, NoseHoover, Objective,
+    Piston, Quartic, Ray, RelativisticDescent, SpinOrbit, ThermalCoordinates,
 };
 use contact_geom::{AtEnergy, ContactHamiltonian, InTransformedTime, PhasePoint, VectorField};
 
@@ -48,7 +48,16 @@ pub const TESTS: &[InputTest] = &[
         run: optimizers,
     },
     InputTest { entries: &["Medium::index", "Ray::start", "SpinOrbit::rigid"], run: rays_and_spins },
-    InputTest { entries: &["Nose::poincare", "Nose::start", "NoseHoover::start"], run: thermostats },
+    InputTest {
+        entries: &[
+            "ContactThermostat::in_time_of_energy",
+            "ContactThermostat::log_density",
+            "Nose::poincare",
+            "Nose::start",
+            "NoseHoover::start",
+        ],
+        run: thermostats,
+    },
 ];
 
 /// A function is finite for ordinary numbers, and not for a NaN in the place of any of them.
@@ -146,6 +155,12 @@ fn rays_and_spins(report: &mut Report) {
 
 fn thermostats(report: &mut Report) {
     let energy = HeatedOscillator::default();
+    for bath in [Bath::Logistic { scale: 2.0 }, Bath::Gaussian { variance: 0.5 }] {
+        let system = ContactThermostat { energy, beta: 0.1, bath };
+        let moving = system.in_time_of_energy::<1>();
+        propagates(report, "density", &[0.3, 0.7, 0.2], |u| system.log_density(0.0, &state(u)));
+        propagates(report, "start", &[0.3, 0.7, 0.2, 1.0], |u| sum::<2>(moving.start(u[3], &state(u))));
+    }
     let nose = Nose::<_, 1> { energy, temperature: 1.0, mass: 1.0, degrees: 1.0 };
     let start = |u: &[f64]| nose.start::<2>(&PhasePoint::new([u[0]], [u[1]], 0.0), u[2]);
     propagates(report, "start", &[0.3, 0.7, 0.2], |u| sum(start(u)));

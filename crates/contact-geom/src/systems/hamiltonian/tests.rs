@@ -237,7 +237,7 @@ fn contact_density_dynamics_has_the_density() {
         close(system.log_density(t, &x), density.ln());
         let field = system.contact_field(t, &x);
         close(field.x[0], h * 0.05 * p);
-        close(field.y[0], -h * (0.05 * 4.0 * q + p * 0.25 * (z / 4.0).tanh() * 2.0));
+        close(field.y[0], -h * (0.05 * 4.0 * q + p * 0.25 * (z / 4.0).tanh()));
         close(field.z, h * (0.05 * p * p - 1.0));
     }
 }
