@@ -318,7 +318,8 @@ fn scenes_run() {
     let off = column(&at.read("ray/rows.csv"), "off");
     assert!(off.iter().all(|x| x.abs() < 1e-12), "{off:?}");
     let kept = column(&at.read("van_der_pol/rows.csv"), "exp(k*t)*(energy - k*z)");
-    assert!(kept.iter().all(|x| (x + 1.0).abs() < 1e-7), "{kept:?}");
+    // The error 1e-10 of (q, p) is multiplied by e^8.
+    assert!(kept.iter().all(|x| (x + 1.0).abs() < 1e-5), "{kept:?}");
     assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
 }
 

@@ -96,8 +96,8 @@ fn field_in_words(scene: &Scene, at: &HamiltonianGeometry) -> String {
         rows.push(vec![name, short(*field), short(*change), short(*bracket)]);
     }
     format!(
-        "H = {} at the start; L_X eta = {} eta for X = X_H, to {:.1e}; a Jacobi bracket {{H, f}} that vanishes at all points \
-         belongs to a dissipated quantity f\n{}",
+        "H = {} at the start; L_X eta = {} eta for X = X_H, to {:.1e}; a Jacobi bracket {{H, f}} that vanishes at all \
+         points belongs to a dissipated quantity f\n{}",
         short(at.hamiltonian),
         short(at.rate),
         conformality_defect(at),

@@ -205,6 +205,9 @@ impl System {
     /// # Errors
     /// [`RuntimeError`] for an invalid problem.
     pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
+        if self.formula().is_hamiltonian() {
+            return Err(RuntimeError::OfLagrangians { what: "paths between two positions" });
+        }
         kernel::path::search(self.formula(), problem)
     }
 }

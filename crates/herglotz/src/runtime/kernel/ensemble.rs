@@ -293,7 +293,11 @@ fn end_of<L: FormulaSystem<N>, const N: usize>(
         let guess = last.map_or_else(SVector::zeros, |row| row.p);
         legendre_inverse(lagrangian, t, x, &guess).ok().map(|x| x.v)
     });
-    let energy = v.map(|v| v.dot(&x.p) - lagrangian.value(t, &x.q, &v, x.z));
+    let energy = if const { L::HINTS.hamiltonian } {
+        lagrangian.hamiltonian_with_gradient(t, x).map(|(h, _)| h)
+    } else {
+        v.map(|v| v.dot(&x.p) - lagrangian.value(t, &x.q, &v, x.z))
+    };
     Row {
         t,
         q: x.q,

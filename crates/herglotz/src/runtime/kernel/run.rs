@@ -32,8 +32,8 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
 }
 
 /// The first line of the plan of a formula in which z may have been meant to be a coordinate.
-const ACTION_IS_NO_COORDINATE: &str = "z is the action and acts as drag: it is no coordinate beside x and y; for a coordinate z, \
-                                       give the action another name, as in action = \"s\"";
+const ACTION_IS_NO_COORDINATE: &str = "z is the action and acts as drag: it is no coordinate beside x and y; \
+                                       for a coordinate z, give the action another name, as in action = \"s\"";
 
 /// Whether a formula has coordinates x and y, and depends on an action that is named z.
 fn acts_as_drag(formula: &Formula) -> bool {
