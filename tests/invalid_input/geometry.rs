@@ -4,6 +4,8 @@
 mod forms;
 #[path = "geometry/hamiltonian_systems.rs"]
 mod hamiltonian_systems;
+#[path = "geometry/hamiltonians.rs"]
+mod hamiltonians;
 #[path = "geometry/lagrangians.rs"]
 mod lagrangians;
 #[path = "geometry/scalars.rs"]
@@ -17,6 +19,11 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Lagrangian::closed_*", "the implementor's, and nothing by default"),
     ("Lagrangian::switching_functions", "the implementor's, and none by default"),
     ("Lagrangian::structure", "the implementor's, and takes no number"),
+    ("ContactHamiltonian::*", "the implementor's"),
+    ("HamiltonianStructure::of_lagrangian", "takes no number"),
+    ("Lagrangian::hamiltonian_*", "those of OfHamiltonian, whose Hamiltonian is tested"),
+    ("OfHamiltonian::hamiltonian", "takes no number"),
+    ("ParametricHamiltonian::*", "the implementor's; tests/hamiltonians/derivatives"),
     ("OneParameterGroup::act", "the implementor's; that of Symmetry is tested with its callers"),
     ("SystemVisitor::*", "the implementor's"),
     ("System::*", "the implementor's: constants and samples"),
@@ -52,5 +59,11 @@ pub const EXCEPTIONS: Exceptions = &[
     ("$name::new", "stores its arguments; check() and every start check them"),
 ];
 
-pub const TESTS: &[&[InputTest]] =
-    &[forms::TESTS, hamiltonian_systems::TESTS, lagrangians::TESTS, scalars::TESTS, switching::TESTS];
+pub const TESTS: &[&[InputTest]] = &[
+    forms::TESTS,
+    hamiltonian_systems::TESTS,
+    hamiltonians::TESTS,
+    lagrangians::TESTS,
+    scalars::TESTS,
+    switching::TESTS,
+];
