@@ -96,7 +96,7 @@ fn modified(report: &mut Report) {
     let problem = Problem::of_hamiltonian(&of, 0.0, PhasePoint::new([0.3], [0.7], 0.2));
     for h in EXTREME {
         let defects = problem.as_ref().map_err(|e| e.to_string()).and_then(|problem| {
-            modified_defects(problem, &GaussCollocation { stages: 1 }, &[h], 2).map_err(|e| e.to_string())
+            modified_defects(problem, &GaussCollocation { stages: 1 }, 0.0, &[h], 2).map_err(|e| e.to_string())
         });
         report.entry_point(&h, defects.map(|all| all.iter().map(|d| d.defect).sum::<f64>()));
     }

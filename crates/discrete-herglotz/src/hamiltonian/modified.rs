@@ -2,7 +2,7 @@
 
 use crate::{InputError, Integrator, Problem, StepError, StepperOptions};
 use contact_geom::hamiltonian::DarbouxBracket;
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, SmoothFunction};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, SmoothFunction, numbers::max_abs_or_nan};
 
 /// The largest order of an interpolated modified Hamiltonian: beyond it the differences of states are round-off.
 pub const MAX_MODIFIED_ORDER: usize = 8;
@@ -42,28 +42,32 @@ pub fn modified_hamiltonian<const N: usize>(states: &[PhasePoint<N>], h: f64) ->
     Some(here.p.dot(&field.x) - field.z)
 }
 
-/// How far one step is from the flow of its modified Hamiltonian.
+/// How far steps are from the flow of their modified Hamiltonian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModifiedDefect {
     /// The order k of the modified Hamiltonian.
     pub k: usize,
     /// The step size.
     pub h: f64,
-    /// `|H~_k(x1) - sigma_d H~_k(x0)|`, relative to `|H~_k(x0)|`, where x0 is the state after k/2 steps.
+    /// The largest `|H~_k(x1) - sigma_d H~_k(x0)|` of the steps, relative to the largest `|H~_k|`.
     pub defect: f64,
 }
 
-/// The defects `H~_k o Phi - sigma_d H~_k` of a step of a method near the start of a problem, for several step sizes, and for the orders k from
-/// 1 to `most`: a table for a plot of the defect against the order and the step size. They decrease as `h^(k+1)`; for
-/// fixed h the smallest one over k decreases as `exp(-c/h)` for an analytic H.
+/// The largest number of steps of a size over the span.
+const MAX_STEPS: usize = 1_000_000;
+
+/// The defects `H~_k o Phi - sigma_d H~_k` of the steps of a method over a span, for several step sizes, and for the orders
+/// k from 1 to `most`: a table for a plot of the defect against the order and the step size. They decrease as `h^(k+1)`;
+/// for fixed h the smallest one over k decreases as `exp(-c/h)` for an analytic H.
 ///
 /// # Errors
 /// [`InputError::Unclaimed`] for a Lagrangian that does not claim to be autonomous, since the modified Hamiltonian then
-/// depends on time; [`InputError::Count`] for an order of 0 or beyond [`MAX_MODIFIED_ORDER`]; those of the stepper, and
-/// [`InputError::FirstStep`] where a step fails.
+/// depends on time; [`InputError::Count`] for an order of 0 or beyond [`MAX_MODIFIED_ORDER`]; [`InputError::TooMany`] for
+/// more than a million steps; those of the stepper, and [`InputError::FirstStep`] where a step fails.
 pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'a, L, N>,
     integrator: &impl Integrator<'a, L, N>,
+    span: f64,
     steps: &[f64],
     most: usize,
 ) -> Result<Vec<ModifiedDefect>, InputError> {
@@ -78,16 +82,24 @@ pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
     let mut found = Vec::with_capacity(most * steps.len());
     for &h in steps {
         let mut stepper = integrator.stepper(problem, h, StepperOptions { action: true, check_resolution: false })?;
-        let (mut states, mut sigmas) = (vec![stepper.state()], Vec::new());
-        for _ in 0..=most {
+        let count = (span / h).abs().round();
+        if count.is_nan() || count > MAX_STEPS as f64 {
+            let (what, remedy) = ("the number of steps of the span", "take a shorter span or longer steps");
+            return Err(InputError::TooMany { what, found: count, most: MAX_STEPS as f64, remedy });
+        }
+        let count = (count as usize).max(1);
+        let (mut states, mut sigmas) = (vec![stepper.state()], Vec::with_capacity(count + most));
+        for _ in 0..count + most {
             stepper.advance(1).map_err(|failure| InputError::FirstStep(failure.cause))?;
             states.push(stepper.state());
             sigmas.push(stepper.sigma());
         }
         for k in 1..=most {
-            let value = |from: usize| states.get(from..=from + k).and_then(|states| modified_hamiltonian(states, h));
-            let (Some(before), Some(after), Some(sigma)) = (value(0), value(1), sigmas.get(k / 2)) else { continue };
-            let defect = ((after - sigma * before) / before).abs();
+            let values = states.windows(k + 1).filter_map(|states| modified_hamiltonian(states, h));
+            let values: Vec<f64> = values.take(count + 1).collect();
+            let pairs = values.iter().zip(values.iter().skip(1)).zip(sigmas.iter().skip(k / 2));
+            let apart = max_abs_or_nan(pairs.map(|((before, after), sigma)| after - sigma * before));
+            let defect = apart / max_abs_or_nan(values.iter().copied());
             if !defect.is_finite() {
                 return Err(InputError::FirstStep(StepError::NonFinite));
             }
