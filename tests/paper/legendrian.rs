@@ -5,7 +5,9 @@ use crate::common::bounded;
 use crate::table::{EXACT_TOLERANCE, Row, along_motions_of_every_system};
 use contact_geom::nalgebra::SVector;
 use contact_geom::support::seed;
-use contact_geom::{ChartVector, ContactHamiltonian, LegendrianDefect, PhasePoint, Scalar, Statement, legendrian_defect};
+use contact_geom::{
+    ChartVector, ContactHamiltonian, LegendrianDefect, PhasePoint, Scalar, Statement, legendrian_defect,
+};
 use exact_lagrangian::contact_flow;
 
 /// The statement about the graph of the flow.

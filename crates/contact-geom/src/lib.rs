@@ -78,7 +78,11 @@ pub use dynamics::{
     legendre, legendre_jacobian, momentum, regularity,
 };
 pub use error::GeometryError;
-pub use forms::{ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form, LagrangianForm, LegendrianDefect, OnParameters, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, VelocityPoint, conformality, legendrian_defect};
+pub use forms::{
+    ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form,
+    LagrangianForm, LegendrianDefect, OnParameters, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction,
+    VelocityPoint, conformality, legendrian_defect,
+};
 pub use number::{Dual, Scalar};
 pub use statement::Statement;
 

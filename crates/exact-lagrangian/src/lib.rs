@@ -61,8 +61,8 @@ pub mod statements;
 mod variational_error;
 
 pub use contact::{
-    ContactFlowError, ContactMotion, ExactLeftHamiltonian, ExactRightHamiltonian, FromFunction, FromPoint, GeneratedStep,
-    HamiltonJacobi, InitialAction, InitialDatum, PrincipalFunction, contact_flow,
+    ContactFlowError, ContactMotion, ExactLeftHamiltonian, ExactRightHamiltonian, FromFunction, FromPoint,
+    GeneratedStep, HamiltonJacobi, InitialAction, InitialDatum, PrincipalFunction, contact_flow,
 };
 pub use error::ExactError;
 pub use map::conjugate::ConjugatePoint;

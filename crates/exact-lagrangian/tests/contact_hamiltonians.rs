@@ -7,13 +7,11 @@
 
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Pendulum};
-use contact_geom::{
-    ChartVector, ContactHamiltonian, DiscretePoint, PhasePoint, Scalar, VelocityPoint, support::seed,
-};
+use contact_geom::{ChartVector, ContactHamiltonian, DiscretePoint, PhasePoint, Scalar, VelocityPoint, support::seed};
 use discrete_herglotz::hamiltonian::{ExactTypeTwo, Quadratic, TypeTwo};
 use exact_lagrangian::{
-    ContactFlowError, ExactError, ExactLagrangian, ExactLeftHamiltonian, ExactRightHamiltonian, FromFunction, FromPoint,
-    HamiltonJacobi, InitialAction, contact_flow, herglotz_flow,
+    ContactFlowError, ExactError, ExactLagrangian, ExactLeftHamiltonian, ExactRightHamiltonian, FromFunction,
+    FromPoint, HamiltonJacobi, InitialAction, contact_flow, herglotz_flow,
 };
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -35,7 +35,7 @@ impl LegendrianDefect {
 /// // (q, 2 p, 2 z) has the factor 2.
 /// let x1 = PhasePoint { q: x0.q, p: x0.p + x0.p, z: x0.z + x0.z };
 /// assert!(legendrian_defect(&x0, &x1, 2f64.ln().into()).largest() < 1e-15);
-/// assert!(legendrian_defect(&x0, &x1, 0.0.into()).form > 0.1); // another factor
+/// assert!(legendrian_defect(&x0, &x1, 0f64.into()).form > 0.1); // another factor
 /// ```
 pub fn legendrian_defect<const N: usize>(
     x0: &PhasePoint<N, OnParameters<N>>,

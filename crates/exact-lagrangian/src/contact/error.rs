@@ -37,7 +37,9 @@ pub enum ContactFlowError<const N: usize> {
         reached: PhasePoint<N>,
     },
     /// No motion with the given end was found.
-    #[error("no motion with the given end was found (residual {residual:e}); pass a guess of it, or take a shorter time")]
+    #[error(
+        "no motion with the given end was found (residual {residual:e}); pass a guess of it, or take a shorter time"
+    )]
     NotConverged {
         /// The start of the last motion tried.
         last: PhasePoint<N>,

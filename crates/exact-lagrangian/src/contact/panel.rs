@@ -1,7 +1,7 @@
 //! One panel of the flow of a contact Hamiltonian: Gauss collocation with 14 nodes, of order 28.
 
 use crate::numerics::gauss::{Gauss, collocations};
-use contact_geom::numbers::{max_or_nan, TangentVector};
+use contact_geom::numbers::{TangentVector, max_or_nan};
 use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianDerivatives, PhasePoint, Scalar};
 
 /// The table of coefficients that is used, with 14 nodes.

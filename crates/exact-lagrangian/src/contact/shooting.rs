@@ -135,7 +135,7 @@ impl<H, T: Scalar, R, L> Search<'_, H, T, R, L> {
     ) -> Result<SMatrix<f64, N, N>, ContactFlowError<N>> {
         let block = self.given.of(&motion.end);
         let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| block[i].d[j]);
-        let mut inverse = SMatrix::zeros();
+        let mut inverse = SMatrix::<f64, N, N>::zeros();
         let conjugate = |smallest: f64| ContactFlowError::Conjugate { last: real(start), smallest };
         for j in 0..N {
             let mut unit = SVector::<f64, N>::from_fn(|i, _| if i == j { 1.0 } else { 0.0 });

@@ -1,7 +1,7 @@
 //! Modified Hamiltonians of splittings as series of Jacobi brackets.
 
+use crate::hamiltonian::BracketSeries;
 use crate::hamiltonian::SplitPart::{self, A, B};
-use crate::hamiltonian::{BracketSeries, MAX_BRACKET_DEGREE, ModifiedDefect};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{ContactHamiltonian, PhasePoint, Scalar};
@@ -46,7 +46,8 @@ impl Part {
                 let before = (z / a).atan();
                 let after = before - k * t;
                 let sigma = (before.cos() / after.cos()).powi(2);
-                let integral = (0.5 * t + ((2.0 * before).sin() - (2.0 * after).sin()) / (4.0 * k)) / before.cos().powi(2);
+                let integral =
+                    (0.5 * t + ((2.0 * before).sin() - (2.0 * after).sin()) / (4.0 * k)) / before.cos().powi(2);
                 (PhasePoint::new([q], [sigma * (p - q.sin() * integral)], a * after.tan()), sigma)
             }
             Part::Spring => (PhasePoint::new([q], [p - q * t], z - 0.5 * q * q * t), 1.0),
@@ -76,25 +77,28 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 const LIE_TROTTER: [(SplitPart, f64); 2] = [(A, 1.0), (B, 1.0)];
 const STRANG: [(SplitPart, f64); 3] = [(A, 0.5), (B, 1.0), (A, 0.5)];
 
-/// `H~_k o Phi = sigma_d H~_k + O(h^(k+1))` for all k up to 7, on a pendulum with a drag that is nonlinear in z: for the
-/// Lie-Trotter splitting, and for the Strang splitting, whose terms of even degree vanish.
+/// `H~_k o Phi = sigma_d H~_k + O(h^(k+1))` on a pendulum with a drag that is nonlinear in z, for k up to 6, for the
+/// Lie-Trotter splitting and the Strang splitting, whose terms of even degree vanish.
 #[test]
 fn a_step_keeps_its_series() {
-    let start = PhasePoint::new([1.0], [0.7], 0.2);
-    let steps = [0.05, 0.1];
+    let states = [(1.0, 0.7, 0.2), (-0.6, 1.2, -0.5), (2.0, -0.9, 0.8)];
+    let states = states.map(|(q, p, z)| PhasePoint::new([q], [p], z));
+    let steps = [0.0125, 0.025, 0.05, 0.1, 0.2];
+    let most = 6;
     for (name, composition) in [("lie_trotter", &LIE_TROTTER[..]), ("strang", &STRANG[..])] {
-        let series = BracketSeries::new(composition, MAX_BRACKET_DEGREE).unwrap();
+        let symmetric = name == "strang";
+        let series = BracketSeries::new(composition, most).unwrap();
         let step = step(composition, Part::Pendulum);
-        let defects = series.defects(&Part::Kinetic, &Part::Pendulum, &start, &steps, step).unwrap();
-        for k in 1..=MAX_BRACKET_DEGREE {
-            let of_k: Vec<&ModifiedDefect> = defects.iter().filter(|d| d.k == k).collect();
-            let order = slope(&[(of_k[0].h, of_k[0].defect), (of_k[1].h, of_k[1].defect)]);
-            let expected = k + if name == "strang" && k % 2 == 1 { 2 } else { 1 };
-            // The rounding of the values is some 1e-16.
-            assert!(of_k[0].defect > 1e-14 || k == 7, "{name}, {k}: {of_k:?}");
-            assert!((order - expected as f64).abs() < 0.15 || k == 7, "{name}, {k}: slope {order}, {of_k:?}");
+        let defects = series.defects(&Part::Kinetic, &Part::Pendulum, &states, &steps, step).unwrap();
+        for k in 1..=most {
+            let of_k: Vec<(f64, f64)> = defects.iter().filter(|d| d.k == k).map(|d| (d.h, d.defect)).collect();
+            let order = k + if symmetric && k % 2 == 1 { 2 } else { 1 };
+            // The smallest steps whose defects are above the rounding of the values, some 1e-16.
+            let first = of_k.iter().position(|(_, defect)| *defect > 2e-14).unwrap();
+            let found = slope(&of_k[first..first + 2]);
+            assert!((found - order as f64).abs() < 0.15, "{name}, {k}: slope {found}, {of_k:?}");
         }
-        if name == "strang" {
+        if symmetric {
             assert!(series.terms().iter().all(|term| term.degree() % 2 == 1), "{:?}", series.terms());
         }
     }
