@@ -1,5 +1,5 @@
-//! The graphs of conformally contact maps are Legendrian: those of the flows of all systems, and those of flows of contact
-//! Hamiltonians that have no Lagrangian. Statement 48.
+//! The graphs of conformally contact maps are Legendrian: those of the flows of all systems, and those of flows of
+//! contact Hamiltonians that have no Lagrangian. Statement 48.
 
 use crate::common::bounded;
 use crate::table::{EXACT_TOLERANCE, Row, along_motions_of_every_system};
@@ -38,8 +38,8 @@ impl ContactHamiltonian<2> for Plane {
     }
 }
 
-/// The graphs of the flows of three kinds of contact Hamiltonians are Legendrian; with another factor, and after a shear of
-/// the momenta, they are not.
+/// The graphs of the flows of three kinds of contact Hamiltonians are Legendrian; with another factor, and after a
+/// shear of the momenta, they are not.
 #[test]
 fn flows_without_a_lagrangian() {
     let x = ChartVector { x: [0.3, -0.4].into(), y: [0.7, 0.2].into(), z: 0.25 };

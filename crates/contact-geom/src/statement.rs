@@ -1,5 +1,5 @@
-//! The list of the statements that can be checked numerically: those of the paper, and those on forces, impacts and graphs
-//! of flows.
+//! The list of the statements that can be checked numerically: those of the paper, and those on forces, impacts and
+//! graphs of flows.
 
 use std::fmt;
 

@@ -40,10 +40,11 @@
 //! [`ExactLeftHamiltonian`]), which exist at conjugate points, and the equation `S_t + H(t, q, S_q, S) = 0`
 //! ([`HamiltonJacobi`]).
 //!
-//! The crate also contains [`NonHolonomic`](principle::NonHolonomic), the constrained system used in the proofs of the paper; Herglotz'
-//! principle for any curve ([`action`](principle::action), [`action_derivative`](principle::action_derivative)); [`error_orders`], the variational error analysis of a
-//! discrete Lagrangian against the exact one; [`compose`]; closed forms ([`QuadraticExact`]); and [`statements`], the
-//! residuals of the theorems.
+//! The crate also contains [`NonHolonomic`](principle::NonHolonomic), the constrained system used in the proofs of the
+//! paper; Herglotz' principle for any curve ([`action`](principle::action),
+//! [`action_derivative`](principle::action_derivative)); [`error_orders`], the variational error analysis of a discrete
+//! Lagrangian against the exact one; [`compose`]; closed forms ([`QuadraticExact`]); and [`statements`], the residuals
+//! of the theorems.
 //!
 //! Accuracy: the error against closed forms is about 1e-15, relative to the motion itself where it decays by `e^-50`.
 //! Cost: `L_h^e` with its first derivatives costs 1.2 to 3.5 times the computation of the motion alone by dop853 to

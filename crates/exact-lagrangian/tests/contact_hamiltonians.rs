@@ -51,8 +51,8 @@ fn distance(a: impl Into<ChartVector<1>>, b: impl Into<ChartVector<1>>) -> f64 {
     a.into().minus(b.into()).amax()
 }
 
-/// The motions of a Lagrangian are those of its contact Hamiltonian: two programs that share only the coefficients of the
-/// collocation.
+/// The motions of a Lagrangian are those of its contact Hamiltonian: two programs that share only the coefficients of
+/// the collocation.
 #[test]
 fn the_flow_is_that_of_the_lagrangian() {
     let (gamma, x) = (-0.3, VelocityPoint::new([1.0], [0.7], 0.2));
@@ -77,8 +77,8 @@ fn the_way_back_is_the_inverse() {
     }
 }
 
-/// The derivatives of both generating functions by dual numbers through flow and shooting are those by the motion, and the
-/// steps that they determine end where they must.
+/// The derivatives of both generating functions by dual numbers through flow and shooting are those by the motion, and
+/// the steps that they determine end where they must.
 #[test]
 fn generating_functions_generate_the_flow() {
     for one in [One::Nonlinear, One::Linear, One::Oscillator(-0.2)] {
@@ -107,8 +107,8 @@ fn generating_functions_generate_the_flow() {
     }
 }
 
-/// At conjugate points of the oscillator, h = pi without drag, there is no exact discrete Lagrangian, but H+; a quarter of a
-/// period later it is the other way round.
+/// At conjugate points of the oscillator, h = pi without drag, there is no exact discrete Lagrangian, but H+; a quarter
+/// of a period later it is the other way round.
 #[test]
 fn they_exist_at_conjugate_points() {
     let one = SMatrix::<f64, 1, 1>::identity();
@@ -140,8 +140,8 @@ impl InitialAction<1> for Wave {
     }
 }
 
-/// `S_t + H(t, q, S_q, S) = 0`, with derivatives of S by dual numbers through flow and shooting, from a point and from a
-/// function; and S_q is the momentum.
+/// `S_t + H(t, q, S_q, S) = 0`, with derivatives of S by dual numbers through flow and shooting, from a point and from
+/// a function; and S_q is the momentum.
 #[test]
 fn the_action_solves_the_equation_of_hamilton_and_jacobi() {
     for t in [0.3, 0.9, 1.4] {

@@ -11,8 +11,8 @@ pub type OnParameters<const N: usize> = Dual<f64, ChartVector<N>>;
 pub struct LegendrianDefect {
     /// The largest component of the pullback of `Theta`, relative to the size of its terms.
     pub form: f64,
-    /// The largest component of the pullback of `d Theta = d eta1 - e^r dr ^ eta0 - e^r d eta0`, relative to the size of
-    /// its terms. It vanishes where the pullback of `Theta` vanishes in a neighbourhood.
+    /// The largest component of the pullback of `d Theta = d eta1 - e^r dr ^ eta0 - e^r d eta0`, relative to the size
+    /// of its terms. It vanishes where the pullback of `Theta` vanishes in a neighbourhood.
     pub closure: f64,
 }
 
@@ -23,11 +23,12 @@ impl LegendrianDefect {
     }
 }
 
-/// The Legendrian defect of a submanifold at a point `(x0, x1, r)`, given with its derivatives along the `2N + 1` parameters.
+/// The Legendrian defect of a submanifold at a point `(x0, x1, r)`, given with its derivatives along the `2N + 1`
+/// parameters.
 ///
-/// `Theta` is a contact form on `M x M x R`, of dimension `4N + 3`. A map of M is conformally contact with the factor sigma
-/// exactly if its graph `(x, Phi(x), ln sigma(x))`, of dimension `2N + 1`, is Legendrian: the pullback of `Theta` to it is
-/// `Phi* eta - sigma eta`. The parameters are the coordinates of x, or those of any chart of M.
+/// `Theta` is a contact form on `M x M x R`, of dimension `4N + 3`. A map of M is conformally contact with the factor
+/// sigma exactly if its graph `(x, Phi(x), ln sigma(x))`, of dimension `2N + 1`, is Legendrian: the pullback of `Theta`
+/// to it is `Phi* eta - sigma eta`. The parameters are the coordinates of x, or those of any chart of M.
 ///
 /// ```
 /// use contact_geom::{legendrian_defect, support::seed, ChartVector, PhasePoint};

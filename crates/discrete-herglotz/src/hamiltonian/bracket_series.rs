@@ -53,12 +53,12 @@ impl std::fmt::Display for BracketTerm {
 /// The modified Hamiltonian `H~ = sum_n h^(n-1) H_n` of a composition of the exact flows of two autonomous contact
 /// Hamiltonians A and B, where `H_n` is a sum of Jacobi brackets of n of them.
 ///
-/// The pullbacks of functions by the flows are `exp(a h X_A)`, `exp(b h X_B)`, so that their product, in the order in which
-/// the flows are taken, is the pullback by the composition. The logarithm of the product is a series of words in `X_A` and
-/// `X_B`, and a Lie element by the Baker-Campbell-Hausdorff theorem; by the theorem of Dynkin, Specht and Wever it remains
-/// the same if each word of length n is replaced by `1/n` times its nested Lie bracket. Since `X_{f,g} = [X_f, X_g]`, the
-/// Jacobi brackets of A and B have the same coefficients. See Hairer, Lubich and Wanner, Geometric Numerical Integration
-/// (2006), sections III.4 and IX.4, for the series of symplectic splittings.
+/// The pullbacks of functions by the flows are `exp(a h X_A)`, `exp(b h X_B)`, so that their product, in the order in
+/// which the flows are taken, is the pullback by the composition. The logarithm of the product is a series of words in
+/// `X_A` and `X_B`, and a Lie element by the Baker-Campbell-Hausdorff theorem; by the theorem of Dynkin, Specht and
+/// Wever it remains the same if each word of length n is replaced by `1/n` times its nested Lie bracket. Since `X_{f,g}
+/// = [X_f, X_g]`, the Jacobi brackets of A and B have the same coefficients. See Hairer, Lubich and Wanner, Geometric
+/// Numerical Integration (2006), sections III.4 and IX.4, for the series of symplectic splittings.
 ///
 /// ```
 /// use discrete_herglotz::hamiltonian::{BracketSeries, SplitPart::{A, B}};
@@ -93,13 +93,13 @@ fn product(x: &Words, y: &Words) -> Words {
 }
 
 impl BracketSeries {
-    /// The series up to a degree of a composition, whose flows are listed in the order in which they are taken, with their
-    /// times in units of h: `[(A, 1/2), (B, 1), (A, 1/2)]` for the Strang splitting. Terms that vanish identically are left
-    /// out.
+    /// The series up to a degree of a composition, whose flows are listed in the order in which they are taken, with
+    /// their times in units of h: `[(A, 1/2), (B, 1), (A, 1/2)]` for the Strang splitting. Terms that vanish
+    /// identically are left out.
     ///
     /// # Errors
-    /// [`InputError::Count`] for a degree of 0 or beyond [`MAX_BRACKET_DEGREE`]; [`InputError::Span`] for a time that is not
-    /// finite.
+    /// [`InputError::Count`] for a degree of 0 or beyond [`MAX_BRACKET_DEGREE`]; [`InputError::Span`] for a time that
+    /// is not finite.
     pub fn new(composition: &[(SplitPart, f64)], degree: usize) -> Result<Self, InputError> {
         if !(1..=MAX_BRACKET_DEGREE).contains(&degree) {
             let what = "the degree of the series of brackets, at most 7,";
@@ -146,10 +146,10 @@ impl BracketSeries {
 
     /// The value `sum_(n <= k) h^(n-1) H_n` of the series, truncated to the degree k or to its own, at a state.
     ///
-    /// The nested bracket of `w_1, ..., w_n` is the mixed derivative at 0 of
-    /// `w_n(phi_(n-1)(... phi_1(x))) / (sigma_1 ... sigma_(n-1))` in the times of the flows `phi_i` of the `w_i` with their
-    /// factors, because `{f, g}` is the derivative of `(g o phi) / sigma` along the flow of f. To first order in each time
-    /// the flow is a step of Euler's method, so that nested dual numbers give it without any flow.
+    /// The nested bracket of `w_1, ..., w_n` is the mixed derivative at 0 of `w_n(phi_(n-1)(... phi_1(x))) / (sigma_1
+    /// ... sigma_(n-1))` in the times of the flows `phi_i` of the `w_i` with their factors, because `{f, g}` is the
+    /// derivative of `(g o phi) / sigma` along the flow of f. To first order in each time the flow is a step of Euler's
+    /// method, so that nested dual numbers give it without any flow.
     pub fn value<const N: usize>(
         &self,
         a: &impl ContactHamiltonian<N>,
@@ -178,12 +178,14 @@ impl BracketSeries {
         terms.map(|(term, bracket)| term.coefficient * h.powi(term.degree as i32 - 1) * bracket).sum()
     }
 
-    /// The defects `|H~_k o Phi - sigma_d H~_k| / |H~_k|` of one step `Phi`, their mean over some states, for several step
-    /// sizes and for all k up to the degree of the series: a table for a plot. They decrease as `h^(k+1)`, for a symmetric
-    /// composition as `h^(k+2)` where k is odd. `step` returns the state after a step of length h, and its factor.
+    /// The defects `|H~_k o Phi - sigma_d H~_k| / |H~_k|` of one step `Phi`, their mean over some states, for several
+    /// step sizes and for all k up to the degree of the series: a table for a plot. They decrease as `h^(k+1)`, for a
+    /// symmetric composition as `h^(k+2)` where k is odd. `step` returns the state after a step of length h, and its
+    /// factor.
     ///
     /// # Errors
-    /// [`InputError::Count`] without a state; [`InputError::FirstStep`] where a step fails, or where a value is not finite.
+    /// [`InputError::Count`] without a state; [`InputError::FirstStep`] where a step fails, or where a value is not
+    /// finite.
     pub fn defects<const N: usize>(
         &self,
         a: &impl ContactHamiltonian<N>,
@@ -222,8 +224,8 @@ impl BracketSeries {
     }
 }
 
-/// The nested brackets of a Lie element, given by its words. Those that end in twice the same function vanish, and those
-/// that end in `{B, A}` are the negative of those that end in `{A, B}`.
+/// The nested brackets of a Lie element, given by its words. Those that end in twice the same function vanish, and
+/// those that end in `{B, A}` are the negative of those that end in `{A, B}`.
 fn brackets(logarithm: &Words) -> Vec<BracketTerm> {
     let mut terms = Vec::new();
     for (degree, words) in logarithm.iter().enumerate().skip(1) {

@@ -3,8 +3,8 @@
 use contact_geom::PhasePoint;
 use thiserror::Error;
 
-/// The reason why a motion of a contact Hamiltonian, or the motion with a given end, could not be computed. Errors along
-/// a motion carry the state that was reached.
+/// The reason why a motion of a contact Hamiltonian, or the motion with a given end, could not be computed. Errors
+/// along a motion carry the state that was reached.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ContactFlowError<const N: usize> {
@@ -46,7 +46,8 @@ pub enum ContactFlowError<const N: usize> {
         /// The largest component of the distance between its end and the given one.
         residual: f64,
     },
-    /// The given end does not determine the motion: its derivative in the unknown of the start is singular to round-off.
+    /// The given end does not determine the motion: its derivative in the unknown of the start is singular to
+    /// round-off.
     #[error(
         "the given end does not determine the motion: its derivative in the unknown of the start is singular (smallest \
          singular value {smallest:e} of its size); use a generating function of another type, or another time"

@@ -12,8 +12,8 @@ const SHORTEST: f64 = 1e-9;
 /// The largest of the last Legendre coefficients of the rates. The error of the end is about the square of it.
 const TAIL: f64 = 1e-9;
 
-/// A motion of a contact Hamiltonian: its end, and the integrals along it. On dual numbers, with the derivatives of all of
-/// them.
+/// A motion of a contact Hamiltonian: its end, and the integrals along it. On dual numbers, with the derivatives of all
+/// of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ContactMotion<const N: usize, T = f64> {
@@ -56,14 +56,14 @@ impl<const N: usize, T: Scalar> Sum<N, T> {
 }
 
 /// The flow of the contact Hamiltonian vector field `X_H`, `q' = H_p`, `p' = -H_q - p H_z`, `z' = p . H_p - H`, from a
-/// start at time `t0` over a duration, with `ln sigma = -int H_z dt`; paper, section 2.1. H may have any rank of `H_pp`.
-/// The duration is negative to run backward in time. On dual numbers the result has the solution of the variational
-/// equations, also the derivatives in `t0` and in the duration.
+/// start at time `t0` over a duration, with `ln sigma = -int H_z dt`; paper, section 2.1. H may have any rank of
+/// `H_pp`. The duration is negative to run backward in time. On dual numbers the result has the solution of the
+/// variational equations, also the derivatives in `t0` and in the duration.
 ///
 /// The method is collocation at 14 Gauss points, of order 28, on panels whose length follows from the last Legendre
-/// coefficients of the rates; the changes are added by compensated summation. The error is some units of round-off times
-/// the condition number of the motion. H must be smooth along the motion: features narrower than the distance of the nodes
-/// may be missed.
+/// coefficients of the rates; the changes are added by compensated summation. The error is some units of round-off
+/// times the condition number of the motion. H must be smooth along the motion: features narrower than the distance of
+/// the nodes may be missed.
 ///
 /// ```
 /// use contact_geom::{nalgebra::SVector, ContactHamiltonian, PhasePoint, Scalar};
@@ -73,13 +73,15 @@ impl<const N: usize, T: Scalar> Sum<N, T> {
 ///     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T { p[0] * z + z * 0.5 }
 /// }
 /// let motion = exact_lagrangian::contact_flow(&Decay, 0.0, &PhasePoint::new([0.0], [0.0], 1.0), 2.0)?;
-/// assert!((motion.end.z - (-1f64).exp()).abs() < 1e-14 && (motion.end.q[0] - 2.0 * (1.0 - motion.end.z)).abs() < 1e-14);
+/// let (q, z) = (motion.end.q[0], motion.end.z);
+/// assert!((z - (-1f64).exp()).abs() < 1e-14 && (q - 2.0 * (1.0 - z)).abs() < 1e-14);
 /// # Ok::<(), exact_lagrangian::ContactFlowError<1>>(())
 /// ```
 ///
 /// # Errors
-/// [`ContactFlowError::NonFinite`], [`ContactFlowError::Undefined`]; [`ContactFlowError::OutsideDomain`] where the motion is
-/// not defined or not resolved up to the end, [`ContactFlowError::Unfinished`] where it needs too many panels.
+/// [`ContactFlowError::NonFinite`], [`ContactFlowError::Undefined`]; [`ContactFlowError::OutsideDomain`] where the
+/// motion is not defined or not resolved up to the end, [`ContactFlowError::Unfinished`] where it needs too many
+/// panels.
 pub fn contact_flow<T: Scalar, const N: usize>(
     hamiltonian: &impl ContactHamiltonian<N>,
     t0: T,

@@ -52,11 +52,11 @@ impl<const N: usize, S: InitialAction<N>> InitialDatum<N> for FromFunction<S> {
 
 /// The Hamilton-Jacobi equation `S_t + H(t, q, S_q, S) = 0` with an initial datum at time `t0`.
 ///
-/// The flow of `X_H` takes the Legendrian submanifold of the datum to one at each later time, since it multiplies
-/// `dz - p dq` by sigma. Where that projects regularly to Q, it is the graph `p = S_q`, `z = S(t, q)`, and along a motion
-/// `z' = S_t + S_q . q' = p . H_p - H` gives the equation. For [`FromPoint`] one step of length `t - t0` is the exact
-/// discrete Lagrangian, and the discrete Hamilton-Jacobi equation
-/// `S_(k+1)(q1) = S_k(q0) + L_d(q0, q1, S_k(q0))`, `D1 L_d + sigma S_k'(q0) = 0`, is the solution at consecutive times.
+/// The flow of `X_H` takes the Legendrian submanifold of the datum to one at each later time, since it multiplies `dz -
+/// p dq` by sigma. Where that projects regularly to Q, it is the graph `p = S_q`, `z = S(t, q)`, and along a motion `z'
+/// = S_t + S_q . q' = p . H_p - H` gives the equation. For [`FromPoint`] one step of length `t - t0` is the exact
+/// discrete Lagrangian, and the discrete Hamilton-Jacobi equation `S_(k+1)(q1) = S_k(q0) + L_d(q0, q1, S_k(q0))`, `D1
+/// L_d + sigma S_k'(q0) = 0`, is the solution at consecutive times.
 ///
 /// ```
 /// use contact_geom::{nalgebra::SVector, ContactHamiltonian, Scalar};
@@ -64,7 +64,9 @@ impl<const N: usize, S: InitialAction<N>> InitialDatum<N> for FromFunction<S> {
 /// struct Pendulum;
 /// impl ContactHamiltonian<1> for Pendulum {
 ///     #[inline(always)]
-///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T { p[0] * p[0] * 0.5 - q[0].cos() + z * 0.3 }
+///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+///         p[0] * p[0] * 0.5 - q[0].cos() + z * 0.3
+///     }
 /// }
 /// let equation = HamiltonJacobi { hamiltonian: Pendulum, datum: FromPoint { q: [0.2].into(), z: 0.1 }, t0: 0.0 };
 /// assert!(equation.residual(0.8, &[0.9].into(), &[1.0].into())?.abs() < 1e-13);
@@ -93,8 +95,8 @@ pub struct PrincipalFunction<const N: usize, T = f64> {
 }
 
 impl<H, D> HamiltonJacobi<H, D> {
-    /// The solution at a time and a position, on the branch of the motion found from a guess of the parameters. On duals
-    /// with its derivatives in t and q.
+    /// The solution at a time and a position, on the branch of the motion found from a guess of the parameters. On
+    /// duals with its derivatives in t and q.
     ///
     /// # Errors
     /// [`ContactFlowError::Conjugate`] at a caustic, where the motions of the datum do not determine S;
@@ -122,8 +124,8 @@ impl<H, D> HamiltonJacobi<H, D> {
         Ok(PrincipalFunction { action: end.z, momentum: end.p, parameters: found.unknown })
     }
 
-    /// The residual `S_t + H(t, q, S_q, S)` relative to the size of its terms, where the derivatives of S are computed by
-    /// dual numbers through flow and shooting, not by the momentum of the motion.
+    /// The residual `S_t + H(t, q, S_q, S)` relative to the size of its terms, where the derivatives of S are computed
+    /// by dual numbers through flow and shooting, not by the momentum of the motion.
     ///
     /// # Errors
     /// Those of [`solution`](Self::solution).

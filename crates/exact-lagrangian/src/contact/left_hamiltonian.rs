@@ -36,12 +36,12 @@ impl<H> ExactLeftHamiltonian<H> {
         ExactLeftHamiltonian { backward: ExactRightHamiltonian::new(hamiltonian, -h), h }
     }
 
-    /// The step backward from time `t + h` to t, with the positions and the action of `x = (q1, p0, z1)` at its start and
-    /// the momenta at its end. Its factor is `1/sigma`.
+    /// The step backward from time `t + h` to t, with the positions and the action of `x = (q1, p0, z1)` at its start
+    /// and the momenta at its end. Its factor is `1/sigma`.
     ///
     /// # Errors
-    /// [`ContactFlowError::Conjugate`] where `dp0/dp1` is singular, [`ContactFlowError::NotConverged`], and those of the
-    /// motion.
+    /// [`ContactFlowError::Conjugate`] where `dp0/dp1` is singular, [`ContactFlowError::NotConverged`], and those of
+    /// the motion.
     pub fn backward_step<T: Scalar, const N: usize>(
         &self,
         t: f64,

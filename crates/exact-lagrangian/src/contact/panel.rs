@@ -78,8 +78,8 @@ fn relative(a: [f64; 4], scale: [f64; 4]) -> f64 {
     a.into_iter().zip(scale).fold(0.0, |largest, (a, s)| max_or_nan(largest, if a == 0.0 { 0.0 } else { a / s }))
 }
 
-/// The panel from a state at the time t over a step, with the number of evaluations. `None` where the iteration does not
-/// converge, or where H is not finite at a stage.
+/// The panel from a state at the time t over a step, with the number of evaluations. `None` where the iteration does
+/// not converge, or where H is not finite at a stage.
 pub(super) fn collocate<T: Scalar, const N: usize>(
     hamiltonian: &impl ContactHamiltonian<N>,
     t: T,

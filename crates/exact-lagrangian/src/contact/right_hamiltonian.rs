@@ -23,7 +23,9 @@ use contact_geom::{ChartVector, ContactHamiltonian, PhasePoint, Scalar};
 /// struct Oscillator;
 /// impl ContactHamiltonian<1> for Oscillator {
 ///     #[inline(always)]
-///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, _z: T) -> T { (q[0] * q[0] + p[0] * p[0]) * 0.5 }
+///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, _z: T) -> T {
+///         (q[0] * q[0] + p[0] * p[0]) * 0.5
+///     }
 /// }
 /// let exact = ExactRightHamiltonian::new(&Oscillator, std::f64::consts::PI); // conjugate points: no L_d
 /// let value: f64 = exact.value(0.0, &PhasePoint::new([1.0], [0.5], 0.0))?;
@@ -52,12 +54,12 @@ impl<H> ExactRightHamiltonian<H> {
         ExactRightHamiltonian { hamiltonian, h }
     }
 
-    /// The step from time t with the positions and the action of `x = (q0, p1, z0)` at its start, and the momenta at its
-    /// end; from the guess `p0 = p1`.
+    /// The step from time t with the positions and the action of `x = (q0, p1, z0)` at its start, and the momenta at
+    /// its end; from the guess `p0 = p1`.
     ///
     /// # Errors
-    /// [`ContactFlowError::Conjugate`] where `dp1/dp0` is singular, [`ContactFlowError::NotConverged`], and those of the
-    /// motion.
+    /// [`ContactFlowError::Conjugate`] where `dp1/dp0` is singular, [`ContactFlowError::NotConverged`], and those of
+    /// the motion.
     pub fn step<T: Scalar, const N: usize>(
         &self,
         t: f64,

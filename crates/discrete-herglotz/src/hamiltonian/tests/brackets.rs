@@ -104,9 +104,9 @@ fn a_step_keeps_its_series() {
     }
 }
 
-/// The Strang splitting of the damped oscillator: its step is a matrix on (q, p), whose logarithm has the contact Hamiltonian
-/// `b p^2/2 + a q p - c q^2/2 - gamma z`, `log(M)/h = ((a, b), (c, gamma - a))`. The series of degree k differs from it by
-/// `O(h^(k+1))`.
+/// The Strang splitting of the damped oscillator: its step is a matrix on (q, p), whose logarithm has the contact
+/// Hamiltonian `b p^2/2 + a q p - c q^2/2 - gamma z`, `log(M)/h = ((a, b), (c, gamma - a))`. The series of degree k
+/// differs from it by `O(h^(k+1))`.
 #[test]
 fn the_series_of_the_oscillator_is_the_logarithm() {
     let series = BracketSeries::new(&STRANG, 7).unwrap();
