@@ -126,17 +126,18 @@ impl BracketSeries {
         }
         all[0][0] = 0.0;
         // The logarithm of 1 + all.
-        let (mut power, mut logarithm) = (one, zero);
+        let (mut power, mut logarithm, mut sizes) = (one, zero.clone(), zero);
         for k in 1..=degree {
             power = product(&power, &all);
             let factor = if k % 2 == 1 { 1.0 } else { -1.0 } / k as f64;
-            for (sums, words) in logarithm.iter_mut().zip(&power) {
-                for (sum, word) in sums.iter_mut().zip(words) {
+            for ((sums, sizes), words) in logarithm.iter_mut().zip(&mut sizes).zip(&power) {
+                for ((sum, size), word) in sums.iter_mut().zip(sizes).zip(words) {
                     *sum += factor * word;
+                    *size += (factor * word).abs();
                 }
             }
         }
-        Ok(BracketSeries { terms: brackets(&logarithm), degree })
+        Ok(BracketSeries { terms: brackets(&logarithm, &sizes), degree })
     }
 
     /// The terms, in the order of their degrees.
@@ -226,12 +227,12 @@ impl BracketSeries {
 
 /// The nested brackets of a Lie element, given by its words. Those that end in twice the same function vanish, and
 /// those that end in `{B, A}` are the negative of those that end in `{A, B}`.
-fn brackets(logarithm: &Words) -> Vec<BracketTerm> {
+fn brackets(logarithm: &Words, sizes: &Words) -> Vec<BracketTerm> {
     let mut terms = Vec::new();
-    for (degree, words) in logarithm.iter().enumerate().skip(1) {
-        let size = words.iter().fold(0.0, |size, word| size + word.abs());
+    for (degree, (words, sizes)) in logarithm.iter().zip(sizes).enumerate().skip(1) {
         for (word, coefficient) in words.iter().enumerate() {
             let mut coefficient = coefficient / degree as f64;
+            let mut size = sizes[word];
             if degree > 1 {
                 // The last two letters are the highest bits: A, then B.
                 let (before, last) = (1 << (degree - 2), 1 << (degree - 1));
@@ -239,6 +240,7 @@ fn brackets(logarithm: &Words) -> Vec<BracketTerm> {
                     continue;
                 }
                 coefficient -= words[word ^ before ^ last] / degree as f64;
+                size += sizes[word ^ before ^ last];
             }
             // What the rounding of the coefficients leaves of zero.
             if coefficient.abs() > 64.0 * f64::EPSILON * size {
