@@ -31,7 +31,7 @@ pub enum ThermalCoordinates {
 /// let containers = Containers::default();
 /// let start = containers.initial().q;
 /// assert_eq!(containers.energy(&start), 6.0);
-/// assert_eq!(containers.at(0.0, &start), [2.0, 0.0, 0.0, 0.0].into()); // in equilibrium, but for the momentum
+/// assert_eq!(containers.at(0.0, &start).as_slice(), [2.0, 0.0, 0.0, 0.0]); // in equilibrium, but for the momentum
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Containers {
