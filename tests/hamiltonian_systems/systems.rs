@@ -25,14 +25,14 @@ macro_rules! one_type {
         })*
 
         impl ContactHamiltonian<$n> for $name {
-            #[inline(always)]
+            #[inline(never)]
             fn value<T: Scalar>(&self, t: T, q: &SVector<T, $n>, p: &SVector<T, $n>, z: T) -> T {
                 match self { $($name::$variant(of) => of.value(t, q, p, z),)* }
             }
             fn structure(&self) -> HamiltonianStructure {
                 match self { $($name::$variant(of) => ContactHamiltonian::<$n>::structure(of),)* }
             }
-            #[inline(always)]
+            #[inline(never)]
             fn closed_with_gradient<T: Scalar>(
                 &self,
                 t: T,
@@ -79,7 +79,7 @@ pub type Four = Lifted<Containers>;
 pub struct OfSystem(pub LaneEmden);
 
 impl ContactHamiltonian<1> for OfSystem {
-    #[inline(always)]
+    #[inline(never)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
         self.0.hamiltonian(t, &PhasePoint { q: *q, p: *p, z }).unwrap_or_else(|| T::from(f64::NAN))
     }
@@ -90,7 +90,7 @@ impl ContactHamiltonian<1> for OfSystem {
 pub struct Polytrope(pub f64);
 
 impl ContactHamiltonian<1> for Polytrope {
-    #[inline(always)]
+    #[inline(never)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
         p[0] * p[0] * 0.5 + q[0].abs().powf(self.0 + 1.0) / (self.0 + 1.0) + z / t * 2.0
     }

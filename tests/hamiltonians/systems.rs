@@ -41,7 +41,7 @@ pub enum Family {
 }
 
 impl Family {
-    #[inline(always)]
+    #[inline(never)]
     fn formula<C: Coefficient, T: ScalarOver<C>>(self, [a, b]: [C; 2], t: T, x: T, y: T, z: T) -> T {
         match self {
             Family::Pendulum => (y * y * 0.5 + x.versine()) * a - z * b,
@@ -56,7 +56,7 @@ impl Family {
 }
 
 impl ContactHamiltonian<1> for One {
-    #[inline(always)]
+    #[inline(never)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
         let (x, y) = (q[0], p[0]);
         match self {
@@ -98,7 +98,7 @@ impl ParametricHamiltonian<1> for One {
         let One::Family(family, _) = self else { return theta.is_empty().then_some(*self) };
         Some(One::Family(*family, theta.try_into().ok()?))
     }
-    #[inline(always)]
+    #[inline(never)]
     fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
         let (One::Family(family, _), [a, b]) = (self, theta) else { return self.value(t, q, p, z) };
         family.formula([*a, *b], t, q[0], p[0], z)
@@ -124,14 +124,14 @@ pub enum Two {
 }
 
 impl Two {
-    #[inline(always)]
+    #[inline(never)]
     fn ray<C: Coefficient, T: ScalarOver<C>>([a, b]: [C; 2], q: &SVector<T, 2>, p: &SVector<T, 2>, z: T) -> T {
         (p[0] * p[0] + p[1] * p[1]).sqrt() / (q[0] * q[0] * a + q[1] * b + 1.0) + z * 0.05
     }
 }
 
 impl ContactHamiltonian<2> for Two {
-    #[inline(always)]
+    #[inline(never)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, p: &SVector<T, 2>, z: T) -> T {
         match self {
             Two::Of(system) => {
@@ -159,7 +159,7 @@ impl ParametricHamiltonian<2> for Two {
         let Two::Medium(_) = self else { return theta.is_empty().then_some(*self) };
         Some(Two::Medium(theta.try_into().ok()?))
     }
-    #[inline(always)]
+    #[inline(never)]
     fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, 2>, p: &SVector<T, 2>, z: T) -> T {
         let (Two::Medium(_), [a, b]) = (self, theta) else { return self.value(t, q, p, z) };
         Self::ray([*a, *b], q, p, z)

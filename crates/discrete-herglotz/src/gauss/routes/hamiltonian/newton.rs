@@ -306,8 +306,9 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
             for (c, part) in parts.enumerate() {
                 largest[kind(c)][1] = max_or_nan(largest[kind(c)][1], part.abs());
             }
-            // An action may vanish by cancellation.
-            let work = (0..N).map(|d| stage.scaled_p[d] * k[i * n + d] / self.table.weights.0[i] * self.table.h);
+            // An action may vanish by cancellation: `h p . H_p` and `h q . H_q`.
+            let part = |d: usize, x: f64, e: usize| x * k[i * n + e + d] / self.table.weights.0[i] * self.table.h;
+            let work = (0..N).flat_map(|d| [part(d, stage.scaled_p[d], 0), part(d, stage.q[d], N)]);
             largest[2][1] = work.fold(largest[2][1], |largest, work| max_or_nan(largest, work.abs()));
             for (c, change) in change.iter().enumerate() {
                 largest[kind(c)][0] = max_or_nan(largest[kind(c)][0], change.abs());
