@@ -305,7 +305,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 18, "{names:?}");
+    assert_eq!(names.len(), 21, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
@@ -314,6 +314,13 @@ fn scenes_run() {
     for (t, log_factor) in column(&field, "t").iter().zip(column(&field, "log_factor")) {
         assert!((log_factor + 2.0 * t.ln()).abs() < 1e-9, "{t}");
     }
+    // A path of light in closed form, a bracket that is dissipated, and a fall with an action that is not named z.
+    let off = column(&at.read("ray/rows.csv"), "off");
+    assert!(off.iter().all(|x| x.abs() < 1e-12), "{off:?}");
+    let kept = column(&at.read("van_der_pol/rows.csv"), "exp(k*t)*(energy - k*z)");
+    // The error 1e-10 of (q, p) is multiplied by e^8.
+    assert!(kept.iter().all(|x| (x + 1.0).abs() < 1e-5), "{kept:?}");
+    assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
 }
 
 /// A comparison names the best integrator for each error, and shorter steps have smaller errors.
