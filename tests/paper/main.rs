@@ -13,6 +13,7 @@ mod common;
 
 mod derivatives;
 mod forces;
+mod legendrian;
 mod methods;
 mod section_2;
 mod section_3;
@@ -31,8 +32,8 @@ use table::Row;
 /// A section: its name, its tables, and the statements that have tests of their own.
 type Section = (&'static str, &'static [&'static [Row]], &'static [Statement]);
 
-/// The sections of the paper, and the statements on forces and impacts, which it does not contain.
-const SECTIONS: [Section; 7] = [
+/// The sections of the paper, and the statements on forces, impacts and graphs of flows, which it does not contain.
+const SECTIONS: [Section; 8] = [
     ("2", &[section_2::AT_POINTS, section_2::WITH_METHODS, section_2::ALONG_MOTIONS], section_2::BY_NAME),
     ("3", &[section_3::WITH_METHODS], section_3::BY_NAME),
     ("4", &[section_4::ALONG_MOTIONS], &[]),
@@ -40,6 +41,7 @@ const SECTIONS: [Section; 7] = [
     ("6", &[], section_6::BY_NAME),
     ("forces", &[forces::AT_POINTS, forces::WITH_FORCES], &[]),
     ("impacts", &[forces::AT_IMPACTS], &[]),
+    ("legendrian", &[legendrian::ALONG_MOTIONS], &[]),
 ];
 
 /// Every statement is in a table of its section or has a test of its own, and the tables hold all that the libraries
@@ -65,5 +67,6 @@ fn every_statement_is_tested() {
     assert_eq!(of(&[forces::WITH_FORCES]), BTreeSet::from(discrete::FORCED_STATEMENTS));
     let with_methods = [section_2::WITH_METHODS, section_3::WITH_METHODS, section_5::WITH_METHODS];
     assert_eq!(of(&with_methods), BTreeSet::from(discrete::STATEMENTS));
-    assert_eq!(of(&[section_2::ALONG_MOTIONS, section_4::ALONG_MOTIONS]), BTreeSet::from(exact::STATEMENTS));
+    let along_motions = [section_2::ALONG_MOTIONS, section_4::ALONG_MOTIONS, legendrian::ALONG_MOTIONS];
+    assert_eq!(of(&along_motions), BTreeSet::from(exact::STATEMENTS));
 }

@@ -80,7 +80,8 @@ pub use dynamics::{
 pub use error::GeometryError;
 pub use forms::{
     ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form,
-    LagrangianForm, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, VelocityPoint, conformality,
+    LagrangianForm, LegendrianDefect, OnParameters, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction,
+    VelocityPoint, conformality, legendrian_defect,
 };
 pub use number::{Dual, Scalar};
 pub use statement::Statement;

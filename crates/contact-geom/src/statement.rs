@@ -1,4 +1,5 @@
-//! The list of the statements that can be checked numerically: those of the paper, and those on forces and impacts.
+//! The list of the statements that can be checked numerically: those of the paper, and those on forces, impacts and
+//! graphs of flows.
 
 use std::fmt;
 
@@ -14,7 +15,8 @@ struct Row {
 macro_rules! statements {
     ($(#[doc = $text:literal] $name:ident = $number:literal, $section:literal, $title:literal;)*) => {
         /// A statement of the paper *On the geometry of discrete contact mechanics*, with its errata applied; or one on
-        /// forces or impacts, which the paper does not treat, in the sections `forces` and `impacts`.
+        /// forces, impacts or graphs of flows, which the paper does not treat, in the sections `forces`, `impacts` and
+        /// `legendrian`.
         ///
         /// The number is that of its rows in `statements.csv`; its tests are in `tests/paper`. Most statements are
         /// evaluated by the function `residual` in the module `statements` of a library.
@@ -25,7 +27,7 @@ macro_rules! statements {
 
         impl Statement {
             /// All statements, in the order of their numbers.
-            pub const ALL: [Statement; 47] = [$(Statement::$name),*];
+            pub const ALL: [Statement; 48] = [$(Statement::$name),*];
 
             fn row(self) -> Row {
                 match self {
@@ -131,10 +133,12 @@ statements! {
     ElasticImpact = 46, "impacts", "elastic impacts are strictly contact";
     /// The law p+ = c p- + mu g_q, z+ = c z-, H+ = c H- - mu g_t multiplies dz - p dq + H dt on the surface by c.
     ConformalImpact = 47, "impacts", "conformally contact impacts";
+    /// The graph of a flow phi_h at r = ln sigma_h is Legendrian in (M x M x R, eta1 - e^r eta0), M = T*Q x R.
+    LegendrianGraph = 48, "legendrian", "Legendrian graph of a flow";
 }
 
 impl Statement {
-    /// The statement's number in the project's list, from 1 to 47.
+    /// The statement's number in the project's list, from 1 to 48.
     pub fn number(self) -> u32 {
         self as u32
     }
@@ -155,8 +159,8 @@ impl Statement {
         self.row().text.trim_start()
     }
 
-    /// The section of the paper that contains the statement, such as `2.2.1`; `forces` and `impacts` for those that the
-    /// paper does not contain.
+    /// The section of the paper that contains the statement, such as `2.2.1`; `forces`, `impacts` and `legendrian` for
+    /// those that the paper does not contain.
     pub fn section(self) -> &'static str {
         self.row().section
     }
@@ -176,11 +180,11 @@ mod tests {
 
     #[test]
     fn numbers_are_places() {
-        assert!(Statement::ALL.into_iter().map(Statement::number).eq(1..=47));
+        assert!(Statement::ALL.into_iter().map(Statement::number).eq(1..=48));
         for statement in Statement::ALL {
             assert_eq!(Statement::from_number(statement.number()), Some(statement));
         }
-        assert_eq!([0, 48, u32::MAX].map(Statement::from_number), [None; 3]);
+        assert_eq!([0, 49, u32::MAX].map(Statement::from_number), [None; 3]);
     }
 
     #[test]

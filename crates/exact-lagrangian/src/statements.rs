@@ -13,6 +13,8 @@
 // `f64::max` and `amax` discard a NaN, which would make a check pass.
 #![deny(clippy::disallowed_methods)]
 
+mod legendrian;
+
 use crate::map::exponential::HerglotzFlow;
 use crate::numerics::gauss::collocations;
 use crate::{
@@ -33,8 +35,9 @@ use discrete_herglotz::{
     theory::{derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse},
 };
 
-/// The statements of section 4 that [`residual`] evaluates, and [`Statement::HerglotzPrinciple`] of section 2.
-pub const STATEMENTS: [Statement; 11] = [
+/// The statements of section 4 that [`residual`] evaluates, [`Statement::HerglotzPrinciple`] of section 2, and
+/// [`Statement::LegendrianGraph`].
+pub const STATEMENTS: [Statement; 12] = [
     Statement::HerglotzPrinciple,
     Statement::ChetaevMultiplier,
     Statement::ProjectedFlow,
@@ -46,6 +49,7 @@ pub const STATEMENTS: [Statement; 11] = [
     Statement::ExactDerivatives,
     Statement::ExactLegendreTransforms,
     Statement::ExactFlow,
+    Statement::LegendrianGraph,
 ];
 
 /// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the
@@ -73,6 +77,7 @@ pub fn residual<S: System<N>, const N: usize>(
         Statement::ExactDerivatives => at.derivatives()?,
         Statement::ExactLegendreTransforms => at.legendre_transforms()?,
         Statement::ExactFlow => at.regular_and_exact()?,
+        Statement::LegendrianGraph => legendrian::graph(&at)?,
         _ => return Ok(None),
     }))
 }

@@ -266,6 +266,37 @@ fn checks_have_lyapunov_exponents() {
     assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{said}");
 }
 
+/// The defects of the modified Hamiltonians of order k fall as `h^(k+1)`, for a Hamiltonian and for a Lagrangian; a system
+/// that depends on time is refused.
+#[test]
+fn checks_have_modified_hamiltonians() {
+    let at = Directory::new("modified");
+    for (name, system) in [
+        ("hamiltonian", "hamiltonian = \"p_x^2/2 + cos(x) + z/5 + z^2/10\""),
+        ("lagrangian", "lagrangian = \"x'^2/2 - cos(x) - z/5 - z^2/10\""),
+    ] {
+        let text = format!(
+            "version = 1\n[system]\ncoordinates = [\"x\"]\n{system}\n[start]\nx = 0.4\n\"x'\" = 0.7\n\
+             [run]\ntime = 4.0\nintegrator = \"gauss_1\"\nstep = 0.05\n"
+        );
+        let file = at.write(&format!("{name}.toml"), &text);
+        let found: serde_json::Value =
+            serde_json::from_str(&succeed(&["check", &file, "--places", "1", "--modified", "--json"])).unwrap();
+        let defect = |k: u64, h: f64| {
+            let mut all = found["modified"].as_array().unwrap().iter();
+            let one = all.find(|of| of["k"].as_u64() == Some(k) && of["h"].as_f64() == Some(h)).unwrap();
+            one["defect"].as_f64().unwrap()
+        };
+        for k in 1..=6 {
+            let slope = (defect(k, 0.025) / defect(k, 0.0125)).log2();
+            assert!((slope - (k + 1) as f64).abs() < 0.15, "{name}, {k}: {slope}");
+        }
+        assert!(succeed(&["check", &file, "--places", "1", "--modified"]).contains("h = 0.0125"), "{name}");
+    }
+    let (_, said) = fail(&["check", &scene("duffing"), "--places", "1", "--modified"]);
+    assert!(said.contains("autonomous"), "{said}");
+}
+
 #[test]
 fn lists_templates_and_completions_are_complete() {
     let systems: serde_json::Value = serde_json::from_str(&succeed(&["list", "systems", "--json"])).unwrap();

@@ -1,8 +1,7 @@
 //! Modified Hamiltonians: the contact Hamiltonian of which a step is the exact flow, up to a power of the step size.
 
 use crate::{InputError, Integrator, Problem, StepError, StepperOptions};
-use contact_geom::hamiltonian::DarbouxBracket;
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, SmoothFunction, numbers::max_abs_or_nan};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, numbers::max_abs_or_nan};
 
 /// The largest order of an interpolated modified Hamiltonian: beyond it the differences of states are round-off.
 pub const MAX_MODIFIED_ORDER: usize = 8;
@@ -107,24 +106,4 @@ pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
         }
     }
     Ok(found)
-}
-
-/// The first correction of the modified Hamiltonian of the Strang splitting `phi^A_(h/2) o phi^B_h o phi^A_(h/2)`:
-/// `H~ = A + B + h^2 ({B, {B, A}} / 12 - {A, {A, B}} / 24) + O(h^4)` with the Jacobi bracket, since `X_{f,g} = [X_f, X_g]`
-/// and the Baker-Campbell-Hausdorff series consists of brackets.
-#[derive(Clone, Copy, Debug)]
-pub struct StrangCorrection<'a, A, B> {
-    /// The Hamiltonian of the first and last flow.
-    pub a: &'a A,
-    /// The Hamiltonian of the flow between them.
-    pub b: &'a B,
-}
-
-impl<const N: usize, A: SmoothFunction<N>, B: SmoothFunction<N>> SmoothFunction<N> for StrangCorrection<'_, A, B> {
-    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
-        let (a, b) = (self.a, self.b);
-        let (ab, ba) = (DarbouxBracket { f: a, g: b }, DarbouxBracket { f: b, g: a });
-        let (aab, bba) = (DarbouxBracket { f: a, g: &ab }, DarbouxBracket { f: b, g: &ba });
-        bba.value(t, x) / 12.0 - aab.value(t, x) / 24.0
-    }
 }

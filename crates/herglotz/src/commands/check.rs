@@ -20,6 +20,10 @@ pub(crate) struct Check {
     /// conformal factor.
     #[arg(long)]
     lyapunov: bool,
+    /// Also compute the defects of modified Hamiltonians of the first steps, for the step size of the motion, a half and a
+    /// quarter of it.
+    #[arg(long)]
+    modified: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -33,6 +37,8 @@ impl Check {
         let lyapunov =
             self.lyapunov.then(|| scene.system.lyapunov_exponents(&scene.bare_motion(), &mut ())).transpose();
         let lyapunov = lyapunov.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let modified = self.modified.then(|| scene.system.modified_defects(&scene.bare_motion(), super::modified::MOST));
+        let modified = modified.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let field = match scene.system.hamiltonian_structure() {
             Some(_) => Some(scene.system.hamiltonian_geometry(&scene.bare_motion().start)),
             None => None,
@@ -45,15 +51,19 @@ impl Check {
             if let Some(found) = &lyapunov {
                 value["lyapunov"] = super::lyapunov::of_json(found);
             }
+            if let Some(found) = &modified {
+                value["modified"] = super::modified::of_json(found);
+            }
             if let Some(field) = &field {
                 value["hamiltonian"] = of_field_json(field);
             }
             print_json(&value)?;
         } else {
-            let exponents = lyapunov.as_ref().map(|found| format!("\n\n{}", super::lyapunov::in_words(found)));
-            let field = field.as_ref().map(|field| format!("\n\n{}", field_in_words(&scene, field)));
-            let field = field.as_deref().unwrap_or_default();
-            print(&(in_words(&check, &momenta) + field + exponents.as_deref().unwrap_or_default()))?;
+            let mut parts = vec![in_words(&check, &momenta)];
+            parts.extend(field.as_ref().map(|field| field_in_words(&scene, field)));
+            parts.extend(modified.as_deref().map(super::modified::in_words));
+            parts.extend(lyapunov.as_ref().map(super::lyapunov::in_words));
+            print(&parts.join("\n\n"))?;
         }
         if let Some(found) = lyapunov.filter(|found| found.status != Status::Completed) {
             return Err(Failure::Run(format!("the motion was not completed: {}", found.status)));

@@ -32,6 +32,7 @@ mod interrupt;
 mod kernel;
 mod lyapunov;
 mod member_derivatives;
+mod modified;
 mod outcome;
 mod parameters;
 mod path;
@@ -69,7 +70,7 @@ pub use contact_geom::table::{Interpolation, Table, TableError};
 pub use contact_geom::{HamiltonianStructure, Statement, Structure};
 pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
-    Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
+    Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally, hamiltonian::ModifiedDefect,
 };
 pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, FormulaNames, Graph, ParseError};

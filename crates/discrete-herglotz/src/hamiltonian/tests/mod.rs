@@ -1,5 +1,6 @@
 //! Tests of pieces, splittings and generating functions: contact to round-off, orders, symmetry, exactness, errors.
 
+mod brackets;
 mod errors;
 mod exact;
 mod generating;

@@ -4,14 +4,15 @@ use super::formula_system::FormulaSystem;
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
 use crate::runtime::{
-    Check, Interrupt, MomentumSample, Motion, NotContact, RuntimeError, Sample, StatementResidual, StepControl,
+    Check, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual, StepControl,
 };
 use contact_geom::{
     ChartVector, Lagrangian, OneParameterGroup, PhasePoint, Statement,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, theory::legendre_inverse,
+    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, hamiltonian,
+    hamiltonian::ModifiedDefect, theory::legendre_inverse,
 };
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
@@ -26,6 +27,9 @@ const THEOREM_SAMPLES: usize = 3;
 
 /// The number of steps between two polls of the interrupt: a poll is then inexpensive compared with the steps.
 const STEPS_BETWEEN_POLLS: usize = 256;
+
+/// The number of steps of a motion whose modified Hamiltonians are compared.
+const MODIFIED_STEPS: f64 = 256.0;
 
 /// The number of stages of the discrete Lagrangian for the theorems, where the integrator of the motion is not a
 /// collocation method: order 8.
@@ -113,10 +117,7 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     samples: usize,
 ) -> Result<(Check, Vec<State<N>>, Option<usize>), RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let by = match motion.step_control {
-        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
-        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
-    };
+    let by = integrator(motion, &plan)?;
     let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
     let problem = system.problem_of(motion)?;
     let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
@@ -161,6 +162,26 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     let integrator = plan.integrator.name.to_string();
     let check = Check { integrator, step_size: h, samples: along, statements: Vec::new(), not_contact };
     Ok((check, states, plan.integrator.collocation))
+}
+
+/// The integrator of a motion.
+fn integrator(motion: &Motion, plan: &Plan) -> Result<AnyIntegrator, RuntimeError> {
+    Ok(match motion.step_control {
+        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
+        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
+    })
+}
+
+/// See [`System::modified_defects`](crate::runtime::System::modified_defects).
+pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    most: usize,
+) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+    let plan = super::run::plan(system, motion)?;
+    let (by, h, problem) = (L::by(integrator(motion, &plan)?)?, plan.step_size, system.problem_of(motion)?);
+    let span = (motion.end - motion.start.t).abs().min(MODIFIED_STEPS * h.abs());
+    Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?)
 }
 
 pub(super) fn check<const N: usize>(

@@ -1,4 +1,4 @@
-//! Kernels of contact Hamiltonians: the part of a kernel that they need, for three dimensions, so that they take little
+//! Kernels of contact Hamiltonians: the part of a kernel that they need, for two dimensions, so that they take little
 //! time to compile.
 
 use super::sized::{Sized, coordinates};
@@ -14,6 +14,7 @@ use contact_geom::{
     ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, Lagrangian, OfHamiltonian, PhasePoint,
     Regularity, Structure,
 };
+use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{AnyIntegrator, InputError, Integrator, ResumeState, ensemble::Tally};
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian};
 use std::sync::Arc;
@@ -30,8 +31,7 @@ pub(super) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
         Ok(Arc::new(Sized(OfHamiltonian(formula.hamiltonian_within::<N>()?))))
     }
     match formula.dimension() {
-        1 => of::<1>(formula),
-        2 => of::<2>(formula),
+        1..=2 => of::<2>(formula),
         3..=MOST => of::<MOST>(formula),
         found => Err(RuntimeError::HamiltonianDimension { found, most: MOST }),
     }
@@ -125,5 +125,9 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
         on_large_stack(|| check::of_steps(self, motion, samples))
+    }
+
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        check::modified_defects(self, motion, most)
     }
 }

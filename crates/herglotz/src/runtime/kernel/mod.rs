@@ -20,6 +20,7 @@ use crate::runtime::{
     LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
 use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
+use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use sized::Sized;
@@ -60,6 +61,7 @@ pub(crate) trait Kernel: Send + Sync {
         Err(FormulaError::IsLagrangian.into())
     }
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError>;
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError>;
     fn sensitivity(
         &self,
         _motion: &Motion,
@@ -200,6 +202,10 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
         on_large_stack(|| check::check(self, motion, samples))
+    }
+
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        check::modified_defects(self, motion, most)
     }
 
     fn sensitivity(
