@@ -7,23 +7,24 @@
 mod bracket_series;
 mod generating;
 mod increment;
+mod map_stepper;
 mod matrix_exponential;
 mod modified;
 mod pieces;
-mod progress;
 mod splitting;
 #[cfg(test)]
 mod tests;
 
 pub use bracket_series::{BracketSeries, BracketTerm, MAX_BRACKET_DEGREE, SplitPart};
 pub use generating::{
-    Adjoint, Arrangement, ContactEuler, Euler, ExactTypeTwo, GeneratingFunction, GeneratingStepper, TypeThree, TypeTwo,
-    type_three_step, type_two_step,
+    Adjoint, Arrangement, ContactEuler, Euler, ExactTypeTwo, GeneratingFunction, GeneratingMaps, GeneratingStepper,
+    TypeThree, TypeTwo, type_three_step, type_two_step,
 };
 pub use increment::ContactIncrement;
+pub use map_stepper::MapStepper;
 pub use modified::{MAX_MODIFIED_ORDER, ModifiedDefect, modified_defects, modified_hamiltonian};
 pub use pieces::{
     ActionPart, ActionTimesHomogeneous, AffineFlow, ContactPiece, Kinetic, PieceList, PieceSum, PointFlow, Polynomial,
     PolynomialInAction, Potential, Prolonged, Quadratic, QuadraticMap,
 };
-pub use splitting::{HamiltonianSplitting, PieceStepper};
+pub use splitting::{HamiltonianSplitting, PieceMaps, PieceStepper};

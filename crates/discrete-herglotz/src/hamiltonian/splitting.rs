@@ -1,13 +1,11 @@
 //! Splittings of contact Hamiltonians into pieces with closed contact flows.
 
 use super::increment::jacobian;
+use super::map_stepper::{ContactMaps, MapStepper, StateSums};
 use super::pieces::PieceList;
-use super::progress::{Progress, StateSums};
 use crate::integration::StepFormula;
-use crate::numbers::state_words::Saved;
 use crate::{
-    InputError, Integrator, MethodInfo, PlanEntry, Problem, SplittingScheme, StepError, StepFailure, Stepper,
-    StepperOptions,
+    InputError, Integrator, MethodInfo, PlanEntry, Problem, SplittingScheme, StepError, Stepper, StepperOptions,
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, ContactHamiltonian, OfHamiltonian, PhasePoint, Scalar};
@@ -231,13 +229,15 @@ fn check_flows<P: PieceList<N>, const N: usize>(pieces: &P, t: f64, x: &PhasePoi
     Ok(())
 }
 
-/// The stepper of [`HamiltonianSplitting`].
+/// The flows of the pieces in a step.
 #[derive(Clone, Debug)]
-pub struct PieceStepper<P: PieceList<N>, const N: usize> {
+pub struct PieceMaps<P: PieceList<N>, const N: usize> {
     pieces: P,
     flows: Vec<PieceFlow<P::Map>>,
-    progress: Progress<N>,
 }
+
+/// The stepper of [`HamiltonianSplitting`]. Its evaluations are flows of pieces.
+pub type PieceStepper<P, const N: usize> = MapStepper<PieceMaps<P, N>, N>;
 
 impl<P: PieceList<N>, const N: usize> PieceStepper<P, N> {
     /// The stepper for the sum of the pieces, with steps of length h from the state at the time t0.
@@ -248,41 +248,20 @@ impl<P: PieceList<N>, const N: usize> PieceStepper<P, N> {
     /// [`InputError::Undefined`] where a piece has no finite vector field; [`InputError::PieceFlow`] where a flow is
     /// not that of its piece.
     pub fn new(pieces: P, scheme: &SplittingScheme, h: f64, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
-        let progress = Progress::new(h, t0, &state)?;
         let flows = flows(&pieces, scheme, h)?;
-        check_flows(&pieces, t0, &state)?;
-        Ok(PieceStepper { pieces, flows, progress })
+        let stepper = MapStepper::of(PieceMaps { pieces, flows }, h, t0, &state)?;
+        check_flows(&stepper.maps.pieces, t0, &state)?;
+        Ok(stepper)
     }
 }
 
-impl<P: PieceList<N>, const N: usize> Stepper<N> for PieceStepper<P, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        let PieceStepper { pieces, flows, progress } = self;
-        let h = progress.h;
-        progress.advance(steps, |t, sums: &mut StateSums<N>, evaluations| {
-            for PieceFlow { map, time } in flows.iter() {
-                sums.add(&pieces.change(map, t + time * h, &sums.state()));
-            }
-            *evaluations += flows.len() as u64;
-            Ok(())
-        })
-    }
-
-    fn state(&self) -> PhasePoint<N> {
-        self.progress.state()
-    }
-
-    fn time(&self) -> f64 {
-        self.progress.time()
-    }
-
-    fn sigma(&self) -> f64 {
-        self.progress.sigma()
-    }
-
-    /// The number of flows of pieces.
-    fn evaluations(&self) -> u64 {
-        self.progress.evaluations
+impl<P: PieceList<N>, const N: usize> ContactMaps<N> for PieceMaps<P, N> {
+    fn add_step(&self, t: f64, h: f64, sums: &mut StateSums<N>, evaluations: &mut u64) -> Result<(), StepError> {
+        for PieceFlow { map, time } in &self.flows {
+            sums.add(&self.pieces.change(map, t + time * h, &sums.state()));
+        }
+        *evaluations += self.flows.len() as u64;
+        Ok(())
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
@@ -290,15 +269,5 @@ impl<P: PieceList<N>, const N: usize> Stepper<N> for PieceStepper<P, N> {
             PlanEntry::skipped("Newton's method", "the flow of each piece is known in closed form"),
             PlanEntry::computed("action z", "the flows of pieces are contact maps of (q, p, z)"),
         ]
-    }
-
-    fn save(&self) -> Option<Vec<u64>> {
-        let mut words = Vec::new();
-        Saved::save(&self.progress, &mut words);
-        Some(words)
-    }
-
-    fn restore(&mut self, mut words: &[u64]) -> bool {
-        self.progress.load(&mut words).is_some() && words.is_empty()
     }
 }

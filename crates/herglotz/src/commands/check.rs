@@ -37,7 +37,8 @@ impl Check {
         let lyapunov =
             self.lyapunov.then(|| scene.system.lyapunov_exponents(&scene.bare_motion(), &mut ())).transpose();
         let lyapunov = lyapunov.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let modified = self.modified.then(|| scene.system.modified_defects(&scene.bare_motion(), super::modified::MOST));
+        let modified =
+            self.modified.then(|| scene.system.modified_defects(&scene.bare_motion(), super::modified::MOST));
         let modified = modified.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let field = match scene.system.hamiltonian_structure() {
             Some(_) => Some(scene.system.hamiltonian_geometry(&scene.bare_motion().start)),

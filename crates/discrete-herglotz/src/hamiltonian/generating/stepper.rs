@@ -2,9 +2,8 @@
 
 use super::{Adjoint, TypeTwo, type_three_step, type_two_step};
 use crate::hamiltonian::ContactIncrement;
-use crate::hamiltonian::progress::{Progress, StateSums};
-use crate::numbers::state_words::Saved;
-use crate::{InputError, PlanEntry, SplittingScheme, StepError, StepFailure, Stepper};
+use crate::hamiltonian::map_stepper::{ContactMaps, MapStepper, StateSums};
+use crate::{InputError, PlanEntry, SplittingScheme, StepError};
 use contact_geom::{PhasePoint, Scalar};
 
 /// How a step is made from a generating function of type II and its adjoint of type III.
@@ -67,7 +66,8 @@ pub(super) fn partial_step<G: TypeTwo<N>, T: Scalar, const N: usize>(
     }
 }
 
-/// The stepper of a generating function of type II, its adjoint, or a symmetric composition of both.
+/// The stepper of a generating function of type II, its adjoint, or a symmetric composition of both. Its evaluations are
+/// those of first or second derivatives of the function.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, PhasePoint, Scalar, nalgebra::SVector};
@@ -85,11 +85,13 @@ pub(super) fn partial_step<G: TypeTwo<N>, T: Scalar, const N: usize>(
 /// stepper.advance(100)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+pub type GeneratingStepper<G, const N: usize> = MapStepper<GeneratingMaps<G>, N>;
+
+/// The maps of generating functions in a step.
 #[derive(Clone, Debug)]
-pub struct GeneratingStepper<G, const N: usize> {
+pub struct GeneratingMaps<G> {
     function: Adjoint<G>,
     maps: Vec<PartialStep>,
-    progress: Progress<N>,
 }
 
 impl<G: TypeTwo<N>, const N: usize> GeneratingStepper<G, N> {
@@ -106,44 +108,23 @@ impl<G: TypeTwo<N>, const N: usize> GeneratingStepper<G, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let (progress, maps) = (Progress::new(h, t0, &state)?, arrangement.maps()?);
-        let stepper = GeneratingStepper { function: Adjoint(function), maps, progress };
+        let maps = GeneratingMaps { function: Adjoint(function), maps: arrangement.maps()? };
+        let stepper = MapStepper::of(maps, h, t0, &state)?;
         let mut x = state;
-        for map in &stepper.maps {
-            let change = partial_step(&stepper.function, map, (t0, h), &x, &mut 0);
+        for map in &stepper.maps.maps {
+            let change = partial_step(&stepper.maps.function, map, (t0, h), &x, &mut 0);
             x = change.map_err(InputError::first_step)?.after(&x);
         }
         Ok(stepper)
     }
 }
 
-impl<G: TypeTwo<N>, const N: usize> Stepper<N> for GeneratingStepper<G, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        let GeneratingStepper { function, maps, progress } = self;
-        let h = progress.h;
-        progress.advance(steps, |t, sums: &mut StateSums<N>, evaluations| {
-            for map in maps.iter() {
-                sums.add(&partial_step(function, map, (t, h), &sums.state(), evaluations)?);
-            }
-            Ok(())
-        })
-    }
-
-    fn state(&self) -> PhasePoint<N> {
-        self.progress.state()
-    }
-
-    fn time(&self) -> f64 {
-        self.progress.time()
-    }
-
-    fn sigma(&self) -> f64 {
-        self.progress.sigma()
-    }
-
-    /// The number of evaluations of first or second derivatives of the generating function.
-    fn evaluations(&self) -> u64 {
-        self.progress.evaluations
+impl<G: TypeTwo<N>, const N: usize> ContactMaps<N> for GeneratingMaps<G> {
+    fn add_step(&self, t: f64, h: f64, sums: &mut StateSums<N>, evaluations: &mut u64) -> Result<(), StepError> {
+        for map in &self.maps {
+            sums.add(&partial_step(&self.function, map, (t, h), &sums.state(), evaluations)?);
+        }
+        Ok(())
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
@@ -151,15 +132,5 @@ impl<G: TypeTwo<N>, const N: usize> Stepper<N> for GeneratingStepper<G, N> {
             PlanEntry::computed("Newton's method", "p1, or (q1, z1), is defined implicitly"),
             PlanEntry::computed("action z", "generating functions give maps of (q, p, z)"),
         ]
-    }
-
-    fn save(&self) -> Option<Vec<u64>> {
-        let mut words = Vec::new();
-        Saved::save(&self.progress, &mut words);
-        Some(words)
-    }
-
-    fn restore(&mut self, mut words: &[u64]) -> bool {
-        self.progress.load(&mut words).is_some() && words.is_empty()
     }
 }

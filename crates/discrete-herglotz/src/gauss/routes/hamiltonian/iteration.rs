@@ -46,8 +46,7 @@ impl<S: Simd> Changes<S> {
 impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     /// Computes momenta, factors, positions and actions of the stages from the right-hand sides. Returns the largest change
     /// of each kind relative to its largest value. An action that vanishes by cancellation, as that of a Hamiltonian of
-    /// degree one in p or of one whose value is its error, is as large as `h p . H_p` or `h q . H_q` in this comparison:
-    /// by eps times these the round-off of p and q changes it.
+    /// degree one in p, is as large as `h p . v` in this comparison.
     ///
     /// With `predict`, the velocities follow the new momenta by `H_pp` at an earlier state, before the positions are computed: for a
     /// motion with kinetic energy an iteration then reduces the error by `(h omega)^2` instead of `h omega`. The actions follow
@@ -55,7 +54,8 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     #[inline(always)]
     pub(super) fn move_stages<S: Simd>(&mut self, predict: bool) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
-        let mut seen = Changes { change: [zero; KINDS], size: [zero, zero, zero, one] };
+        let [p, z] = self.least.map(Lanes::splat);
+        let mut seen = Changes { change: [zero; KINDS], size: [zero, p, z, one] };
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, predict, &mut seen));
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_group::<S, K>(r, predict, &mut seen));
         seen.largest()
@@ -106,15 +106,12 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
         let (m, s) = (self.table.m, self.table.s);
         let start = Lanes::<S>::splat(self.z.value);
         let [mut z] = m.rows([&self.l], s, [[start; K]], r);
-        let stages = Lanes::<S>::splat(s as f64);
         for d in 0..N {
             let q = Lanes::<S>::splat(self.q[d].value);
             let [x] = m.rows([&self.moved[d]], s, [[q; K]], r);
             for k in 0..K {
                 let change = x[k] - self.x[d].block(r + k);
                 seen.see(0, change, x[k]);
-                // The force is multiplied by h times a weight, which is 1/s on average.
-                seen.see(2, Lanes::splat(0.0), x[k] * self.force[d].block(r + k) * stages);
                 if predict {
                     z[k] = self.p_stages[d].block::<S>(r + k).mul_add(change, z[k]);
                 }

@@ -18,7 +18,7 @@ use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, numbers::max_or_nan};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::rounding_at_state};
 use newton::{FullNewton, SimplifiedNewton};
 use pulp::Simd;
 use std::array::from_fn;
@@ -62,6 +62,9 @@ pub(crate) struct HamiltonianStages<'a, L, const N: usize> {
     /// `H_pp` at an earlier state, by which velocities follow momenta within an iteration, and the number of steps since.
     pp: Box<SMatrix<f64, N, N>>,
     pp_age: u32,
+    /// The least values with which changes of momenta and of the action are compared: 0, and in a step whose iteration does
+    /// not converge otherwise, those of which the round-off of `h H_q` and `h (p . H_p - H)` is one unit.
+    least: [f64; 2],
     /// Whether the right-hand sides are those of the last step.
     warm: bool,
     /// Whether the right-hand sides are the solution of the next step.
@@ -101,6 +104,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
             one_minus_rho: 0.0,
             pp: Box::new(SMatrix::zeros()),
             pp_age: PP_AGE,
+            least: [0.0; 2],
             warm: false,
             solved: false,
             newton: None,
@@ -132,8 +136,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
                 self.keep_iterate(warm);
             }
         }
-        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        let new_iteration = || FixedPointIteration::until(1.0, 0.25);
+        let mut iteration = new_iteration();
         let mut first = true;
+        self.least = [0.0; 2];
         // H is evaluated at one place in the code, so that it is inlined into this loop and compiled for its instruction
         // set.
         loop {
@@ -167,9 +173,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
                     }
                     return outcome;
                 }
+                IterationOutcome::Slow { .. } if self.least == [0.0; 2] && self.admit_round_off(t) => {
+                    iteration = new_iteration();
+                }
                 refused => return refused,
             }
         }
+    }
+
+    /// Admits changes of the size of the round-off of the forces and of L at the start of the step, as at an equilibrium,
+    /// where forces cancel and momenta vanish. Returns whether there is any.
+    #[cold]
+    #[inline(never)]
+    fn admit_round_off(&mut self, t: f64) -> bool {
+        let state = self.phase_point();
+        let x = VelocityPoint { q: state.q, v: SVector::from(self.known), z: state.z };
+        let (of_l, of_gradient) = rounding_at_state(self.lagrangian, t, &x, &state);
+        let least = [of_gradient.x.amax(), of_l].map(|once| self.table.h.abs() * once / f64::EPSILON);
+        let is_usable = least.iter().all(|e| e.is_finite()) && least.iter().any(|e| *e > 0.0);
+        if is_usable {
+            self.least = least;
+        }
+        is_usable
     }
 
     /// Evaluates `H_pp` at the state, where it is old.

@@ -294,7 +294,7 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     /// The size of a correction: the largest component, each kind relative to the largest stage value of that kind.
     fn size(&self, t: f64, k: &[f64], change: &[f64]) -> f64 {
         let n = Self::COMPONENTS;
-        let mut largest = [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 1.0]];
+        let mut largest = [[0.0, 0.0], [0.0, self.least[0]], [0.0, self.least[1]], [0.0, 1.0]];
         let kind = |c: usize| match c {
             c if c < N => 0,
             c if c < 2 * N => 1,
@@ -306,9 +306,8 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
             for (c, part) in parts.enumerate() {
                 largest[kind(c)][1] = max_or_nan(largest[kind(c)][1], part.abs());
             }
-            // An action may vanish by cancellation: `h p . H_p` and `h q . H_q`.
-            let part = |d: usize, x: f64, e: usize| x * k[i * n + e + d] / self.table.weights.0[i] * self.table.h;
-            let work = (0..N).flat_map(|d| [part(d, stage.scaled_p[d], 0), part(d, stage.q[d], N)]);
+            // An action may vanish by cancellation.
+            let work = (0..N).map(|d| stage.scaled_p[d] * k[i * n + d] / self.table.weights.0[i] * self.table.h);
             largest[2][1] = work.fold(largest[2][1], |largest, work| max_or_nan(largest, work.abs()));
             for (c, change) in change.iter().enumerate() {
                 largest[kind(c)][0] = max_or_nan(largest[kind(c)][0], change.abs());
@@ -324,6 +323,7 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
     pub(super) fn solve(&mut self, t: f64) -> Result<(), StepError> {
         self.reserve();
+        self.admit_round_off(t);
         let Some(mut work) = self.full_newton.take() else { return Ok(()) };
         let solved = self.solve_with(t, &mut work);
         if solved.is_ok() {
