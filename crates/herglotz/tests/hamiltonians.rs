@@ -65,6 +65,31 @@ fn a_hamiltonian_that_is_linear_in_p_runs_from_momenta() -> Result {
     Ok(())
 }
 
+/// The pieces of a separable formula are found: its splittings have their orders, and converge to the motion of Gauss
+/// collocation.
+#[test]
+fn a_separable_hamiltonian_runs_by_splittings() -> Result {
+    let h = system("p_x^2/2 + p_x^4/20 - cos(x - sin(t)/5) + g*z + z^2/20", &["x"], &[("g", 0.1)])?;
+    let end = |step_control: StepControl| -> Result<f64> {
+        Ok(h.run(&Motion::new(at(&[1.0], &[0.3], 0.2), 3.0, step_control), &mut ())?.q[0])
+    };
+    let exact = end(gauss(60))?;
+    for (name, count, order) in [("strang", 100, 2.0), ("mclachlan_4", 50, 4.0)] {
+        let by: AnyIntegrator = name.parse()?;
+        let error =
+            |count| -> Result<f64> { Ok((end(StepControl::Steps { by, steps: Steps::Count(count) })? - exact).abs()) };
+        let slope = (error(count)? / error(2 * count)?).log2();
+        assert!((slope - order).abs() < 0.15, "{name}: {slope}");
+    }
+    let motion = Motion::new(
+        at(&[1.0], &[0.3], 0.2),
+        3.0,
+        StepControl::Accuracy { error: 1e-9, by: Some("kahan_li_8".parse()?) },
+    );
+    assert!((h.run(&motion, &mut ())?.q[0] - exact).abs() < 1e-9);
+    Ok(())
+}
+
 #[test]
 fn three_coordinates_run_in_four() -> Result {
     let names = FormulaNames { action: "s", ..FormulaNames::new(&["x", "y", "z"], &[]) };

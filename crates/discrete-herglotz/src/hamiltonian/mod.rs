@@ -11,6 +11,7 @@ mod map_stepper;
 mod matrix_exponential;
 mod modified;
 mod pieces;
+mod separable;
 mod splitting;
 #[cfg(test)]
 mod tests;
@@ -26,5 +27,8 @@ pub use modified::{MAX_MODIFIED_ORDER, ModifiedDefect, modified_defects, modifie
 pub use pieces::{
     ActionPart, ActionTimesHomogeneous, AffineFlow, ContactPiece, Kinetic, PieceList, PieceSum, PointFlow, Polynomial,
     PolynomialInAction, Potential, Prolonged, Quadratic, QuadraticMap,
+};
+pub use separable::{
+    PartOfAction, PartOfMomenta, PartOfPositions, SeparablePieces, SeparableSplitting, separable_pieces,
 };
 pub use splitting::{HamiltonianSplitting, PieceMaps, PieceStepper};

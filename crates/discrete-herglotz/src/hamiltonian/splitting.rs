@@ -52,19 +52,7 @@ where
     P: PieceList<N> + Clone + 'a,
 {
     fn info(&self) -> MethodInfo {
-        MethodInfo {
-            name: Cow::Owned(format!("hamiltonian_splitting_{}", self.scheme.name())),
-            order: self.scheme.order(),
-            symmetric: true,
-            explicit: true,
-            exact_rate: false,
-            in_transformed_time: false,
-            collocation: None,
-            substeps: self.scheme.stages() > 1,
-            divides: false,
-            cost_per_evaluation: 2,
-            source: Cow::Borrowed(self.scheme.source()),
-        }
+        info(&self.scheme)
     }
 
     fn check(&self, _hamiltonian: &OfHamiltonian<H>) -> Result<(), InputError> {
@@ -97,8 +85,25 @@ where
     }
 }
 
+/// The properties of a splitting into pieces with closed flows.
+pub(super) fn info(scheme: &SplittingScheme) -> MethodInfo {
+    MethodInfo {
+        name: Cow::Owned(format!("hamiltonian_splitting_{}", scheme.name())),
+        order: scheme.order(),
+        symmetric: true,
+        explicit: true,
+        exact_rate: false,
+        in_transformed_time: false,
+        collocation: None,
+        substeps: scheme.stages() > 1,
+        divides: false,
+        cost_per_evaluation: 2,
+        source: Cow::Borrowed(scheme.source()),
+    }
+}
+
 /// The substeps of a composition.
-fn substeps(scheme: &SplittingScheme) -> Result<Vec<f64>, InputError> {
+pub(super) fn substeps(scheme: &SplittingScheme) -> Result<Vec<f64>, InputError> {
     scheme.substeps().ok_or(InputError::Hypothesis {
         hypothesis: "a composition of symmetric maps (a Runge-Kutta-Nyström scheme has its order for kicks and drifts only)",
     })

@@ -2,7 +2,12 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry};
-use discrete_herglotz::{AnyIntegrator, GaussCollocation, InputError, Integrator, theory::legendre_inverse};
+use discrete_herglotz::hamiltonian::SeparableSplitting;
+use discrete_herglotz::rules::Method;
+use discrete_herglotz::{
+    AnyIntegrator, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
+    StepperOptions, theory::legendre_inverse,
+};
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
 
 /// What observers of a motion use. It is not generic, so that observers are compiled once for each dimension.
@@ -97,15 +102,57 @@ impl<const N: usize> Observed<N> for OfHamiltonian<FormulaHamiltonian<N>> {
     }
 }
 
-/// Contact Gauss collocation on rho H; the other integrators are those of Lagrangians.
-impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {
-    type By = GaussCollocation;
+/// The integrators of contact Hamiltonians; the other ones are those of Lagrangians.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum OfHamiltonians {
+    /// Contact Gauss collocation on rho H.
+    Gauss(GaussCollocation),
+    /// The splitting of a separable H.
+    Splitting(SeparableSplitting),
+}
 
-    fn by(integrator: AnyIntegrator) -> Result<GaussCollocation, InputError> {
+/// Evaluates an expression with the integrator of a variant.
+macro_rules! each {
+    ($any:expr, $integrator:ident => $result:expr) => {
+        match $any {
+            OfHamiltonians::Gauss($integrator) => $result,
+            OfHamiltonians::Splitting($integrator) => $result,
+        }
+    };
+}
+
+impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N> for OfHamiltonians {
+    fn info(&self) -> MethodInfo {
+        each!(self, by => Integrator::<OfHamiltonian<FormulaHamiltonian<N>>, N>::info(by))
+    }
+
+    fn check(&self, hamiltonian: &OfHamiltonian<FormulaHamiltonian<N>>) -> Result<(), InputError> {
+        each!(self, by => by.check(hamiltonian))
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        each!(self, by => by.stepper(problem, h, options))
+    }
+}
+
+impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {
+    type By = OfHamiltonians;
+
+    fn by(integrator: AnyIntegrator) -> Result<OfHamiltonians, InputError> {
         match integrator {
-            AnyIntegrator::Gauss { stages } => Ok(GaussCollocation { stages }),
+            AnyIntegrator::Gauss { stages } => Ok(OfHamiltonians::Gauss(GaussCollocation { stages })),
+            AnyIntegrator::Splitting(scheme) => Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme })),
+            AnyIntegrator::Discrete(Method::Strang) => {
+                Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme: SplittingScheme::STRANG }))
+            }
             _ => Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian, and a Hamiltonian runs by `gauss_1` to `gauss_16`",
+                hypothesis: "a Lagrangian; a Hamiltonian runs by `gauss_1` to `gauss_16`, and by the splittings where it \
+                             is T(p) + V(t, q) + a*z + b*z^2",
             }),
         }
     }
