@@ -6,8 +6,8 @@ use crate::numbers::{EXTREME, Report, places, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ContactHamiltonian, OfHamiltonian, PhasePoint, Scalar};
 use discrete_herglotz::hamiltonian::{
-    Arrangement, Euler, GeneratingStepper, PieceStepper, Quadratic, modified_defects, modified_hamiltonian,
-    type_three_step, type_two_step,
+    Arrangement, BracketSeries, Euler, GeneratingStepper, PieceStepper, PieceSum, Quadratic, SplitPart,
+    modified_defects, modified_hamiltonian, separable_pieces, type_three_step, type_two_step,
 };
 use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Stepper};
 
@@ -15,6 +15,11 @@ pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["Problem::of_hamiltonian"], run: problems },
     InputTest { entries: &["GeneratingStepper::new", "PieceStepper::new", "Quadratic::new"], run: steppers },
     InputTest { entries: &["hamiltonian::type_three_step", "hamiltonian::type_two_step"], run: maps },
+    InputTest { entries: &["hamiltonian::separable_pieces"], run: separable },
+    InputTest {
+        entries: &["BracketSeries::defects", "BracketSeries::new", "BracketSeries::value", "BracketTerm::value"],
+        run: brackets,
+    },
     InputTest { entries: &["hamiltonian::modified_defects", "hamiltonian::modified_hamiltonian"], run: modified },
 ];
 
@@ -71,6 +76,48 @@ fn maps(report: &mut Report) {
         report.entry_point(&(t, x), two.map(|change| (change.q[0], (change.p[0], change.z))));
         let three = type_three_step(&Euler(Linear), t, 0.1, &state, &mut evaluations);
         report.entry_point(&(t, x), three.map(|change| (change.q[0], (change.p[0], change.z))));
+    }
+}
+
+/// A pendulum with a drag, and its potential alone.
+struct Separable {
+    kinetic: bool,
+}
+
+impl ContactHamiltonian<1> for Separable {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+        let potential = (q[0] - t * 0.1).cos() + 2.0 + z * z * 0.1;
+        if self.kinetic { p[0] * p[0] * 0.5 + potential + z * 0.1 } else { potential }
+    }
+    fn structure(&self) -> contact_geom::HamiltonianStructure {
+        contact_geom::HamiltonianStructure { separable: true, ..Default::default() }
+    }
+}
+
+fn separable(report: &mut Report) {
+    let h = Separable { kinetic: true };
+    for (t, x) in places() {
+        let state = PhasePoint::from(x);
+        let pieces = separable_pieces(&h, t, &state);
+        report.formula(&(t, x), pieces.map(|of| PieceSum(of).value(t, &state.q, &state.p, state.z)));
+    }
+}
+
+fn brackets(report: &mut Report) {
+    let (a, b) = (Separable { kinetic: true }, Separable { kinetic: false });
+    for time in EXTREME {
+        let series = BracketSeries::new(&[(SplitPart::A, time), (SplitPart::B, 1.0)], 2);
+        report.entry_point(&time, series.map(|of| of.terms().iter().map(|term| term.coefficient).sum::<f64>()));
+    }
+    let strang = [(SplitPart::A, 0.5), (SplitPart::B, 1.0), (SplitPart::A, 0.5)];
+    let Ok(series) = BracketSeries::new(&strang, 3) else { return report.check(false, || "no series".into()) };
+    for x in triples() {
+        let state = PhasePoint::from(x);
+        report.formula(&x, Ok::<_, String>(series.value(&a, &b, &state, 0.1, 3)));
+        let first: f64 = series.terms().iter().take(2).map(|term| term.value(&a, &b, &state)).sum();
+        report.formula(&x, Ok::<_, String>(first));
+        let defects = series.defects(&a, &b, &[state], &[0.1], |x, _| Ok((*x, 1.0)));
+        report.entry_point(&x, defects.map(|all| all.iter().map(|d| d.defect).sum::<f64>()));
     }
 }
 

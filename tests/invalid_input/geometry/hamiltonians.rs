@@ -1,12 +1,12 @@
 //! Invalid input to contact Hamiltonians: their derivatives propagate a NaN, and a velocity without a momentum is refused.
 
 use crate::InputTest;
-use crate::numbers::{Report, places};
+use crate::numbers::{EXTREME, Report, places};
 use contact_geom::nalgebra::SVector;
-use contact_geom::support::rounding_at_state;
+use contact_geom::support::{rounding_at_state, seed};
 use contact_geom::{
-    ContactHamiltonian, Derivatives, HamiltonianDerivatives, HamiltonianStructure, NoMomentum, OfHamiltonian,
-    PhasePoint, Scalar, VelocityPoint, momentum,
+    ChartVector, ContactHamiltonian, Derivatives, HamiltonianDerivatives, HamiltonianStructure, NoMomentum,
+    OfHamiltonian, PhasePoint, Scalar, VelocityPoint, legendrian_defect, momentum,
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -21,6 +21,7 @@ pub const TESTS: &[InputTest] = &[
         run: derivatives,
     },
     InputTest { entries: &["momentum"], run: momenta },
+    InputTest { entries: &["LegendrianDefect::largest", "legendrian_defect"], run: graphs },
 ];
 
 /// Nonlinear in all variables, with a regular `H_pp`.
@@ -50,6 +51,18 @@ fn derivatives(report: &mut Report) {
         let velocity = VelocityPoint { q: state.q, v: d.y, z: state.z };
         let (of_value, of_gradient) = rounding_at_state(&OfHamiltonian(Nonlinear), t, &velocity, &state);
         report.formula(&input, Ok::<_, NoMomentum>((of_value, of_gradient)));
+    }
+}
+
+/// The form depends on momenta and on the factor; positions and actions enter by their derivatives alone.
+fn graphs(report: &mut Report) {
+    for p in EXTREME {
+        let x = ChartVector { x: [0.3].into(), y: [p].into(), z: 0.2 };
+        let x0: PhasePoint<1, _> = seed(&x).into();
+        let x1 = PhasePoint { q: x0.q, p: x0.p + x0.p, z: x0.z + x0.z };
+        let of = |r: f64| legendrian_defect(&x0, &x1, r.into()).largest();
+        report.formula(&p, Ok::<_, NoMomentum>(of(2f64.ln())));
+        report.check(of(f64::NAN).is_nan(), || format!("{p} with a factor that is not a number: {}", of(f64::NAN)));
     }
 }
 

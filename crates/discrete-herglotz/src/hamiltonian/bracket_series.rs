@@ -99,7 +99,7 @@ impl BracketSeries {
     ///
     /// # Errors
     /// [`InputError::Count`] for a degree of 0 or beyond [`MAX_BRACKET_DEGREE`]; [`InputError::Span`] for a time that
-    /// is not finite.
+    /// is not finite, or is so long that the coefficients overflow.
     pub fn new(composition: &[(SplitPart, f64)], degree: usize) -> Result<Self, InputError> {
         if !(1..=MAX_BRACKET_DEGREE).contains(&degree) {
             let what = "the degree of the series of brackets, at most 7,";
@@ -137,7 +137,12 @@ impl BracketSeries {
                 }
             }
         }
-        Ok(BracketSeries { terms: brackets(&logarithm, &sizes), degree })
+        let terms = brackets(&logarithm, &sizes);
+        if terms.iter().all(|term| term.coefficient.is_finite()) {
+            return Ok(BracketSeries { terms, degree });
+        }
+        let longest = composition.iter().map(|(_, time)| time.abs()).fold(0.0, f64::max);
+        Err(InputError::Span { span: longest })
     }
 
     /// The terms, in the order of their degrees.
