@@ -336,7 +336,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 21, "{names:?}");
+    assert_eq!(names.len(), 26, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
@@ -351,6 +351,31 @@ fn scenes_run() {
     let kept = column(&at.read("van_der_pol/rows.csv"), "exp(k*t)*(energy - k*z)");
     // The error 1e-10 of (q, p) is multiplied by e^8.
     assert!(kept.iter().all(|x| (x + 1.0).abs() < 1e-5), "{kept:?}");
+    // Two containers: the published state at t = 30.
+    let rows = at.read("containers/rows.csv");
+    for (name, published) in [
+        ("q", 1.16581228326),
+        ("p", -0.53388914243),
+        ("E1", 2.63142893086),
+        ("E2", 3.22605226094),
+        ("S", 1.10085901608),
+    ] {
+        let last = *column(&rows, name).last().unwrap();
+        assert!((last - published).abs() < 1e-10, "{name}: {last}");
+    }
+    // Density times volume, the radius of a polytrope, a factor in closed form and the capture, the rate of an optimizer.
+    let kept = column(&at.read("thermostat/rows.csv"), "invariant");
+    assert!(kept.iter().all(|x| (x - kept[0]).abs() < 1e-9), "{kept:?}");
+    let surface = *column(&at.read("lane_emden/events.csv"), "t").last().unwrap();
+    assert!((surface - 3.65375374).abs() < 1e-8, "{surface}");
+    let rows = at.read("spin_orbit/rows.csv");
+    assert!(column(&rows, "off").iter().all(|x| x.abs() < 1e-9));
+    assert!(column(&rows, "p_q").iter().rev().take(100).all(|p| (p - 1.0).abs() < 0.16));
+    let rows = at.read("optimizer/rows.csv");
+    for (t, factor) in column(&rows, "t").iter().zip(column(&rows, "log_factor")) {
+        assert!((factor + 3.0 * (t / 0.5).ln()).abs() < 1e-9, "{factor} at {t}");
+    }
+    assert!(*column(&rows, "log f").last().unwrap() < -3.0 * 20.0_f64.ln());
     assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
 }
 
