@@ -193,5 +193,10 @@ fn finish<T: Scalar, const N: usize>(
         return Err(StepError::SigmaVanished { sigma: 1.0 / below.re() });
     }
     let p = SVector::from_fn(|i, _| -(d.x[i] + x.p[i] * d.z) / below);
-    Ok(ContactIncrement { q: d.y, p, z: x.p.dot(&d.y) - value, sigma_minus_one: -d.z / below })
+    let z = x.p.dot(&d.y) - value;
+    // The increment of the action may overflow where that of the equations does not.
+    if !z.re().is_finite() {
+        return Err(StepError::NonFinite);
+    }
+    Ok(ContactIncrement { q: d.y, p, z, sigma_minus_one: -d.z / below })
 }

@@ -117,7 +117,12 @@ pub fn type_two_step<G: TypeTwo<N>, T: Scalar, const N: usize>(
             if sigma <= 0.0 {
                 return Err(StepError::SigmaVanished { sigma });
             }
-            return Ok(ContactIncrement { q: d.y, p, z: p1.dot(&d.y) - value, sigma_minus_one: -d.z });
+            let z = p1.dot(&d.y) - value;
+            // The action is no part of the equations that are solved.
+            if !z.re().is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            return Ok(ContactIncrement { q: d.y, p, z, sigma_minus_one: -d.z });
         }
         if !size.is_finite() {
             return Err(StepError::NonFinite);
