@@ -1,0 +1,4 @@
+//! Splittings of rigid bodies.
+
+/// Explicit splittings of a rigid body.
+pub struct RigidBodySplitting;
