@@ -46,7 +46,11 @@ impl Inertia {
             (matrix.diagonal(), Matrix3::identity())
         } else {
             let eigen = SymmetricEigen::new(matrix);
-            (eigen.eigenvalues, eigen.eigenvectors)
+            let mut axes = eigen.eigenvectors;
+            if axes.determinant() < 0.0 {
+                axes.neg_mut();
+            }
+            (eigen.eigenvalues, axes)
         };
         let mut sorted = [moments[0], moments[1], moments[2]];
         sorted.sort_by(f64::total_cmp);
@@ -87,7 +91,7 @@ impl Inertia {
         &self.moments
     }
 
-    /// The principal axes in the body, the columns of an orthogonal matrix.
+    /// The principal axes in the body, right-handed, the columns of a rotation matrix.
     pub fn axes(&self) -> &Matrix3<f64> {
         &self.axes
     }
