@@ -9,7 +9,8 @@ use contact_geom::groups::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Dual, Scalar};
-use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupMotion, GroupState};
+use discrete_herglotz::SplittingScheme;
+use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupMotion, GroupState, RigidBodySplitting};
 
 const EPS: f64 = f64::EPSILON;
 
@@ -51,7 +52,9 @@ fn run_heavy_top(
     (end.g.apply(&x) - x, end.z, [body, spatial])
 }
 
-fn gauss(stages: usize) -> impl Fn(&RigidBody<UniformGravity, 3>, f64) -> Box<dyn Fn(&mut GroupMotion<Rotations, 3>, usize)> {
+fn gauss(
+    stages: usize,
+) -> impl Fn(&RigidBody<UniformGravity, 3>, f64) -> Box<dyn Fn(&mut GroupMotion<Rotations, 3>, usize)> {
     move |top, h| {
         let method = GroupGauss::new(*top, stages, h).unwrap();
         Box::new(move |motion, steps| motion.advance(&method, steps).unwrap())
@@ -210,6 +213,65 @@ fn the_order_of_gauss_collocation_is_twice_the_number_of_stages() {
             }
         }
     }
+}
+
+/// Splittings of order 8 and 10: the spin of 150 rad/s is integrated exactly, so that 60 and 40 steps suffice.
+#[test]
+fn the_heavy_top_by_splittings() {
+    for (gamma, expected) in DISPLACEMENTS {
+        for (scheme, steps) in [(SplittingScheme::BLANES_CASAS_8, 100), (SplittingScheme::SOFRONIOU_SPALETTA_10, 60)] {
+            let (u, z, momenta) = run_heavy_top(gamma, steps, |top, h| {
+                let method = RigidBodySplitting::new(*top, scheme, h).unwrap();
+                Box::new(move |motion, steps| motion.advance(&method, steps).unwrap())
+            });
+            println!("{} {gamma}: {u:?} {z} {momenta:?}", scheme.name());
+            let bound = if gamma == 0.0 { 1e-11 } else { 1e-10 };
+            assert!((u - SVector::from(expected)).amax() < bound, "{}, gamma = {gamma}: {u:?}", scheme.name());
+            if gamma == -0.1 {
+                assert!((z / 8312.8010121552 - 1.0).abs() < 1e-13, "z = {z}");
+            }
+            assert!(momenta.iter().all(|m| m.abs() < 1e-14), "{}, gamma = {gamma}: {momenta:?}", scheme.name());
+        }
+    }
+}
+
+/// A symmetric body about an axis that is not an axis of the coordinates, off its centre of mass.
+fn symmetric(gamma: f64) -> RigidBody<UniformGravity, 3> {
+    let gravity = UniformGravity { weight: [0.3, -0.5, -1.2], centre: [0.4, 0.8, -0.3] };
+    RigidBody::rotating(&Inertia::principal([1.4, 2.0, 1.4]).unwrap(), gravity, gamma).unwrap()
+}
+
+/// Splittings are conformally contact with `sigma_d = e^(gamma h)`, and have the order of their scheme.
+#[test]
+fn splittings_are_contact_and_have_their_order() {
+    let (strang, fourth) = (SplittingScheme::STRANG, SplittingScheme::SUZUKI_4);
+    let nystrom = SplittingScheme::BLANES_MOAN_6;
+    for (body, schemes) in [(tilted(-0.3), [strang, fourth]), (symmetric(-0.3), [fourth, nystrom])] {
+        let reference = end_of(Top::Body(body), 8, 12);
+        for scheme in schemes {
+            for h in [0.4, -0.2] {
+                let method = RigidBodySplitting::new(body, scheme, h).unwrap();
+                let (defect, sigma) = conformality(&method, 0.2, &start(), &SVector::zeros());
+                assert!(defect < 64.0 * EPS, "{}, h = {h}: {defect:e}", scheme.name());
+                assert!((sigma - (-0.3 * h).exp()).abs() < 8.0 * EPS);
+            }
+            let order = f64::from(scheme.order());
+            let counts = if order < 3.0 { [60, 90, 135] } else { [16, 24, 36] };
+            let errors = counts.map(|n| {
+                let method = RigidBodySplitting::new(body, scheme, 1.5 / n as f64).unwrap();
+                let mut motion = GroupMotion::new(0.2, start()).unwrap();
+                motion.advance(&method, n).unwrap();
+                distance(&motion.state(), &reference)
+            });
+            for i in 0..2 {
+                let slope = (errors[i] / errors[i + 1]).ln() / 1.5_f64.ln();
+                println!("{} {slope} {errors:?}", scheme.name());
+                assert!((slope - order).abs() < 0.15, "{}: {slope}, {errors:?}", scheme.name());
+            }
+        }
+    }
+    let refused = RigidBodySplitting::new(tilted(0.0), nystrom, 0.1);
+    assert!(matches!(refused, Err(GroupError::NeedsComposition { scheme: "blanes_moan_6" })));
 }
 
 /// Invalid input is a typed error that names the remedy.

@@ -5,8 +5,8 @@
 
 use contact_geom::groups::{GroupError, Inertia, LieGroup, NoPotential, RigidBody, Rotations};
 use contact_geom::nalgebra::{Matrix3, SVector};
-use discrete_herglotz::groups::{GroupGauss, GroupMotion, GroupState, RigidBodySplitting};
 use discrete_herglotz::SplittingScheme;
+use discrete_herglotz::groups::{GroupGauss, GroupMotion, GroupState, RigidBodySplitting};
 use exact_lagrangian::groups::{ChangeOfTime, FreeRigidBody, jacobi_functions};
 
 const EPS: f64 = f64::EPSILON;
@@ -79,7 +79,8 @@ fn a_splitting_of_order_10_of_the_asymmetric_body() {
     let start = start([2.0, 2.0, 2.0]);
     let exact = FreeRigidBody::new(inertia, -0.1).unwrap().at(12.0, &start).unwrap();
     let error = |steps: usize| {
-        let method = RigidBodySplitting::new(body, SplittingScheme::SOFRONIOU_SPALETTA_10, 12.0 / steps as f64).unwrap();
+        let method =
+            RigidBodySplitting::new(body, SplittingScheme::SOFRONIOU_SPALETTA_10, 12.0 / steps as f64).unwrap();
         let mut motion = GroupMotion::new(0.0, start).unwrap();
         motion.advance(&method, steps).unwrap();
         (motion.state().momentum - exact.momentum).amax()

@@ -75,8 +75,8 @@ pub enum GroupError {
     RateNotConstant,
     /// A splitting needs a scheme of another class.
     #[error(
-        "the scheme {scheme} is a Runge-Kutta-Nystroem splitting, whose order needs the exact flow of the free body; \
-         the moments of inertia are all different, so use a composition instead"
+        "the scheme {scheme} is a Runge-Kutta-Nyström splitting, whose order needs the exact flow of the free body; the \
+         moments of inertia are all different, so use a composition instead"
     )]
     NeedsComposition {
         /// The name of the scheme.

@@ -38,7 +38,8 @@ fn axioms<G: LieGroup<N>, const N: usize>(name: &str, seed: u32, size: f64) {
     let (eta, zeta, mu) = (sample::<N>(seed + 100), sample::<N>(seed + 200), sample::<N>(seed + 300));
     let (g, a, b) = (G::exp(&xi), G::exp(&eta), G::exp(&zeta));
     let scale = 1.0 + xi.amax();
-    let tiny = |x: f64, bound: f64, what: &str| assert!(x <= bound, "{name}, {what}, size {size:e}: {x:e} of {bound:e}");
+    let tiny =
+        |x: f64, bound: f64, what: &str| assert!(x <= bound, "{name}, {what}, size {size:e}: {x:e} of {bound:e}");
     let bound = 64.0 * EPS * scale * scale;
 
     // The group.

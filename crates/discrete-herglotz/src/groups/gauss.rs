@@ -119,7 +119,7 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
                 return Err(GroupError::NotConverged { iterations, change });
             }
             // The iteration is at round-off once its changes are small and no longer decrease.
-            stagnant = if change < 0.5 * smallest { 0 } else { stagnant + 1 };
+            stagnant = if change < 0.9 * smallest { 0 } else { stagnant + 1 };
             if change < smallest {
                 smallest = change;
             }

@@ -162,8 +162,7 @@ impl<V: GroupPotential<Rotations, 3>> GroupIntegrator<Rotations, 3> for RigidBod
     ) -> Result<GroupStep<3, T>, GroupError> {
         let gamma = self.body.gamma();
         let zero = SVector::<T, 3>::zeros();
-        let mut inner =
-            Inner { f: Rotations::identity(), at_start: from.momentum, kicks: zero, z: T::zero(), s: 0.0 };
+        let mut inner = Inner { f: Rotations::identity(), at_start: from.momentum, kicks: zero, z: T::zero(), s: 0.0 };
         for (i, kick) in self.kicks.iter().enumerate() {
             if *kick != 0.0 {
                 let weight = kick * self.h * (-gamma * inner.s).exp();

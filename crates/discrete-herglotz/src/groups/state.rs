@@ -40,11 +40,7 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> GroupState<G, N, T> {
     pub fn after(&self, step: &GroupStep<N, T>) -> Self {
         let f = G::exp(&step.increment);
         let momentum = self.momentum + self.momentum * step.sigma_minus_one + step.impulse;
-        GroupState {
-            g: G::compose(&self.g, &f),
-            momentum: G::coadjoint(&f, &momentum),
-            z: self.z + step.action,
-        }
+        GroupState { g: G::compose(&self.g, &f), momentum: G::coadjoint(&f, &momentum), z: self.z + step.action }
     }
 }
 
