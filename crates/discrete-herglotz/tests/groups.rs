@@ -199,7 +199,8 @@ fn end_of(top: Top, stages: usize, steps: usize) -> GroupState<Rotations, 3> {
     motion.state()
 }
 
-/// The order is 2s: measured slopes between steps whose ratio is 3/2, for a Lagrangian that is nonlinear in g, xi and z.
+/// The order is 2s: measured slopes between steps whose ratio is 3/2, for a Lagrangian that is nonlinear in g, xi and
+/// z.
 #[test]
 fn the_order_of_gauss_collocation_is_twice_the_number_of_stages() {
     for top in [Top::General, Top::Body(tilted(-0.3))] {

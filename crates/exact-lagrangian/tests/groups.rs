@@ -115,7 +115,8 @@ fn elliptic_functions() {
     assert!((sn - 1.0).abs() < 2.0 * EPS && cn.abs() < 4.0 * EPS && (dn - root).abs() < 2.0 * EPS);
 }
 
-/// A great circle of the sphere with drag, in closed form: SO(3) with the inertia of a ball, where motions are geodesics.
+/// A great circle of the sphere with drag, in closed form: SO(3) with the inertia of a ball, where motions are
+/// geodesics.
 #[test]
 fn geodesics_with_drag_are_geodesics_in_another_time() {
     let ball = RigidBody::rotating(&Inertia::principal([2.0; 3]).unwrap(), NoPotential, -0.7).unwrap();

@@ -70,13 +70,10 @@ pub enum GroupError {
         /// The number of stages that was passed.
         found: usize,
     },
-    /// The Lagrangian depends on z in another way than the method assumes.
-    #[error("the method needs a Lagrangian whose rate L_z is constant; use Gauss collocation instead")]
-    RateNotConstant,
     /// A splitting needs a scheme of another class.
     #[error(
-        "the scheme {scheme} is a Runge-Kutta-Nyström splitting, whose order needs the exact flow of the free body; the \
-         moments of inertia are all different, so use a composition instead"
+        "the scheme {scheme} is a Runge-Kutta-Nyström splitting, whose order needs the exact flow of the free body; \
+         the moments of inertia are all different, so use a composition instead"
     )]
     NeedsComposition {
         /// The name of the scheme.

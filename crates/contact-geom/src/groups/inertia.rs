@@ -71,8 +71,8 @@ impl Inertia {
         Self::new(Matrix3::from_diagonal(&moments.into()))
     }
 
-    /// The tensor about a point, from this one about the centre of mass, which is at `centre` from the point: the theorem
-    /// of Huygens and Steiner, `J + m (|X|^2 1 - X X^T)`.
+    /// The tensor about a point, from this one about the centre of mass, which is at `centre` from the point: the
+    /// theorem of Huygens and Steiner, `J + m (|X|^2 1 - X X^T)`.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).

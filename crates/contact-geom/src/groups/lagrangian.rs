@@ -8,13 +8,12 @@ use nalgebra::{SMatrix, SVector};
 /// A Lagrangian `l(t, g, xi, z)` on a Lie group, with the body velocity `xi = g^-1 gdot`, written once as a generic
 /// function.
 ///
-/// The motion makes the final action critical, where `zdot = l`. Its equations are those of Euler, Poincare and
+/// The motion makes the final action critical, where `zdot = l`. Its equations are those of Euler, Poincaré and
 /// Herglotz, with the body momentum `Pi = l_xi` and the left-trivialised derivative `l_g`:
 ///
 /// `gdot = g xi`, `Pidot = ad_xi^T Pi + l_g + l_z Pi`, `zdot = l`
 ///
-/// (Anahory Simoes, Colombo, de Leon, Marrero, Martin de Diego and Padron, arXiv 2512.17424). Only [`value`](Self::value)
-/// is needed; closed derivatives make steps faster.
+/// (arXiv 2512.17424). Only [`value`](Self::value) is needed; closed derivatives make steps faster.
 pub trait GroupLagrangian<G: LieGroup<N>, const N: usize> {
     /// The value `l(t, g, xi, z)`.
     fn value<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> T;

@@ -10,7 +10,8 @@ pub trait GroupPotential<G: LieGroup<N>, const N: usize> {
     /// The value `V(g)`.
     fn value<T: Scalar>(&self, g: &G::Element<T>) -> T;
 
-    /// The value with the left-trivialised gradient, `d/ds V(g exp(s eta)) = gradient . eta`; by default by dual numbers.
+    /// The value with the left-trivialised gradient, `d/ds V(g exp(s eta)) = gradient . eta`; by default by dual
+    /// numbers.
     fn with_gradient<T: Scalar>(&self, g: &G::Element<T>) -> (T, SVector<T, N>) {
         type Seed<T, const N: usize> = Dual<T, SVector<T, N>>;
         let mut eta = SVector::<Seed<T, N>, N>::zeros();
@@ -37,9 +38,9 @@ impl<G: LieGroup<N>, const N: usize> GroupPotential<G, N> for NoPotential {
     }
 }
 
-/// Uniform gravity on a body with a fixed point, `V(R) = -weight . (R X)`: the weight is the mass times the acceleration
-/// of gravity, a vector in space, and X leads from the fixed point to the centre of mass, in the body. The rotations
-/// about the weight leave it invariant.
+/// Uniform gravity on a body with a fixed point, `V(R) = -weight . (R X)`: the weight is the mass times the
+/// acceleration of gravity, a vector in space, and X leads from the fixed point to the centre of mass, in the body. The
+/// rotations about the weight leave it invariant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformGravity {
     /// The weight, a force in space.

@@ -6,8 +6,8 @@ use super::{GroupError, LieGroup, Rotation, Rotations};
 use crate::{Dual, Scalar};
 use nalgebra::SVector;
 
-/// The group SE(3) of rigid motions `X -> R X + x`. An element of the algebra is an angular velocity and a velocity, both
-/// in the body, `(omega, v)`; a momentum is an angular momentum and a linear one.
+/// The group SE(3) of rigid motions `X -> R X + x`. An element of the algebra is an angular velocity and a velocity,
+/// both in the body, `(omega, v)`; a momentum is an angular momentum and a linear one.
 ///
 /// The algebra is that of SO(3) over the dual numbers `omega + eps v`, `eps^2 = 0` (the principle of transference), so
 /// that brackets and dexp are those of rotations, evaluated on [`Dual`].

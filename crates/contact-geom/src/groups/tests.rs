@@ -27,8 +27,8 @@ fn series<G: LieGroup<N>, const N: usize>(xi: &SVector<f64, N>, eta: &SVector<f6
     [exponential, dexp]
 }
 
-/// The axioms at elements of the algebra of the given size. `scale` is the size of the coordinates, by which round-off is
-/// measured.
+/// The axioms at elements of the algebra of the given size. `scale` is the size of the coordinates, by which round-off
+/// is measured.
 fn axioms<G: LieGroup<N>, const N: usize>(name: &str, seed: u32, size: f64) {
     let unit = |seed: u32| {
         let x = sample::<N>(seed);

@@ -17,8 +17,8 @@ use std::f64::consts::PI;
 ///
 /// `Pi1 = dexp_xi1^-T p1`, `sigma_d Pi0 = Ad_(f^-1)^T Pi1 - d_c S`,
 ///
-/// where `d_c S = h sum_j b_j R_j Ad_(exp -Xi_j)^T l_g` is the derivative of S in the centre g0 of the chart. The flow is
-/// conformally contact, and momenta of symmetries scale by `sigma_d`, up to round-off. For a constant rate gamma the
+/// where `d_c S = h sum_j b_j R_j Ad_(exp -Xi_j)^T l_g` is the derivative of S in the centre g0 of the chart. The flow
+/// is conformally contact, and momenta of symmetries scale by `sigma_d`, up to round-off. For a constant rate gamma the
 /// factor `e^(gamma t)` is integrated exactly: `sigma_d = e^(gamma h)`.
 #[derive(Clone, Debug)]
 pub struct GroupGauss<L> {

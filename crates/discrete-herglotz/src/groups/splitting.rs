@@ -11,9 +11,9 @@ use contact_geom::nalgebra::SVector;
 ///
 /// The kinetic energy is a sum of two parts with closed flows: that of the symmetric body that is nearest,
 /// `(|Pi|^2/I_a + (1/I_b - 1/I_a) (Pi . u_b)^2)/2`, a turn about Pi and one about the axis u_b; and the rest,
-/// `(1/I_c - 1/I_a) (Pi . u_c)^2/2`, a turn about u_c, which vanishes for a symmetric body. The drag is part of a turn by
-/// a change of time, `tau = (e^(gamma t) - 1)/gamma`. A kick by V changes Pi by the torque. Every part is the flow of a
-/// contact Hamiltonian, so that a step is conformally contact with `sigma_d = e^(gamma h)`. Fast rotation costs no
+/// `(1/I_c - 1/I_a) (Pi . u_c)^2/2`, a turn about u_c, which vanishes for a symmetric body. The drag is part of a turn
+/// by a change of time, `tau = (e^(gamma t) - 1)/gamma`. A kick by V changes Pi by the torque. Every part is the flow
+/// of a contact Hamiltonian, so that a step is conformally contact with `sigma_d = e^(gamma h)`. Fast rotation costs no
 /// accuracy: the step is limited by the torque, and by the difference `1/I_c - 1/I_a`.
 ///
 /// ```
@@ -49,8 +49,8 @@ struct Turn {
     factor: f64,
 }
 
-/// The state within a step, at the time s after its start. The momentum and the action are divided by `e^(gamma s)`, and
-/// the momentum is at g0 in the body, where turns leave it unchanged.
+/// The state within a step, at the time s after its start. The momentum and the action are divided by `e^(gamma s)`,
+/// and the momentum is at g0 in the body, where turns leave it unchanged.
 struct Inner<T> {
     f: Rotation<T>,
     at_start: SVector<T, 3>,

@@ -83,8 +83,9 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
     /// residual of its momentum. Returns the largest change of a velocity.
     ///
     /// In the chart the Lagrangian is `l(g0 exp Xi, dexp_Xi V, Z)`. With `R = rho/rho_1` the stage equations are
-    /// `R_k l_V = P_k = P0 + h sum_j a_kj R_j l_Xi,j`, and the momentum at the end is `p1 = P0 + h sum_j b_j R_j l_Xi,j`,
-    /// where `p1 = dexp_(-xi1)^T (sigma_d Pi0 + d_c S)` is the equation of the discrete Legendre transformation at g0.
+    /// `R_k l_V = P_k = P0 + h sum_j a_kj R_j l_Xi,j`, and the momentum at the end is `p1 = P0 + h sum_j b_j R_j
+    /// l_Xi,j`, where `p1 = dexp_(-xi1)^T (sigma_d Pi0 + d_c S)` is the equation of the discrete Legendre
+    /// transformation at g0.
     pub fn sweep<L: GroupLagrangian<G, N>>(
         &mut self,
         given: &Given<'_, L, G::Element<T>, N, T>,

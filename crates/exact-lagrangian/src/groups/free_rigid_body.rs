@@ -88,7 +88,8 @@ impl Motion {
     fn new(moments: &Vector3<f64>, p: &Vector3<f64>) -> Option<Self> {
         let mut order = [0, 1, 2];
         order.sort_by(|&i, &j| moments[i].total_cmp(&moments[j]));
-        // With a and c the axes of the smallest and the largest moment, or the other way, so that the modulus is below 1.
+        // With a and c the axes of the smallest and the largest moment, or the other way, so that the modulus is below
+        // 1.
         let [first, b, last] = order;
         if moments[first] == moments[last] || p.iter().filter(|x| **x != 0.0).count() < 2 {
             return None;
