@@ -8,7 +8,7 @@ const EPS: f64 = f64::EPSILON;
 
 /// Numbers of `[-1, 1]` that look random, different for each seed.
 fn sample<const N: usize>(seed: u32) -> SVector<f64, N> {
-    SVector::from_fn(|i, _| (f64::from(seed) * 12.9898 + i as f64 * 78.233).sin() * 43758.5453 % 1.0)
+    SVector::from_fn(|i, _| (f64::from(seed + 1) * 12.9898 + i as f64 * 78.233).sin() * 43758.5453 % 1.0)
 }
 
 /// The difference of two elements as an element of the algebra.
@@ -135,7 +135,8 @@ fn stumpff_functions() {
     let below = stumpff::stumpff(2.5 - 4.0 * EPS);
     let above = stumpff::stumpff(2.5);
     for (k, (a, b)) in below.into_iter().zip(above).enumerate() {
-        assert!((a - b).abs() <= 16.0 * EPS * a.abs().max(0.02), "{k}: {a} {b}");
+        // Sine and cosine have absolute errors, the cosine near its zero as well.
+        assert!((a - b).abs() <= 16.0 * EPS * a.abs().max(if k < 2 { 0.25 } else { 0.0 }), "{k}: {a} {b}");
     }
 }
 
