@@ -57,7 +57,7 @@ fn the_free_body_agrees_with_collocation() {
     for (k, inertia) in bodies.into_iter().enumerate() {
         let exact = FreeRigidBody::new(inertia, -0.2).unwrap();
         let body = RigidBody::rotating(&inertia, NoPotential, -0.2).unwrap();
-        let method = GroupGauss::new(body, 8, 0.25).unwrap();
+        let method = GroupGauss::new::<Rotations, 3>(body, 8, 0.25).unwrap();
         for momentum in momenta {
             let start = start(momentum);
             let mut motion = GroupMotion::new(0.0, start).unwrap();
@@ -122,7 +122,7 @@ fn geodesics_with_drag_are_geodesics_in_another_time() {
     let ball = RigidBody::rotating(&Inertia::principal([2.0; 3]).unwrap(), NoPotential, -0.7).unwrap();
     let start = start([1.0, -0.4, 0.6]);
     let mut motion = GroupMotion::new(0.0, start).unwrap();
-    motion.advance(&GroupGauss::new(ball, 4, 0.1).unwrap(), 30).unwrap();
+    motion.advance(&GroupGauss::new::<Rotations, 3>(ball, 4, 0.1).unwrap(), 30).unwrap();
     let drag = ChangeOfTime::new(-0.7).unwrap();
     let (tau, end) = (drag.free_time(3.0), motion.state());
     let g = Rotations::compose(&start.g, &Rotations::exp(&(start.momentum * (0.5 * tau))));
