@@ -257,7 +257,11 @@ fn splittings_are_contact_and_have_their_order() {
                 assert!((sigma - (-0.3 * h).exp()).abs() < 8.0 * EPS);
             }
             let order = f64::from(scheme.order());
-            let counts = if order < 3.0 { [60, 90, 135] } else { [16, 24, 36] };
+            let counts = match scheme.order() {
+                2 => [60, 90, 135],
+                4 => [16, 24, 36],
+                _ => [8, 12, 18],
+            };
             let errors = counts.map(|n| {
                 let method = RigidBodySplitting::new(body, scheme, 1.5 / n as f64).unwrap();
                 let mut motion = GroupMotion::new(0.2, start()).unwrap();

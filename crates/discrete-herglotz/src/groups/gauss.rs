@@ -118,12 +118,13 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
             if !change.is_finite() {
                 return Err(GroupError::NotConverged { iterations, change });
             }
-            // The iteration is at round-off once its changes are small and no longer decrease.
+            // The iteration is at round-off once its changes are negligible, or small and no longer decreasing.
             stagnant = if change < 0.9 * smallest { 0 } else { stagnant + 1 };
             if change < smallest {
                 smallest = change;
             }
-            if change == 0.0 || (change <= 64.0 * f64::EPSILON * size && stagnant >= STAGNANT) {
+            let negligible = change <= 0.0625 * f64::EPSILON * size;
+            if negligible || (change <= 64.0 * f64::EPSILON * size && stagnant >= STAGNANT) {
                 return self.end(&given, stages);
             }
             if iterations == SWEEPS {
