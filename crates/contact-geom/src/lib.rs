@@ -42,6 +42,13 @@ pub mod hamiltonian {
     };
 }
 
+/// Constraints: holonomic `c(q) = 0`, and linear in the velocities, `omega(q) v = 0`.
+pub mod constraints {
+    pub use crate::dynamics::constraint::{
+        ConstrainedMotion, Constraint, ConstraintDerivatives, Distribution, DistributionDerivatives, constrained_motion,
+    };
+}
+
 /// Vector spaces of dual parts, and maxima that propagate NaN.
 pub mod numbers {
     pub use crate::number::{
