@@ -1,7 +1,7 @@
 //! The constrained Herglotz equations, solved for accelerations and multipliers.
 
-use super::{Constraint, ConstraintDerivatives};
-use crate::support::linear::solve;
+use super::{Constraint, ConstraintDerivatives, Redundancy, independent_rows, least_norm, restricted};
+use crate::support::linear::{SingularMatrix, solve};
 use crate::{Derivatives, Dual, GeometryError, Lagrangian, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
@@ -19,10 +19,10 @@ pub struct ConstrainedMotion<const N: usize, const M: usize> {
 /// `W a - G^T lambda = L_q + L_z L_v - (L_vq v + L_vz L + L_vt)`, `G a = -c_qq(v, v)`.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, constraints::constrained_motion, systems::constrained::RigidPendulum};
+/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion}, systems::constrained::RigidPendulum};
 /// let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
 /// let x = VelocityPoint::new([0.0, -1.0], [2.0, 0.0], 0.0);
-/// let motion = constrained_motion(&system, &system, 0.0, &x)?;
+/// let motion = constrained_motion(&system, &system, 0.0, &x, Redundancy::Refuse)?;
 /// // The tension g + v^2 pulls upward; G = 2 q.
 /// assert!((2.0 * x.q[1] * motion.multipliers[0] - (9.81 + 4.0)).abs() < 1e-14);
 /// # Ok::<(), contact_geom::GeometryError>(())
@@ -35,6 +35,7 @@ pub fn constrained_motion<const N: usize, const M: usize>(
     constraint: &impl Constraint<N, M>,
     t: f64,
     x: &VelocityPoint<N>,
+    redundancy: Redundancy,
 ) -> Result<ConstrainedMotion<N, M>, GeometryError> {
     let (value, slope) = lagrangian.with_gradient_and_force(t, x);
     let drifting = |re: f64, drift: f64| Dual { re, d: SVector::<f64, 1>::new(drift) };
@@ -55,10 +56,21 @@ pub fn constrained_motion<const N: usize, const M: usize>(
     for a in 0..M {
         responses.set_column(a, &solved(g.row(a).transpose())?);
     }
-    let mut matrix = g * responses;
+    let independent = match redundancy {
+        Redundancy::Refuse => [true; M],
+        Redundancy::LeastNorm => independent_rows(&g),
+    };
     let mut multipliers = -curvature - g * free;
-    solve(&mut matrix, &mut multipliers).map_err(|e| {
-        e.of("G W^-1 G^T with G = c_q", "remove dependent constraints, or choose a point at which c_q has full rank")
-    })?;
-    Ok(ConstrainedMotion { acceleration: free + responses * multipliers, multipliers })
+    for (a, _) in independent.iter().enumerate().filter(|(_, kept)| !**kept) {
+        multipliers[a] = 0.0;
+    }
+    solve(&mut restricted(g * responses, &independent), &mut multipliers).map_err(dependent)?;
+    let acceleration = free + responses * multipliers;
+    let multipliers = least_norm(&g, &independent, &multipliers).map_err(dependent)?;
+    Ok(ConstrainedMotion { acceleration, multipliers })
+}
+
+/// The error for dependent constraints.
+fn dependent(singular: SingularMatrix) -> GeometryError {
+    singular.of("G W^-1 G^T with G = c_q", "remove dependent constraints, or choose a point at which c_q has full rank")
 }

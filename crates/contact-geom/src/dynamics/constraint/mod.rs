@@ -3,7 +3,9 @@
 mod field;
 mod holonomic;
 mod nonholonomic;
+mod redundancy;
 
 pub use field::{ConstrainedMotion, constrained_motion};
 pub use holonomic::{Constraint, ConstraintDerivatives};
 pub use nonholonomic::{Distribution, DistributionDerivatives};
+pub use redundancy::{Redundancy, independent_rows, least_norm, restricted};
