@@ -5,7 +5,7 @@ use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::linear::solve;
 use contact_geom::systems::constrained::{FourBar, ParallelCranks, RigidPendulum, Squeezer};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, OffConstraint};
 use discrete_herglotz::{InputError, SplittingScheme, StepError, Stepper};
 
@@ -72,7 +72,7 @@ fn eta<const N: usize>(x: &PhasePoint<N, Along>) -> f64 {
     x.z.d[0] - (0..N).map(|i| x.p[i].re * x.q[i].d[0]).sum::<f64>()
 }
 
-/// The slope of errors that fall by halving steps.
+/// The logarithms to the base 2 of the quotients of successive errors.
 fn slopes(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect()
 }
@@ -140,14 +140,14 @@ fn compositions_have_their_order() {
         (SplittingScheme::STRANG, 80),
         (SplittingScheme::SUZUKI_4, 20),
         (SplittingScheme::KAHAN_LI_6, 20),
-        (SplittingScheme::KAHAN_LI_8, 14),
+        (SplittingScheme::KAHAN_LI_8, 10),
         (SplittingScheme::SOFRONIOU_SPALETTA_10, 6),
     ] {
-        let errors: Vec<f64> = [1, 2, 4].map(|m| distance(&end(&scheme, m * count), &exact)).into();
+        let errors: Vec<f64> = [2, 3, 4].map(|m| distance(&end(&scheme, m * count / 2), &exact)).into();
         println!("{}: {errors:?} {:?}", scheme.name(), slopes(&errors));
         let order = f64::from(scheme.order());
-        // The mean of two slopes is the least-squares slope of three points.
-        let slope = slopes(&errors).iter().sum::<f64>() / 2.0;
+        // Over a factor of two in the number of steps.
+        let slope = slopes(&errors).iter().sum::<f64>();
         assert!((slope - order).abs() < 0.15, "{}: {slope}", scheme.name());
     }
 }
@@ -217,7 +217,12 @@ fn spherical_pendulum_by_both_methods() {
     }
 }
 
-/// The angles of Andrews' squeezing mechanism at t = 0.03 agree with the reference of the test set.
+/// The angles of Andrews' squeezing mechanism at t = 0.03: to 1e-12 those of another method for other equations, and to
+/// ten digits the reference of the test set.
+///
+/// The other values are by the classical Runge-Kutta method with 6000 and 12000 steps and extrapolation, for the equations
+/// of motion in the form of the test set with the constraints differentiated twice. Methods of 4 to 7 stages with 300 to
+/// 1200 steps give them as well, so that the reference itself is off by 1.5e-9.
 #[test]
 fn squeezer_reaches_its_reference() {
     let system = Squeezer::default();
@@ -229,9 +234,20 @@ fn squeezer_reaches_its_reference() {
     let mut motion = ContactLobatto::new(system, system, 5, 0.03 / f64::from(count), &start).unwrap();
     motion.advance(count as usize).unwrap();
     let end = motion.state().q;
+    let extrapolated = SVector::from([
+        15.81077119515395,
+        -15.75637105841233,
+        0.04082224011961796,
+        -0.534730116342106,
+        0.5244099658799553,
+        0.5347301163421186,
+        1.048080741041924,
+    ]);
+    let off = (end - extrapolated).amax();
+    // A shift of the motion by the round-off of t = 0.03 and of 300 steps, at angular velocities of 1400.
+    assert!(off < 1e-12, "{off:e}: {end}");
     let off = (end - SVector::from(Squeezer::REFERENCE)).amax();
-    println!("squeezer: {off:e}");
-    assert!(off < 1e-9, "{off:e}: {end}");
+    assert!(off < 1e-10 * end.amax(), "{off:e}");
     assert!(Constraint::value(&system, &end).amax() < 1e-15);
 }
 
@@ -255,8 +271,12 @@ fn redundant_constraints() {
     // The kinetic energy is that of a unit mass times two, the height 5/2 of it.
     let pendulum = RigidPendulum::<2> { gravity: 1.25, gamma: -0.1 };
     let (q, v) = ([angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]);
-    let one = ConstrainedStart { off_constraint: OffConstraint::Project, ..ConstrainedStart::new(VelocityPoint::new(q, v, 0.0)) };
+    let one = ConstrainedStart {
+        off_constraint: OffConstraint::Project,
+        ..ConstrainedStart::new(VelocityPoint::new(q, v, 0.0))
+    };
     let mut single = DragRattle::new(pendulum, pendulum, &scheme, 0.05, &one).unwrap();
+    let mut largest = 0f64;
     for _ in 0..10 {
         cranks.advance(1).unwrap();
         by_lobatto.advance(1).unwrap();
@@ -273,8 +293,14 @@ fn redundant_constraints() {
         assert!(without.eigenvalues[smallest].abs() < 1e-12);
         let along = without.eigenvectors.column(smallest).dot(&motion.multipliers);
         assert!(along.abs() < 1e-12, "{along:e}");
-        assert!(motion.multipliers.amax() > 0.1);
+        largest = largest.max(motion.multipliers.amax());
+        // p' = L_q + gamma p + G^T lambda, to the round-off of numbers of order one.
+        let x = cranks.velocity_point();
+        let (gradient, mass) = (system.gradient(0.0, &x), system.mass_matrix(0.0, &x));
+        let balance = mass * motion.acceleration - gradient.x - gradient.y * -0.1 - g.transpose() * motion.multipliers;
+        assert!(balance.amax() < 1e-13, "{balance}");
     }
+    assert!(largest > 1e-2, "{largest:e}");
 }
 
 /// Invalid input is refused by name.
@@ -302,7 +328,9 @@ fn invalid_starts_are_refused() {
     let strang = SplittingScheme::STRANG;
     let of = |start: &ConstrainedStart<2>| DragRattle::new(system, system, &strang, 0.1, start).err();
     let off = of(&at([1.1, 0.0], [0.0, 0.0])).unwrap();
-    assert!(matches!(off, ConstraintError::OffConstraint { distance, index: 0, .. } if (distance - 0.0955).abs() < 1e-3));
+    assert!(
+        matches!(off, ConstraintError::OffConstraint { distance, index: 0, .. } if (distance - 0.0955).abs() < 1e-3)
+    );
     assert!(off.to_string().contains("OffConstraint::Project"), "{off}");
     let off = of(&at([1.0, 0.0], [0.1, 0.3])).unwrap();
     assert!(matches!(off, ConstraintError::OffVelocity { distance } if (distance - 0.1).abs() < 1e-12));
@@ -318,7 +346,8 @@ fn invalid_starts_are_refused() {
     let crossing = DragRattle::<_, _, 2, 1>::new(system, Curves(0), &strang, 0.1, &at([0.0, 0.0], [1.0, 1.0])).err();
     assert_eq!(crossing, Some(ConstraintError::RankDeficient { rank: 0, expected: 1 }));
     let least = |start| ConstrainedStart { redundancy: Redundancy::LeastNorm, ..start };
-    let of = |curves, start: &ConstrainedStart<2>| DragRattle::<_, _, 2, 2>::new(system, curves, &strang, 0.1, start).err();
+    let of =
+        |curves, start: &ConstrainedStart<2>| DragRattle::<_, _, 2, 2>::new(system, curves, &strang, 0.1, start).err();
     let touching = of(Curves(0), &least(at([0.0, 0.0], [0.0, 0.0])));
     assert!(matches!(touching, Some(ConstraintError::SingularPosition { rank: 1, .. })), "{touching:?}");
     let apart = of(Curves(1), &least(at([1.0, 0.0], [0.0, 1.0])));

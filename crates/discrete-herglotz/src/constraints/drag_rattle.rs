@@ -4,9 +4,7 @@ use super::start::inverse_mass;
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
-use contact_geom::constraints::{
-    ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion,
-};
+use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
 use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};

@@ -5,9 +5,7 @@ use super::linear_system::LinearSystem;
 use super::lobatto_tables::{LobattoTables, STAGES};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
 use crate::{InputError, StepError, StepFailure, Stepper};
-use contact_geom::constraints::{
-    ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion,
-};
+use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::independent_rows;
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -224,9 +222,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     ) -> Result<LobattoStep<N, T>, StepError> {
         let kept = match self.redundancy {
             Redundancy::Refuse => [true; M],
-            Redundancy::LeastNorm => {
-                independent_rows(&self.constraint.with_jacobian(&from.q.map(|q| q.re())).1)
-            }
+            Redundancy::LeastNorm => independent_rows(&self.constraint.with_jacobian(&from.q.map(|q| q.re())).1),
         };
         for stage in &mut work.stages {
             (stage.v, stage.rho, stage.z) = (guess.map(T::from), T::one(), from.z);
@@ -262,8 +258,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             let stage = &mut work.stages[i];
             stage.q = q;
             let x = VelocityPoint { q, v: stage.v, z: stage.z };
-            (stage.value, stage.gradient) =
-                self.lagrangian.with_gradient(T::from(t + self.tables.c[i] * self.h), &x);
+            (stage.value, stage.gradient) = self.lagrangian.with_gradient(T::from(t + self.tables.c[i] * self.h), &x);
             (stage.c, stage.g) = self.constraint.with_jacobian(&q);
             stage.force = stage.gradient.x * (stage.rho * self.h) + stage.g.transpose() * stage.y;
         }
@@ -275,7 +270,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         let (h, s, stages) = (self.h, work.stages.len(), &work.stages);
         for i in 0..s {
             let stage = &stages[i];
-            let (mut p, mut rho, mut z) = (from.p - stage.gradient.y * stage.rho, T::one() - stage.rho, from.z - stage.z);
+            let (mut p, mut rho, mut z) =
+                (from.p - stage.gradient.y * stage.rho, T::one() - stage.rho, from.z - stage.z);
             for j in 0..s {
                 let (a, a_hat) = (self.tables.a[i][j], self.tables.a_hat[i][j]);
                 p += stages[j].force * T::from(a_hat);

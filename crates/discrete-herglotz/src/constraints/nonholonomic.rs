@@ -14,7 +14,7 @@ use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoi
 ///
 /// `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = mu omega(q1)`, `omega((q0 + q1)/2) (q1 - q0) = 0`,
 ///
-/// here with the momenta `p0 = -(D1 L_d - Y omega(q0))/sigma_d`, `p1 = D2 L_d + Y' omega(q1)`, where Y is determined by
+/// here with the momenta `p0 = -(D1 L_d + Y omega(q0))/sigma_d`, `p1 = D2 L_d + Y' omega(q1)`, where Y is determined by
 /// the discrete constraint and Y' by `omega(q1) v(q1, p1, z1) = 0`.
 ///
 /// The step is symmetric if `L_d` is, and then of order 2; symmetric compositions have the order of their scheme. Facts:
@@ -156,7 +156,7 @@ where
             let jet = self.rules[i].second_jet(t, &DiscretePoint { q0, q1: q0 + u * h, z0 })?;
             self.evaluations += 1;
             let slope = (jet.d12 + p0 * jet.d2z.transpose()) * h;
-            let momenta = jet.first.d1 + p0 * jet.first.sigma() - omega0.transpose() * y;
+            let momenta = jet.first.d1 + p0 * jet.first.sigma() + omega0.transpose() * y;
             let middle = q0 + u * (0.5 * h);
             let (normal, turning) = self.distribution.rates(&middle, &u);
             let rows = turning * (0.5 * h) + self.distribution.omega(&middle);
@@ -164,7 +164,7 @@ where
             for m in 0..N {
                 self.residual[m] = momenta[m];
                 (0..N).for_each(|k| self.system.add(m, k, slope[(m, k)]));
-                (0..M).for_each(|a| self.system.add(m, N + a, -omega0[(a, m)]));
+                (0..M).for_each(|a| self.system.add(m, N + a, omega0[(a, m)]));
             }
             for a in 0..M {
                 self.residual[N + a] = normal[a];

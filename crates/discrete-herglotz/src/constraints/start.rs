@@ -78,7 +78,8 @@ impl<const N: usize> ConstrainedStart<N> {
             check_redundant(constraint, &inverse, &kept, &x.q)?;
         }
         let (c, g) = constraint.with_jacobian(&x.q);
-        let largest = c.iter().enumerate().fold((0, 0.0), |m, (a, c)| if c.abs() > f64::abs(m.1) { (a, *c) } else { m });
+        let largest =
+            c.iter().enumerate().fold((0, 0.0), |m, (a, c)| if c.abs() > f64::abs(m.1) { (a, *c) } else { m });
         // Dependent constraints that contradict the others are not reached by the projection.
         if largest.1.abs() > 1e-9 * (g.amax() * (1.0 + x.q.amax())) {
             return Err(ConstraintError::OffConstraint { distance: f64::INFINITY, index: largest.0, value: largest.1 });
