@@ -303,6 +303,24 @@ fn redundant_constraints() {
     assert!(largest > 1e-2, "{largest:e}");
 }
 
+/// At rest in its equilibrium the pendulum stays there, with the weight as its tension.
+#[test]
+fn pendulum_stays_in_its_equilibrium() {
+    let system = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };
+    let start = ConstrainedStart::new(VelocityPoint::new([0.0, -1.0], [0.0, 0.0], 0.0));
+    let mut rattle = DragRattle::new(system, system, &SplittingScheme::KAHAN_LI_8, 0.1, &start).unwrap();
+    let mut lobatto = ContactLobatto::new(system, system, 3, 0.1, &start).unwrap();
+    rattle.advance(100).unwrap();
+    lobatto.advance(100).unwrap();
+    for (state, tension) in
+        [(rattle.state(), rattle.multipliers().unwrap()), (lobatto.state(), lobatto.multipliers().unwrap())]
+    {
+        // The round-off of a weight of 10 in 100 steps.
+        assert!((state.q - start.at.q).amax().max(state.p.amax()) < 1e-13, "{state:?}");
+        assert!((tension[0] + 0.5 * 9.81).abs() < 1e-13, "{tension}");
+    }
+}
+
 /// Invalid input is refused by name.
 #[test]
 fn invalid_starts_are_refused() {

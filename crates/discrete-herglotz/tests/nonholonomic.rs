@@ -187,3 +187,13 @@ fn velocities_outside_of_the_distribution_are_refused() {
     let motion = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, 0.1, start.at);
     assert_eq!(motion.velocity_point().v[1], 0.0);
 }
+
+/// The sleigh stays at rest.
+#[test]
+fn sleigh_stays_at_rest() {
+    let system = ChaplyginSleigh { mass: 1.0, arm: 0.7, inertia: 0.4, gamma: -0.3 };
+    let start = VelocityPoint::new([0.2, -0.1, 0.4], [0.0; 3], 0.3);
+    let mut motion = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, 0.1, start);
+    motion.advance(20).unwrap();
+    assert_eq!(motion.state().q, start.q);
+}

@@ -149,7 +149,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
             Redundancy::Refuse => [true; M],
             Redundancy::LeastNorm => independent_rows(&g0.map(|e| e.re())),
         };
-        // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's method.
+        // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
+        // method.
         let responses = self.inverse * g0.map(|e| e.re()).transpose();
         let mut corrections = Corrections::new();
         let (mut q, mut c, mut g);

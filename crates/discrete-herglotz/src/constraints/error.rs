@@ -53,8 +53,8 @@ pub enum ConstraintError {
     },
     /// The rank of `c_q` is smaller at the start than near it, or dependent constraints contradict each other.
     #[error(
-        "the constraints are dependent only at the start: near it constraint {index} has the value {value:e} where {rank} \
-         independent ones hold; start at a position at which c_q has its full rank"
+        "the constraints are dependent only at the start: near it constraint {index} has the value {value:e} where \
+         {rank} independent ones hold; start at a position at which c_q has its full rank"
     )]
     SingularPosition {
         /// The rank at the start.

@@ -3,15 +3,15 @@
 use super::drag_rattle::extent;
 use super::linear_system::LinearSystem;
 use super::lobatto_tables::{LobattoTables, STAGES};
-use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
+use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
 use crate::{InputError, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::independent_rows;
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
-/// The contact Lobatto IIIA-IIIB method with s stages, of order `2s - 2`, for any regular Lagrangian on `c(q) = 0`, with
-/// the current state.
+/// The contact Lobatto IIIA-IIIB method with s stages, of order `2s - 2`, for any regular Lagrangian on `c(q) = 0`,
+/// with the current state.
 ///
 /// The motion is symplectified: with `rho' = -rho L_z` and `P = rho p`, `(q, z)` and `(P, -rho)` are canonical
 /// coordinates, in which the motion has the homogeneous Hamiltonian `rho H(t, q, P/rho, z)`. Lobatto IIIA is applied to
@@ -22,8 +22,8 @@ use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoi
 /// `rho_i L_v(Q_i, V_i, Z_i) = p0 + sum a_hat_ij f_j`, `c(Q_i) = 0`,
 /// `rho_1 p1 = p0 + sum b_j f_j`, `G(q1) v(q1, p1, z1) = 0`.
 ///
-/// The map is symplectic and homogeneous of degree one, so it keeps the form `P dq - rho dz = -rho eta`: on `T*N x R` it
-/// is conformally contact with `sigma_d = 1/rho_1`. For `s = 2` it is RATTLE.
+/// The map is symplectic and homogeneous of degree one, so it keeps the form `P dq - rho dz = -rho eta`: on `T*N x R`
+/// it is conformally contact with `sigma_d = 1/rho_1`. For `s = 2` it is RATTLE.
 ///
 /// Reference: Jay, SIAM J. Numer. Anal. 33 (1996) 368-387; Hairer, Lubich and Wanner, Geometric Numerical Integration,
 /// section VII.1.4.
@@ -132,8 +132,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     /// The motion with s stages and steps of the length h from a start.
     ///
     /// # Errors
-    /// [`ConstraintError`]: a start off the constraints, dependent constraints, a number of stages that is not from 2 to
-    /// 8, a step that is 0 or not finite, an applied force, a Lagrangian that is singular at the start, a first step
+    /// [`ConstraintError`]: a start off the constraints, dependent constraints, a number of stages that is not from 2
+    /// to 8, a step that is 0 or not finite, an applied force, a Lagrangian that is singular at the start, a first step
     /// that fails.
     pub fn new(
         lagrangian: L,
@@ -195,8 +195,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         VelocityPoint { q: self.state.q, v: self.velocity, z: self.state.z }
     }
 
-    /// The acceleration and the multipliers of the motion at the current state, from the constrained Herglotz equations;
-    /// the constraint force is `G^T lambda`.
+    /// The acceleration and the multipliers of the motion at the current state, from the constrained Herglotz
+    /// equations; the constraint force is `G^T lambda`.
     ///
     /// # Errors
     /// [`GeometryError::Singular`] where the constraints are dependent.
@@ -238,8 +238,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
                 self.linearise(t, &kept, work)?;
             }
             work.system.solve(&mut work.residual);
-            let (size, scale) = correct(work);
-            progress = corrections.after(size, scale)?;
+            let size = correct(work, extent(&from.q), self.h);
+            progress = corrections.after(size, 1.0)?;
             if progress == Progress::Ended {
                 break;
             }
@@ -407,7 +407,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             v -= change;
             y -= SVector::<T, M>::from_fn(|a, _| work.last_residual[N + a]);
             work.evaluations += 1;
-            if corrections.after(extent(&change), extent(&v))? == Progress::Ended {
+            if corrections.after(extent(&change), velocity_scale(extent(&v), extent(&end.q), h))? == Progress::Ended {
                 break;
             }
         }
@@ -426,28 +426,28 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     }
 }
 
-/// Subtracts the corrections; returns their size and the scale of what they correct.
-fn correct<T: Scalar, const N: usize, const M: usize>(work: &mut Workspace<N, M, T>) -> (f64, f64) {
+/// Subtracts the corrections; returns the largest of those of velocities and factors, relative to their scale.
+fn correct<T: Scalar, const N: usize, const M: usize>(work: &mut Workspace<N, M, T>, position: f64, h: f64) -> f64 {
     let s = work.stages.len();
     let residual = &work.residual;
-    let (mut size, mut scale) = (0.0, 0.0);
+    let (mut of_velocity, mut of_factor, mut velocity) = (0f64, 0f64, 0f64);
     for (i, stage) in work.stages.iter_mut().enumerate() {
         for k in 0..N {
             stage.v[k] -= residual[i * N + k];
+            of_velocity = of_velocity.max(residual[i * N + k].extent());
         }
         stage.rho -= residual[s * N + i];
+        of_factor = of_factor.max(residual[s * N + i].extent());
         stage.z -= residual[s * (N + 1) + i];
         if i + 1 < s {
             for a in 0..M {
                 stage.y[a] -= residual[s * (N + 2) + i * M + a];
             }
         }
-        let changes = &residual[i * N..(i + 1) * N];
-        let change = changes.iter().map(|e| e.extent()).fold(residual[s * N + i].extent(), f64::max);
-        size = f64::max(size, change);
-        scale = f64::max(scale, f64::max(extent(&stage.v), stage.rho.extent()));
+        velocity = velocity.max(extent(&stage.v));
     }
-    (size, scale)
+    // An extent is infinite, not NaN, where a number is NaN.
+    of_factor.max(of_velocity / velocity_scale(velocity, position, h).min(f64::MAX))
 }
 
 /// The derivatives without their differentials.

@@ -18,8 +18,8 @@ pub(super) struct LobattoTables {
 
 impl LobattoTables {
     /// The coefficients for s stages. The inner nodes are the zeros of `P'_(s-1)`. The Lagrange polynomial of node j is
-    /// `sum_k w_j P_k(x_j) P_k / gamma_k` by the discrete orthogonality of Lobatto quadrature, with `gamma_k = 2/(2k+1)`
-    /// and `gamma_(s-1) = 2/(s-1)`, and the integral of `P_k` from -1 is `(P_(k+1) - P_(k-1))/(2k+1)`.
+    /// `sum_k w_j P_k(x_j) P_k / gamma_k` by the discrete orthogonality of Lobatto quadrature, with `gamma_k =
+    /// 2/(2k+1)` and `gamma_(s-1) = 2/(s-1)`, and the integral of `P_k` from -1 is `(P_(k+1) - P_(k-1))/(2k+1)`.
     pub fn new(s: usize) -> Self {
         let n = s - 1;
         let legendre = |x: f64| legendre_polynomials::<f64, POLYNOMIALS>(n + 1, x);

@@ -1,6 +1,7 @@
 //! Motions under constraints: holonomic, `c(q) = 0`, and linear in the velocities, `omega(q) v = 0`.
 //!
-//! - [`DragRattle`]: RATTLE between two halves of a linear drag, for separable Lagrangians; conformally contact with the
+//! - [`DragRattle`]: RATTLE between two halves of a linear drag, for separable Lagrangians; conformally contact with
+//! the
 //!   factor `e^(gamma h)`, explicit but for the multipliers, composed to order 10.
 //! - [`ContactLobatto`]: the partitioned Lobatto IIIA-IIIB method of order 2s - 2 on the symplectified motion, for any
 //!   Lagrangian; conformally contact.
@@ -67,4 +68,11 @@ impl Corrections {
         self.before = size;
         Ok(if slow { Progress::Slow } else { Progress::Continues })
     }
+}
+
+/// The scale to which corrections of velocities are compared: their size, or for smaller ones that which moves a
+/// position by a millionth of it in a step, since the round-off of velocities that are computed from positions is that of
+/// the positions, divided by h.
+fn velocity_scale(velocity: f64, position: f64, h: f64) -> f64 {
+    velocity.max(1e-6 * position / h.abs()).max(f64::MIN_POSITIVE)
 }

@@ -2,22 +2,23 @@
 
 use super::linear_system::LinearSystem;
 use super::start::{inverse_mass, tangent_velocity};
-use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
+use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
 use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{Distribution, DistributionDerivatives};
 use contact_geom::nalgebra::SVector;
 use contact_geom::support::independent_rows;
 use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoint, VelocityPoint};
 
-/// A nonholonomic motion under `omega(q) v = 0` by a symmetric discrete Lagrangian, with the current state. The discrete
-/// Lagrange-d'Alembert-Herglotz equations are
+/// A nonholonomic motion under `omega(q) v = 0` by a symmetric discrete Lagrangian, with the current state. The
+/// discrete Lagrange-d'Alembert-Herglotz equations are
 ///
 /// `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = mu omega(q1)`, `omega((q0 + q1)/2) (q1 - q0) = 0`,
 ///
 /// here with the momenta `p0 = -(D1 L_d + Y omega(q0))/sigma_d`, `p1 = D2 L_d + Y' omega(q1)`, where Y is determined by
 /// the discrete constraint and Y' by `omega(q1) v(q1, p1, z1) = 0`.
 ///
-/// The step is symmetric if `L_d` is, and then of order 2; symmetric compositions have the order of their scheme. Facts:
+/// The step is symmetric if `L_d` is, and then of order 2; symmetric compositions have the order of their scheme.
+/// Facts:
 ///
 /// - the momentum `p . xi` of a constant horizontal symmetry, `omega(q) xi = 0`, is multiplied by `sigma_d` in each
 ///   step, to round-off;
@@ -170,7 +171,7 @@ where
                 self.residual[N + a] = normal[a];
                 (0..N).for_each(|k| self.system.add(N + a, k, rows[(a, k)]));
             }
-            if self.correct(&mut u, &mut y, &mut corrections)? {
+            if self.correct(&mut u, &mut y, &mut corrections, &middle, h)? {
                 break;
             }
         }
@@ -200,7 +201,7 @@ where
                 self.residual[N + a] = normal[a];
                 (0..N).for_each(|k| self.system.add(N + a, k, omega1[(a, k)]));
             }
-            if self.correct(&mut v, &mut y, &mut corrections)? {
+            if self.correct(&mut v, &mut y, &mut corrections, &q1, h)? {
                 break;
             }
         }
@@ -218,6 +219,8 @@ where
         u: &mut SVector<f64, N>,
         y: &mut SVector<f64, M>,
         corrections: &mut Corrections,
+        q: &SVector<f64, N>,
+        h: f64,
     ) -> Result<bool, StepError> {
         self.system.factorise()?;
         self.system.solve(&mut self.residual);
@@ -225,7 +228,7 @@ where
         *u -= change;
         *y -= SVector::<f64, M>::from_fn(|a, _| self.residual[N + a]);
         let size = |x: &SVector<f64, N>| contact_geom::numbers::max_abs_or_nan(x.iter().copied());
-        Ok(corrections.after(size(&change), size(u))? == Progress::Ended)
+        Ok(corrections.after(size(&change), velocity_scale(size(u), size(q), h))? == Progress::Ended)
     }
 }
 

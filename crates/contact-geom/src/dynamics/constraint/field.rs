@@ -19,8 +19,8 @@ pub struct ConstrainedMotion<const N: usize, const M: usize> {
 /// `W a - G^T lambda = L_q + L_z L_v - (L_vq v + L_vz L + L_vt)`, `G a = -c_qq(v, v)`.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion}, systems::constrained::RigidPendulum};
-/// let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
+/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion},
+/// systems::constrained::RigidPendulum}; let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
 /// let x = VelocityPoint::new([0.0, -1.0], [2.0, 0.0], 0.0);
 /// let motion = constrained_motion(&system, &system, 0.0, &x, Redundancy::Refuse)?;
 /// // The tension g + v^2 pulls upward; G = 2 q.
