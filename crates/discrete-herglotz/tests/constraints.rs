@@ -140,7 +140,7 @@ fn compositions_have_their_order() {
         (SplittingScheme::STRANG, 80),
         (SplittingScheme::SUZUKI_4, 20),
         (SplittingScheme::KAHAN_LI_6, 20),
-        (SplittingScheme::KAHAN_LI_8, 10),
+        (SplittingScheme::KAHAN_LI_8, 14),
         (SplittingScheme::SOFRONIOU_SPALETTA_10, 6),
     ] {
         let errors: Vec<f64> = [2, 3, 4].map(|m| distance(&end(&scheme, m * count / 2), &exact)).into();
