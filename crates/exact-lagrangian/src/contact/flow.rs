@@ -90,15 +90,10 @@ pub fn contact_flow<T: Scalar, const N: usize>(
 ) -> Result<ContactMotion<N, T>, ContactFlowError<N>> {
     let from = ChartVector::from(*start);
     let sizes = Rate { field: from, ln_sigma: T::zero() };
-    for (what, finite) in
-        [("time", t0.extent()), ("duration", duration.extent())].map(|(what, size)| (what, size.is_finite()))
-    {
-        if !finite {
-            return Err(ContactFlowError::NonFinite { what });
-        }
-    }
-    if !sizes.is_finite() {
-        return Err(ContactFlowError::NonFinite { what: "start" });
+    let input =
+        [("time", t0.extent().is_finite()), ("duration", duration.extent().is_finite()), ("start", sizes.is_finite())];
+    if let Some((what, _)) = input.into_iter().find(|(_, finite)| !finite) {
+        return Err(ContactFlowError::NonFinite { what });
     }
     let mut first = Rate::at(hamiltonian, t0, &from);
     if !first.is_finite() {

@@ -2,10 +2,13 @@
 
 use super::{Coefficients, assert_order, distance, pullback, random_point, runge_kutta};
 use crate::hamiltonian::splitting::HamiltonianSplitting;
-use crate::hamiltonian::{Kinetic, PieceStepper, PieceSum, PointFlow, PolynomialInAction, Potential, Prolonged};
-use crate::{Integrator, Problem, SplittingScheme, Stepper, StepperOptions};
+use crate::hamiltonian::{
+    Kinetic, PieceStepper, PieceSum, PointFlow, PolynomialInAction, Potential, Prolonged, SeparableSplitting,
+    separable_pieces,
+};
+use crate::{InputError, Integrator, Problem, SplittingScheme, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ContactHamiltonian, OfHamiltonian, PhasePoint, Scalar};
+use contact_geom::{ContactHamiltonian, HamiltonianStructure, OfHamiltonian, PhasePoint, Scalar};
 
 /// Parts in one coordinate.
 #[derive(Clone, Copy, Debug)]
@@ -154,4 +157,46 @@ fn problems_take_a_splitting() {
     let moved = |d: f64| end(PhasePoint { z: 0.2 + d, ..start() });
     let slope = (moved(1e-4).p[0] - moved(-1e-4).p[0]) / 2e-4;
     assert!((jacobian[(1, 2)] - slope).abs() < 1e-7 && slope.abs() > 1e-3, "{slope} {jacobian}");
+}
+
+/// `p^2/2 + p^4/20 - cos(q - sin(t)/5) + z/10 + z^2/20 + mixed p q`, which claims to be separable.
+#[derive(Clone, Copy, Debug)]
+struct Parted {
+    mixed: f64,
+}
+
+impl ContactHamiltonian<1> for Parted {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, p: &SVector<T, 1>, z: T) -> T {
+        let (q, p) = (q[0], p[0]);
+        let parts = p * p * 0.5 + p.powi(4) * 0.05 - (q - t.sin() * 0.2).cos() + z * 0.1 + z * z * 0.05;
+        parts + p * q * self.mixed
+    }
+    fn structure(&self) -> HamiltonianStructure {
+        HamiltonianStructure { separable: true, ..HamiltonianStructure::default() }
+    }
+}
+
+#[test]
+fn the_pieces_of_a_separable_hamiltonian_are_found() {
+    let parted = Parted { mixed: 0.0 };
+    let (exact, _) = runge_kutta(&parted, (0.0, DURATION), &start(), 20_000, false);
+    let hamiltonian = OfHamiltonian(parted);
+    let problem = Problem::new(&hamiltonian, 0.0, start()).unwrap();
+    for scheme in [SplittingScheme::STRANG, SplittingScheme::MCLACHLAN_4, SplittingScheme::KAHAN_LI_6] {
+        let pieces = separable_pieces(&parted, 0.0, &start()).unwrap();
+        let stepper = |h: f64| PieceStepper::new(pieces, &scheme, h, 0.0, start()).unwrap();
+        assert_order(scheme.name(), scheme.order(), (DURATION, &exact), stepper);
+        let options = StepperOptions::default();
+        let mut of_problem = SeparableSplitting { scheme }.stepper(&problem, 0.1, options).unwrap();
+        let mut motion = stepper(0.1);
+        of_problem.advance(7).unwrap();
+        motion.advance(7).unwrap();
+        assert_eq!(of_problem.state(), motion.state());
+    }
+    let mixed = OfHamiltonian(Parted { mixed: 0.1 });
+    let false_claim = Problem::new(&mixed, 0.0, start()).err();
+    assert!(matches!(false_claim, Some(InputError::FalseClaim { claim: "separable", .. })), "{false_claim:?}");
+    let splitting = SeparableSplitting { scheme: SplittingScheme::STRANG };
+    let unclaimed = OfHamiltonian(PieceSum(PIECES));
+    assert!(matches!(splitting.check(&unclaimed), Err(InputError::Hypothesis { .. })));
 }

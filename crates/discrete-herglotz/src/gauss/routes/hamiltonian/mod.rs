@@ -18,7 +18,9 @@ use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::rounding_at_state};
+use contact_geom::{
+    Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, numbers::max_or_nan, support::rounding_at_state,
+};
 use newton::{FullNewton, SimplifiedNewton};
 use pulp::Simd;
 use std::array::from_fn;
@@ -189,7 +191,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
         let state = self.phase_point();
         let x = VelocityPoint { q: state.q, v: SVector::from(self.known), z: state.z };
         let (of_l, of_gradient) = rounding_at_state(self.lagrangian, t, &x, &state);
-        let least = [of_gradient.x.amax(), of_l].map(|once| self.table.h.abs() * once / f64::EPSILON);
+        let least =
+            [max_abs_or_nan(of_gradient.x.iter().copied()), of_l].map(|once| self.table.h.abs() * once / f64::EPSILON);
         let is_usable = least.iter().all(|e| e.is_finite()) && least.iter().any(|e| *e > 0.0);
         if is_usable {
             self.least = least;
