@@ -39,6 +39,26 @@ impl Hints {
         forced: false,
         hamiltonian: false,
     };
+
+    /// What may be relied on for a Lagrangian that is one of several, as in [`lagrangian_enum`](crate::lagrangian_enum).
+    ///
+    /// # Panics
+    /// Where one of them is given by a contact Hamiltonian; at compile time in constants.
+    pub const fn of_any(several: &[Hints]) -> Hints {
+        let mut any = Hints { proved: !several.is_empty(), ..Hints::NONE };
+        let mut i = 0;
+        while i < several.len() {
+            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian } = several[i];
+            assert!(!hamiltonian, "a Lagrangian that is given by a contact Hamiltonian needs a type of its own");
+            any.time_transformation |= time_transformation;
+            any.switching_functions |= switching_functions;
+            any.proved &= proved;
+            any.interpreted |= interpreted;
+            any.forced |= forced;
+            i += 1;
+        }
+        any
+    }
 }
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.

@@ -13,6 +13,7 @@ mod herglotz;
 mod impact;
 mod impact_parameters;
 mod lagrangian;
+mod lagrangian_enum;
 mod law_derivatives;
 pub(crate) mod nearest_name;
 mod parameters;

@@ -1,57 +1,16 @@
 //! Enums of the systems with the same number of coordinates.
 
-/// Defines an enum of systems with the same number of coordinates, which is itself a system. Code that is generic over
-/// systems is then compiled once for all of them.
+/// Defines an enum of systems with the same number of coordinates, which is itself a system.
 macro_rules! systems {
     ($(#[$of:meta])* $name:ident<$n:literal> { $($system:ident: $type:ty,)* }) => {
-        $(#[$of])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum $name {
-            $(#[doc = concat!("[`", stringify!($system), "`].")] $system($type),)*
-        }
-
-        $(impl From<$type> for $name {
-            fn from(system: $type) -> Self {
-                $name::$system(system)
-            }
-        })*
-
-        impl Lagrangian<$n> for $name {
-            #[inline]
-            fn value<T: Scalar>(&self, t: T, q: &SVector<T, $n>, v: &SVector<T, $n>, z: T) -> T {
-                match self { $($name::$system(system) => system.value(t, q, v, z),)* }
-            }
-            #[inline]
-            fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<ChartVector<$n, T>> {
-                match self { $($name::$system(system) => system.closed_gradient(t, x),)* }
-            }
-            #[inline]
-            fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<Hessian<$n, T>> {
-                match self { $($name::$system(system) => system.closed_hessian(t, x),)* }
-            }
-            fn structure(&self) -> Structure {
-                match self { $($name::$system(system) => system.structure(),)* }
+        $crate::lagrangian_enum! {
+            $(#[$of])*
+            #[derive(Clone, Copy, Debug, PartialEq)]
+            pub enum $name<$n> {
+                $(#[doc = concat!("[`", stringify!($system), "`].")] $system($type),)*
             }
         }
-
-        impl $crate::Parametric<$n> for $name {
-            fn parameter_names(&self) -> Vec<String> {
-                match self { $($name::$system(system) => system.parameter_names(),)* }
-            }
-            fn parameters(&self) -> Vec<f64> {
-                match self { $($name::$system(system) => system.parameters(),)* }
-            }
-            fn parameter_count(&self) -> usize {
-                match self { $($name::$system(system) => $crate::Parametric::<$n>::parameter_count(system),)* }
-            }
-            fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
-                match self { $($name::$system(system) => system.with_parameters(theta).map(Self::from),)* }
-            }
-            #[inline]
-            fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, $n>, v: &SVector<T, $n>, z: T) -> T {
-                match self { $($name::$system(system) => system.value_at(theta, t, q, v, z),)* }
-            }
-        }
+        $crate::lagrangian_enum!(parametric $name<$n> { $($system),* });
 
         impl System<$n> for $name {
             fn name(&self) -> &'static str {

@@ -46,9 +46,8 @@ pub use spherical_pendulum::SphericalPendulum;
 pub use uniform_field::UniformField;
 pub use van_der_pol::VanDerPol;
 
-use crate::{ChartVector, Hessian, Lagrangian, Parametric, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::{Parametric, PhasePoint, Scalar, Symmetry, VelocityPoint};
 use as_one::systems;
-use nalgebra::SVector;
 
 /// A system of the catalogue: a regular Lagrangian with initial data, sample points, and its known properties.
 pub trait System<const N: usize>: Parametric<N> {
