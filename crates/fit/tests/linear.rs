@@ -1,11 +1,9 @@
 //! Linear models against the closed solution, for random problems; covariance against linear regression and a Monte
 //! Carlo estimate.
 
-mod noise;
-
+use crate::noise::Noise;
 use herglotz_fit::{Curve, FunctionModel, LeastSquares};
 use nalgebra::{DMatrix, DVector};
-use noise::Noise;
 use proptest::prelude::*;
 
 proptest! {

@@ -1,15 +1,12 @@
 //! Fits of motions: the damped spring of diffsol's book, Jacobians, starts, observables, invalid input.
 
-mod noise;
-mod spring;
-
+use crate::noise::Noise;
+use crate::spring::Spring;
 use contact_geom::systems::{DoublePendulum, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndState, Loss, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Rows, Steps, Until};
 use herglotz_fit::{FitError, FitStatus, LeastSquares, Model, MotionModel, Observed, jacobian_defect};
-use noise::Noise;
-use spring::Spring;
 
 fn parameter(name: &str) -> Variable {
     Variable::Parameter(name.to_owned())
@@ -160,7 +157,7 @@ fn noisy_data() {
 /// Stiffness and mass enter as a ratio where only positions are observed.
 #[test]
 fn an_undetermined_parameter_of_a_motion_is_named() {
-    let spring = spring::Heavy { m: 1.0, k: 1.1 };
+    let spring = crate::spring::Heavy { m: 1.0, k: 1.1 };
     let model = MotionModel::new(&spring, 0.0, at_rest(1.0), &[parameter("m"), parameter("k")], 0.4).unwrap();
     let model = model.observe(Observed::Position(0), &times(30, 9.0)).unwrap();
     let data: Vec<f64> = times(30, 9.0).iter().map(|t| t.cos()).collect();

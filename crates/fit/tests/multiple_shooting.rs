@@ -1,14 +1,11 @@
 //! Multiple shooting: the same fit as with one piece, and fits that one piece does not find.
 
-mod noise;
-mod spring;
-
+use crate::noise::Noise;
+use crate::spring::Spring;
 use contact_geom::VelocityPoint;
 use contact_geom::systems::DoublePendulum;
 use discrete_herglotz::sensitivity::Variable;
 use herglotz_fit::{FitError, LeastSquares, Loss, Model, MotionModel, Observed};
-use noise::Noise;
-use spring::Spring;
 
 fn parameter(name: &str) -> Variable {
     Variable::Parameter(name.to_owned())

@@ -1,10 +1,8 @@
 //! Robust losses: outliers, the conditions of the minimum, and the covariance.
 
-mod noise;
-
+use crate::noise::Noise;
 use herglotz_fit::{Curve, LeastSquares, Loss, Model};
 use nalgebra::DMatrix;
-use noise::Noise;
 
 fn points(count: usize) -> Vec<f64> {
     (0..count).map(|i| 4.0 * i as f64 / count as f64).collect()

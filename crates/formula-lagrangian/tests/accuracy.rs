@@ -1,8 +1,6 @@
 //! Motions whose parts require steps of very different lengths, or that start from a vanishing force: runs with a
 //! required accuracy, compared with closed-form solutions.
 
-#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
-
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{InputError, Interrupt, Outcome, Problem, Until};
 use formula_lagrangian::Formula;

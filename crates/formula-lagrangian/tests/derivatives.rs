@@ -1,13 +1,9 @@
 //! Derivatives where a slope is infinite, or is NaN in a branch that is not taken.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
-mod random;
-
+use crate::random::Random;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint};
 use formula_lagrangian::Formula;
-use random::Random;
 
 /// The potential, its first and its second derivative at x, from the formula. Dual numbers over the first derivative
 /// must give the same second derivative, or NaN, since they see the powers of a root at 0 one by one.

@@ -1,7 +1,5 @@
 //! Forces of formulas, in the text of L and by a program.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
     Dual, Force, ForceStructure, Forced, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, herglotz_field,

@@ -1,7 +1,5 @@
 //! Dry friction: stick and slip by resets.
 
-#![allow(missing_docs, clippy::unwrap_used)]
-
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, Problem, Resets, Status, Steps, Until};
 use formula_lagrangian::{Direction, Formula, Reset};

@@ -1,7 +1,5 @@
 //! Impacts of formulas, and the state where resets accumulate.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
 use contact_geom::{Lagrangian, Scalar, VelocityPoint};

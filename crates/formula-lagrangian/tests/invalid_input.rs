@@ -1,12 +1,8 @@
 //! Random texts, and random changes of valid texts: each gives a value or an error, and never panics.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
-mod random;
-
+use crate::random::Random;
 use contact_geom::{Lagrangian, VelocityPoint};
 use formula_lagrangian::{Direction, Formula, Reset};
-use random::Random;
 
 const WORDS: [&str; 51] = [
     "x",

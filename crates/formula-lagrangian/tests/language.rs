@@ -1,7 +1,5 @@
 //! The values of valid texts, and the errors of invalid ones.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use formula_lagrangian::{Formula, FormulaError, ParseError};
 
 /// The value of a text over x, y with parameter a = 3, at x = 2, y = -1, x' = 0.5, y' = 4, z = 7, t = 0.25.

@@ -1,16 +1,12 @@
 //! Derivatives of formulas with respect to their parameters.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
-mod random;
-
+use crate::random::Random;
 use contact_geom::nalgebra::SVector;
 use contact_geom::table::{Interpolation, Table};
 use contact_geom::{Dual, Forced, Lagrangian, Parametric, VelocityDrag, VelocityPoint, systems::Pendulum};
 use discrete_herglotz::sensitivity::{EndCovector, Gradient, LossGradient};
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
-use random::Random;
 
 type Along = Dual<f64, SVector<f64, 1>>;
 

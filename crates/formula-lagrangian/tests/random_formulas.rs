@@ -1,12 +1,8 @@
 //! Random formulas: derivatives compared with dual numbers, and proved properties with numerical checks.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
-mod random;
-
+use crate::random::Random;
 use contact_geom::VelocityPoint;
 use formula_lagrangian::{Formula, FormulaLagrangian};
-use random::Random;
 
 impl Random {
     fn number(&mut self) -> f64 {

@@ -1,7 +1,5 @@
 //! Resets of the state of formulas.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::table::{Interpolation, Table};
 use contact_geom::{Lagrangian, Symmetry, VelocityPoint, switching::Control};
 use formula_lagrangian::{

@@ -1,7 +1,5 @@
 //! Proved properties of formulas.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, OneParameterGroup, Symmetry, VelocityPoint};
 use discrete_herglotz::{Problem, Steps, Until};

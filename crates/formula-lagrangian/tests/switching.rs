@@ -1,7 +1,5 @@
 //! Kinks and jumps of formulas: steps end on them, so that accuracy is maintained across them.
 
-#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
-
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, Outcome, Problem, Status, Steps, Until};
 use formula_lagrangian::Formula;

@@ -1,7 +1,5 @@
 //! Formulas that are built by a program are equal to those of the same text.
 
-#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
-
 use contact_geom::{Derivatives, VelocityPoint};
 use formula_lagrangian::{Formula, FormulaError, Symbols};
 

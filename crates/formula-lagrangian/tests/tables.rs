@@ -1,7 +1,5 @@
 //! Tables in formulas, and the times of kinks and jumps.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
     Derivatives, ForceStructure, Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives,

@@ -1,7 +1,5 @@
 //! Rust source of formulas, which is compiled here and compared bitwise with the formulas.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
-
 use contact_geom::{Derivatives, Dual, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 

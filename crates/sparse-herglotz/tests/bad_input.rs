@@ -1,8 +1,5 @@
 //! Invalid input is a typed error that contains the element or the unknown; a failure during the motion is a status.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use discrete_herglotz::{InputError, SplittingScheme, StepError};
 use sparse_herglotz::systems::{FputBond, Gravitation, OuterSolarSystem, SineGordon, Spring, fput_chain, lattice};
 use sparse_herglotz::{Difference, FIXED, SparseError, SparseMidpoint, SparseSplitting, SparseSystem, State};

@@ -1,8 +1,5 @@
 //! Results are bitwise equal for any number of threads, and for any number of steps taken at once.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use discrete_herglotz::SplittingScheme;
 use sparse_herglotz::systems::{SineGordon, lattice};
 use sparse_herglotz::{SparseSplitting, SparseSystem, State};

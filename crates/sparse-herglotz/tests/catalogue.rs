@@ -1,8 +1,5 @@
 //! Systems of the catalogue compared with closed-form solutions.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use discrete_herglotz::SplittingScheme;
 use sparse_herglotz::systems::{Mesh, OuterSolarSystem, cloth, consistent_membrane, membrane};
 use sparse_herglotz::{SparseError, SparseGauss, SparseMidpoint, SparseSplitting, State};

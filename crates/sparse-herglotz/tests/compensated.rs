@@ -1,9 +1,6 @@
 //! Compensated sums give the same motion to round-off, with smaller round-off. The system of bodies agrees with that of
 //! the library for small systems.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, VelocityPoint, check_closed_derivatives};

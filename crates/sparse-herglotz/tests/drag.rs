@@ -1,9 +1,6 @@
 //! A drag whose rate is periodic in time: the maps agree with those of the library for small systems, `sigma_d` is
 //! correct, and the order is not reduced.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{

@@ -1,8 +1,5 @@
 //! Steps that do not resolve the motion are flagged, and steps that do are not.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{SplittingScheme, UnresolvedStep};

@@ -1,8 +1,5 @@
 //! Friction of the unknowns of a sparse system: compared with the splitting of small systems, and what refuses it.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends};
 use contact_geom::{Forced, PhasePoint, VelocityDrag};

@@ -1,9 +1,6 @@
 //! Contact Gauss collocation of sparse systems: agreement with the library for small systems, orders, momenta, and
 //! the input that is rejected.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{

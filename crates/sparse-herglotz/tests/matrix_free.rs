@@ -1,7 +1,5 @@
 //! Midpoint steps by conjugate gradients, without forming the matrix, agree with those by matrix factors.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::StepError;

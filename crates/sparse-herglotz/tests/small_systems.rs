@@ -1,9 +1,6 @@
 //! Sparse systems of few unknowns compared with the library for small systems, for every splitting scheme and the
 //! midpoint rule.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};

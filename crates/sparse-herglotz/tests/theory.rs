@@ -1,9 +1,6 @@
 //! Theoretical properties of the flows of sparse systems: orders, conformal factors, decay of the momenta and of the
 //! energy.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
