@@ -3,7 +3,7 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
 use crate::{Ensemble, GaussCollocation, SplittingScheme, Steps, Until};
 use contact_geom::Lagrangian;
-use contact_geom::systems::{Kepler, Pendulum};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -92,7 +92,7 @@ fn ends<const N: usize>(
 /// lanes.
 #[test]
 fn members_in_all_widths_are_the_same() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let pendula = |i: usize| VelocityPoint::new([0.03 * i as f64], [1.0 - 0.02 * i as f64], 0.1);
     let orbits = |i: usize| VelocityPoint::new([1.0 + 0.003 * i as f64, 0.0], [0.1, 1.0], 0.0);
     let kepler = Kepler::<2>::default();

@@ -3,7 +3,7 @@
 use super::*;
 use crate::gauss::Gauss;
 use crate::{DiscreteLagrangian, DiscreteStep, solve::Solver};
-use contact_geom::systems::QuadraticInZ;
+use contact_geom::systems::{OneCoordinate, QuadraticInZ};
 use contact_geom::{Scalar, Structure};
 use pulp::Arch;
 
@@ -109,7 +109,7 @@ fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
 fn actions_that_follow_spare_iterations_and_change_nothing() {
     let (steps, start) = (100, PhasePoint::new([1.0], [0.5], 0.8));
     for (stages, h) in [(4, 0.1), (8, 0.5), (8, 1.0), (16, 0.5), (16, 1.0)] {
-        let system = QuadraticInZ::default();
+        let system = OneCoordinate::from(QuadraticInZ::default());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let [(with, a), (without, b)] = [true, false].map(|follows| {
             let mut run =

@@ -74,7 +74,7 @@ fn long_motions_take_more_stages() {
 /// are taken.
 #[test]
 fn steps_that_cost_less_are_taken() {
-    let system = QuadraticInZ { c: -0.05 };
+    let system = OneCoordinate::from(QuadraticInZ { c: -0.05 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 1.0)).unwrap();
     let (_, count, _) = search(&problem, 100.0, None, 1e-3);
     let newton_steps = |count: usize| {

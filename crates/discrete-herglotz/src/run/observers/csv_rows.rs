@@ -8,9 +8,9 @@ use std::ops::ControlFlow;
 /// Writes rows as CSV during the run, without keeping them: a header, then the numbers of each row with all digits.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_geom::{VelocityPoint, systems::{OneCoordinate, Pendulum}};
 /// use discrete_herglotz::{CsvRows, GaussCollocation, Problem, Rows, Steps, Until};
-/// let pendulum = Pendulum { gamma: -0.1 };
+/// let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
 /// let mut csv = CsvRows::new(Rows::every(10)?.with_energy(), std::io::stdout());
 /// problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut csv).run(Until::Time(10.0))?;
@@ -76,10 +76,10 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
 mod tests {
     use super::*;
     use crate::{GaussCollocation, Problem, Status, Steps, Until};
-    use contact_geom::{VelocityPoint, systems::Pendulum};
+    use contact_geom::{VelocityPoint, systems::{OneCoordinate, Pendulum}};
 
     fn run(observer: &mut impl Observer<1>) -> Status {
-        let pendulum = Pendulum { gamma: -0.1 };
+        let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).observe(observer);
         run.run(Until::Time(2.0)).unwrap().status

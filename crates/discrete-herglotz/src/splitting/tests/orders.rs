@@ -3,7 +3,7 @@
 use super::{ActionSplitting, Curved, Inertia, Outcome, SCHEMES, Splitting, Tides, distance, run};
 use crate::rules::{Composition, Midpoint};
 use crate::{InputError, SplittingScheme, Stepper};
-use contact_geom::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
+use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The time after which errors are measured.
@@ -54,7 +54,7 @@ fn gentle() -> impl Iterator<Item = &'static SplittingScheme> {
 
 #[test]
 fn linear_drag_has_the_schemes_order() -> Outcome {
-    let (pendulum, forced) = (Pendulum { gamma: -0.1 }, Duffing::forced());
+    let [pendulum, forced] = [OneCoordinate::from(Pendulum { gamma: -0.1 }), Duffing::forced().into()];
     let (one, two) = (PhasePoint::new([1.0], [1.0], 0.2), PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2));
     assert_orders("pendulum", gentle(), by_midpoint(&pendulum, one)?, |scheme, h| {
         Ok(Splitting::new(&pendulum, scheme, h, 0.0, one)?.compensated())
@@ -82,7 +82,7 @@ fn all_orders_show_on_half_a_kepler_orbit() -> Outcome {
 #[test]
 fn nonlinear_drag_has_the_schemes_order() -> Outcome {
     let compositions = || gentle().filter(|s| !s.is_nystrom());
-    let (quadratic, start) = (QuadraticInZ { c: 0.4 }, PhasePoint::new([1.0], [1.0], 0.5));
+    let (quadratic, start) = (OneCoordinate::from(QuadraticInZ { c: 0.4 }), PhasePoint::new([1.0], [1.0], 0.5));
     assert_orders("quadratic", compositions(), by_midpoint(&quadratic, start)?, |scheme, h| {
         Ok(ActionSplitting::new(&quadratic, scheme, h, 0.0, start)?.compensated())
     })?;
