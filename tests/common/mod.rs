@@ -7,7 +7,8 @@ pub mod lagrangians;
 pub mod oracle;
 
 use contact_geom::systems::{
-    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, QuadraticInZ, SystemVisitor,
+    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, QuadraticInZ, SystemVisitor,
+    TwoCoordinates,
 };
 use contact_geom::{
     ChartVector, DiscretePoint, PhasePoint, VelocityPoint,
@@ -80,10 +81,10 @@ pub fn relative_distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> 
 /// Visits one system of each kind of structure, for tests of integrators, which take long to compile: linear,
 /// separable, time dependent, nonlinear in z, with a mass matrix that depends on q, and on q, v and z.
 pub fn visit_kinds(visitor: &mut impl SystemVisitor) {
-    visitor.visit(&HarmonicOscillator::default());
+    visitor.visit(&OneCoordinate::from(HarmonicOscillator::default()));
     visitor.visit(&Kepler::<2>::default());
-    visitor.visit(&Duffing::forced());
-    visitor.visit(&QuadraticInZ::default());
-    visitor.visit(&DoublePendulum::default());
-    visitor.visit(&CoupledPlane::default());
+    visitor.visit(&OneCoordinate::from(Duffing::forced()));
+    visitor.visit(&OneCoordinate::from(QuadraticInZ::default()));
+    visitor.visit(&TwoCoordinates::from(DoublePendulum::default()));
+    visitor.visit(&TwoCoordinates::from(CoupledPlane::default()));
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{around, on_random, step_from};
 use crate::table::discretise;
-use contact_geom::systems::{Chain, Pendulum, System, SystemVisitor, visit_catalogue};
+use contact_geom::systems::{Chain, OneCoordinate, Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, DiscretePoint, PhasePoint, Scalar, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},
@@ -78,7 +78,7 @@ fn forward_and_backward() {
 fn small_steps_keep_their_digits() {
     for exponent in 1..=5 {
         let steps = 10usize.pow(exponent);
-        let ld = Midpoint::new(Pendulum::default(), 1.0 / steps as f64).unwrap();
+        let ld = Midpoint::new(OneCoordinate::from(Pendulum::default()), 1.0 / steps as f64).unwrap();
         let start = PhasePoint::new([1.0], [0.5], 0.2);
         let mut flow = Flow::new(&ld, 0.0, start).unwrap();
         assert_eq!(flow.advance(steps), Ok(()));
@@ -116,7 +116,7 @@ fn a_large_chain() {
 /// A run records the requested rows, and can be stopped and continued.
 #[test]
 fn records() {
-    let pendulum = Pendulum::default();
+    let pendulum = OneCoordinate::from(Pendulum::default());
     let problem = Problem::new(&pendulum, 2.0, PhasePoint::new([1.0], [0.5], 0.2)).unwrap();
     let by_rule = AnyIntegrator::Discrete(Method::LeftMidpoint);
     let counter = |at: &StepView<'_, 1>| match at.k {

@@ -3,7 +3,7 @@
 
 use crate::common::lagrangians::LogarithmicWall;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{CoupledInZ, HarmonicOscillator, Pendulum, System};
+use contact_geom::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate, Pendulum, System};
 use exact_lagrangian::{
     ExactError,
     principle::{Curve, MotionCurve, SplineCurve, VariedCurve, action, action_derivative},
@@ -14,7 +14,7 @@ use std::cell::Cell;
 /// error with step d, extrapolated once, is d^4 and eps/d.
 #[test]
 fn the_derivative_is_that_of_the_action() {
-    let (system, span, d) = (CoupledInZ::default(), (0.3, 1.2), 1e-3);
+    let (system, span, d) = (OneCoordinate::from(CoupledInZ::default()), (0.3, 1.2), 1e-3);
     let curve = |s: f64| (SVector::from([(1.3 * s).sin()]), SVector::from([1.3 * (1.3 * s).cos()]));
     let variation = |s: f64| (SVector::from([s * s + 0.2]), SVector::from([2.0 * s]));
     let at = |by: f64| action(&system, &VariedCurve { curve: &curve, variation: &variation, by }, span, 0.4);
@@ -33,7 +33,7 @@ fn the_derivative_is_that_of_the_action() {
 /// the curve.
 #[test]
 fn splines_through_nodes() {
-    let (system, duration) = (Pendulum { gamma: -0.3 }, 2.0);
+    let (system, duration) = (OneCoordinate::from(Pendulum { gamma: -0.3 }), 2.0);
     let start = system.initial();
     let motion = MotionCurve { lagrangian: &system, t0: 0.0, start };
     let truth = action(&system, &motion, (0.0, duration), start.z).map_or(f64::NAN, |a| a.z);
@@ -56,7 +56,7 @@ fn splines_through_nodes() {
 fn the_growth_of_dz_along_a_curve_at_rest() {
     let rest = |_: f64| (SVector::<f64, 1>::zeros(), SVector::<f64, 1>::zeros());
     for gamma in [-5.0f64, -1.0, 2.0] {
-        let system = HarmonicOscillator { gamma };
+        let system = OneCoordinate::from(HarmonicOscillator { gamma });
         let growth = action_derivative(&system, &rest, &rest, (0.0, 1.0), (0.0, 1.0)).unwrap_or(f64::NAN);
         assert!((growth / gamma.exp() - 1.0).abs() < 1e-14, "gamma = {gamma}: {growth}");
     }
@@ -102,7 +102,7 @@ fn a_spline_breaks_at_its_nodes() {
     assert_eq!(spline.breaks(), times);
     assert_eq!(VariedCurve { curve: &spline, variation: &still, by: 1.0 }.breaks(), times);
     // In both directions by few evaluations: no panel contains a break.
-    let system = Pendulum { gamma: -0.3 };
+    let system = OneCoordinate::from(Pendulum { gamma: -0.3 });
     for duration in [-1.0, 1.0] {
         let counted = Counted { curve: &spline, count: Cell::new(0) };
         let whole = action(&system, &counted, (0.0, duration), 0.4).map_or(f64::NAN, |a| a.z);

@@ -1,6 +1,6 @@
 //! Statements 25 and 26 (section 3.2): the momentum along a run, and a group that is no symmetry.
 
-use contact_geom::systems::{Kepler, SphericalPendulum, System};
+use contact_geom::systems::{Kepler, SphericalPendulum, System, TwoCoordinates};
 use contact_geom::{DiscretePoint, numbers::max_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, MomentumDecay, Problem, Status, Steps, Until,
@@ -36,7 +36,7 @@ fn along_a_run() {
         }
     }
     run(&Kepler::<3>::default(), 0.02);
-    run(&SphericalPendulum::default(), 0.02);
+    run(&TwoCoordinates::from(SphericalPendulum::default()), 0.02);
 }
 
 /// A group that is no symmetry of L is no symmetry of L_d.

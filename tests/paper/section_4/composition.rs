@@ -4,7 +4,7 @@
 use crate::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{CoupledInZ, System, visit_catalogue};
+use contact_geom::systems::{CoupledInZ, OneCoordinate, System, visit_catalogue};
 use exact_lagrangian::{ExactError, ExactLagrangian, compose, statements, through};
 
 /// Along random motions of every system, with unequal steps.
@@ -28,7 +28,7 @@ fn on_every_system() {
 /// The slope of a composition is the derivative of its value, by central differences, extrapolated once.
 #[test]
 fn the_slope_is_that_of_the_value() {
-    let system = CoupledInZ::default();
+    let system = OneCoordinate::from(CoupledInZ::default());
     let [a, b] = [0.3, 0.4].map(|h| ExactLagrangian::<_, 1>::new(&system, h).unwrap());
     let ends = [SVector::from([0.3]), SVector::from([0.9])];
     let at = |q1: f64| through(&a, &b, 0.1, (&ends, 0.4), &SVector::from([q1]));

@@ -2,7 +2,7 @@
 //! = e^b` against differences, under strong damping, for short steps, and where the momentum depends on time.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, QuadraticInZ, System};
+use contact_geom::systems::{DoublePendulum, HarmonicOscillator, OneCoordinate, QuadraticInZ, System, TwoCoordinates};
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, Parametric, Scalar, VelocityPoint, legendre, numbers::MaxAbsOrNan,
 };
@@ -40,8 +40,12 @@ fn by_differences<const N: usize>(system: &impl System<N>, x: &VelocityPoint<N>,
 fn against_differences() {
     for h in [0.1, 0.5] {
         let residuals = [
-            by_differences(&DoublePendulum::default(), &VelocityPoint::new([0.7, -0.4], [0.5, 0.9], 0.3), h),
-            by_differences(&QuadraticInZ { c: 1.0 }, &VelocityPoint::new([0.7], [0.5], 0.3), h),
+            by_differences(
+                &TwoCoordinates::from(DoublePendulum::default()),
+                &VelocityPoint::new([0.7, -0.4], [0.5, 0.9], 0.3),
+                h,
+            ),
+            by_differences(&OneCoordinate::from(QuadraticInZ { c: 1.0 }), &VelocityPoint::new([0.7], [0.5], 0.3), h),
         ];
         assert!(residuals.iter().all(|r| *r < 1e-9), "h = {h}: {residuals:?}");
     }
@@ -50,8 +54,8 @@ fn against_differences() {
 /// sigma_d keeps its relative accuracy at `e^-50`, where `1 + Dz L_d` has lost all digits.
 #[test]
 fn sigma_under_strong_damping() {
-    let exp = ContactExponential::new(HarmonicOscillator { gamma: -50.0 }, 1.0).unwrap();
-    let ld = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: -50.0 }, 1.0).unwrap();
+    let exp = ContactExponential::new(OneCoordinate::from(HarmonicOscillator { gamma: -50.0 }), 1.0).unwrap();
+    let ld = ExactLagrangian::<_, 1>::new(OneCoordinate::from(HarmonicOscillator { gamma: -50.0 }), 1.0).unwrap();
     let y = exp.at(0.0, &VelocityPoint::new([0.4], [1.2], 0.3));
     let sigma = y.ok().and_then(|y| ld.jet(0.0, &y).ok()).map_or(f64::NAN, |jet| jet.sigma());
     // The rounding of b = -50 changes e^b by 32 units in the last place.
@@ -120,7 +124,7 @@ fn forward_and_backward() {
 #[test]
 fn dz_of_a_short_step() {
     for h in [1e-3, 1e-5, 1e-7] {
-        let ld = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: -0.3 }, h).unwrap();
+        let ld = ExactLagrangian::<_, 1>::new(OneCoordinate::from(HarmonicOscillator { gamma: -0.3 }), h).unwrap();
         let dz = ld.jet(0.0, &DiscretePoint::new([0.4], [0.4 + 1.2 * h], 0.3)).map_or(f64::NAN, |jet| jet.dz);
         let truth = (-0.3 * h).exp_m1();
         assert!((dz / truth - 1.0).abs() < 1e-14, "h = {h}: {dz:e} for {truth:e}");

@@ -2,7 +2,7 @@
 //! branches beyond them.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{ChargedParticle, HarmonicOscillator, Pendulum};
+use contact_geom::systems::{ChargedParticle, HarmonicOscillator, OneCoordinate, Pendulum, TwoCoordinates};
 use contact_geom::{Lagrangian, Scalar, VelocityPoint, numbers::MaxAbsOrNan};
 use exact_lagrangian::{ContactExponential, ExactError};
 
@@ -11,7 +11,7 @@ use exact_lagrangian::{ContactExponential, ExactError};
 fn conjugate_points_of_the_oscillator() {
     for gamma in [0.0f64, -0.1, -1.0] {
         let w = (1.0 - gamma * gamma / 4.0).sqrt();
-        let exp = ContactExponential::new(HarmonicOscillator { gamma }, 10.0).unwrap();
+        let exp = ContactExponential::new(OneCoordinate::from(HarmonicOscillator { gamma }), 10.0).unwrap();
         let x = VelocityPoint::new([0.4], [1.2], 0.0);
         let found = exp.conjugate_points(0.0, &x).unwrap_or_default();
         assert_eq!(found.len(), (10.0 * w / std::f64::consts::PI) as usize);
@@ -28,7 +28,7 @@ fn conjugate_points_of_the_oscillator() {
 /// value. Shortly before and after the conjugate time there is one.
 #[test]
 fn no_retraction_at_a_conjugate_point() {
-    let system = HarmonicOscillator { gamma: 0.0 };
+    let system = OneCoordinate::from(HarmonicOscillator { gamma: 0.0 });
     let x = VelocityPoint::new([0.4], [1.2], 0.0);
     let refused = |h: f64, off: f64| {
         let exp = ContactExponential::new(system, h).map_err(ExactError::from)?;
@@ -53,7 +53,7 @@ fn no_retraction_at_a_conjugate_point() {
 /// Beyond a conjugate point several motions join two points; different guesses find them, and each joins the points.
 #[test]
 fn branches() {
-    let pendulum = Pendulum { gamma: -0.05 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
     let exp = ContactExponential::new(pendulum, 8.0).unwrap();
     let y = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let guesses: Vec<_> = (-8..=8).map(|k| [0.24 * f64::from(k)].into()).collect();
@@ -82,7 +82,7 @@ fn the_slope_of_a_motion_at_rest() {
     for gamma in [0.0f64, -0.4] {
         for h in [0.1, 1.0, 2.5] {
             let w = (1.0 - gamma * gamma / 4.0).sqrt();
-            let slope = ContactExponential::new(HarmonicOscillator { gamma }, h)
+            let slope = ContactExponential::new(OneCoordinate::from(HarmonicOscillator { gamma }), h)
                 .ok()
                 .and_then(|exp| exp.differential(0.0, &VelocityPoint::new([0.0], [0.0], 0.0)).ok())
                 .map_or(f64::NAN, |d| d.v[(0, 0)]);
@@ -95,7 +95,7 @@ fn the_slope_of_a_motion_at_rest() {
 /// No two branches are the same motion.
 #[test]
 fn branches_are_different() {
-    let pendulum = Pendulum { gamma: -0.05 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
     let exp = ContactExponential::new(pendulum, 8.0).unwrap();
     let y = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let guesses: Vec<_> = (-8..=8).map(|k| [0.24 * f64::from(k)].into()).collect();
@@ -112,7 +112,7 @@ fn branches_are_different() {
 #[test]
 fn double_conjugate_points() {
     let particle = ChargedParticle::default();
-    let exp = ContactExponential::new(particle, 8.0).unwrap();
+    let exp = ContactExponential::new(TwoCoordinates::from(particle), 8.0).unwrap();
     let found = exp.conjugate_points(0.0, &VelocityPoint::new([0.4, 0.1], [1.2, 0.3], 0.0)).unwrap_or_default();
     // dq1/dv0 is a complex number times sin(w h).
     let ChargedParticle { b, k, gamma } = particle;

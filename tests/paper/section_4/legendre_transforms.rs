@@ -2,7 +2,7 @@
 
 use crate::section_5::free_particle::Printed;
 use contact_geom::DiscretePoint;
-use contact_geom::systems::FreeParticle;
+use contact_geom::systems::{FreeParticle, OneCoordinate};
 use discrete_herglotz::{
     StepError,
     theory::{legendre_minus, legendre_plus},
@@ -14,7 +14,7 @@ use exact_lagrangian::ExactLagrangian;
 #[test]
 fn the_printed_formula_violates_it() {
     let (gamma, h) = (-0.3f64, 0.5);
-    let (system, x) = (FreeParticle { gamma }, DiscretePoint::new([0.2], [1.0], 0.7));
+    let (system, x) = (OneCoordinate::from(FreeParticle { gamma }), DiscretePoint::new([0.2], [1.0], 0.7));
     let exact = ExactLagrangian::<_, 1>::new(system, h).unwrap();
     let motion = exact.retract(0.0, &x).unwrap();
     let at = |ld: &dyn Fn() -> [Result<f64, StepError>; 3]| ld().map(|r| r.unwrap_or(f64::NAN));

@@ -2,13 +2,13 @@
 //! map at a conjugate point.
 
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{CoupledInZ, HarmonicOscillator};
+use contact_geom::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate};
 use exact_lagrangian::principle::{ExtendedPoint, NonHolonomic};
 
 /// Off `M_L` the flow of Chetaev's equations keeps the constraint function `Phi` constant, and the defect measures it.
 #[test]
 fn off_the_constraint() {
-    let system = CoupledInZ::default();
+    let system = OneCoordinate::from(CoupledInZ::default());
     let chetaev = NonHolonomic::new(&system);
     let x = VelocityPoint::new([0.3], [0.6], 0.2);
     let on = chetaev.lift(0.1, &x);
@@ -29,7 +29,7 @@ fn off_the_constraint() {
 /// elsewhere.
 #[test]
 fn at_a_conjugate_point() {
-    let system = NonHolonomic::new(HarmonicOscillator { gamma: 0.0 });
+    let system = NonHolonomic::new(OneCoordinate::from(HarmonicOscillator { gamma: 0.0 }));
     let x = VelocityPoint::new([0.3], [1.1], 0.2);
     let rank = |h: f64| system.exponential_differential(0.0, &x, h).map_or(f64::NAN, |d| d.singular_values().min());
     assert!(rank(std::f64::consts::PI) < 1e-15 && rank(3.0) > 0.1);

@@ -3,7 +3,7 @@
 
 use crate::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
+use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, System, visit_catalogue};
 use contact_geom::{
     DiscretePoint, Lagrangian, Scalar, Statement, VelocityPoint,
     numbers::{MaxAbsOrNan, MaxOrNan},
@@ -43,7 +43,7 @@ fn without_a_guess() {
 /// units of the condition stays at round-off while the condition grows like 1/h.
 #[test]
 fn the_loss_at_small_steps_is_the_condition() {
-    let (system, x) = (Pendulum::default(), VelocityPoint::new([1.0], [0.7], 0.1));
+    let (system, x) = (OneCoordinate::from(Pendulum::default()), VelocityPoint::new([1.0], [0.7], 0.1));
     for k in 0..=8 {
         let h = 10f64.powi(-k);
         let condition = statements::condition(&system, 0.0, &x, h).unwrap_or(f64::NAN);
@@ -59,7 +59,8 @@ fn the_loss_at_small_steps_is_the_condition() {
 #[test]
 fn routes() {
     let route = |h: f64, q: f64, v: f64| {
-        let exp = ContactExponential::new(HarmonicOscillator { gamma: 0.0 }, h).map_err(ExactError::from)?;
+        let exp = ContactExponential::new(OneCoordinate::from(HarmonicOscillator { gamma: 0.0 }), h)
+            .map_err(ExactError::from)?;
         let found = exp.retract(0.0, &exp.at(0.0, &VelocityPoint::new([q], [v], 0.0))?)?;
         Ok::<_, ExactError<1>>((found.route, found.conjugate.is_some()))
     };
@@ -68,7 +69,7 @@ fn routes() {
     assert_eq!(route(3.2, 1.0, 0.0), Ok((RetractionRoute::Continuation, true)));
     // Under strong damping the iteration with both ends given does not contract, and Newton's method converges.
     for gamma in [-50.0, -20.0, 5.0] {
-        let exp = ContactExponential::new(HarmonicOscillator { gamma }, 1.0).unwrap();
+        let exp = ContactExponential::new(OneCoordinate::from(HarmonicOscillator { gamma }), 1.0).unwrap();
         let x = VelocityPoint::new([0.4], [1.2], 0.3);
         let found = exp.at(0.0, &x).and_then(|y| exp.retract(0.0, &y)).map_or(f64::NAN, |r| r.start.v[0]);
         // dq1/dv0 is 1/50, so that the error is that of 50 roundings of q.
@@ -105,7 +106,7 @@ fn a_slow_iteration_is_not_taken_for_one_that_has_ended() {
 /// correction.
 #[test]
 fn the_end_belongs_to_the_start() {
-    let pendulum = Pendulum { gamma: -0.05 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
     let exp = ContactExponential::new(pendulum, 8.0).unwrap();
     let y = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.3)).unwrap();
     // From some guesses no motion is found.

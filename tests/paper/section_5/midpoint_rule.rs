@@ -2,7 +2,7 @@
 //! does not vanish.
 
 use crate::common::{on_random, step_from, within};
-use contact_geom::systems::{Duffing, Pendulum, System};
+use contact_geom::systems::{Duffing, OneCoordinate, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, numbers::MaxOrNan};
 use discrete_herglotz::{
     InputError,
@@ -33,16 +33,16 @@ fn any_potential<S: System<1>>(system: &S, gamma: f64, slope: impl Fn(f64) -> f6
 #[test]
 fn midpoint_equations() {
     let pendulum = Pendulum::default();
-    any_potential(&pendulum, pendulum.gamma, f64::sin);
+    any_potential(&OneCoordinate::from(pendulum), pendulum.gamma, f64::sin);
     let duffing = Duffing::default();
-    any_potential(&duffing, duffing.gamma, |q| duffing.alpha * q + duffing.beta * q.powi(3));
+    any_potential(&OneCoordinate::from(duffing), duffing.gamma, |q| duffing.alpha * q + duffing.beta * q.powi(3));
 }
 
 /// At `h gamma <= -1` sigma_d is not positive, and the flow is refused before its first step with the value of sigma_d.
 #[test]
 fn sigma_vanishes_for_large_steps() {
     for (gamma, sigma) in [(-2.0, 0.0), (-3.0, -0.5)] {
-        let ld = LeftMidpoint::new(Pendulum { gamma }, 0.5).unwrap();
+        let ld = LeftMidpoint::new(OneCoordinate::from(Pendulum { gamma }), 0.5).unwrap();
         let by_points = Flow::from_points(&ld, 0.0, DiscretePoint::new([0.0], [1.0], 0.0)).err();
         assert_eq!(by_points, Some(InputError::Sigma { sigma }));
         let by_state = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [1.0], 0.0)).err();

@@ -2,7 +2,7 @@
 //! form.
 
 use crate::common::{on_random, within};
-use contact_geom::systems::HarmonicOscillator;
+use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{DiscretePoint, VelocityPoint, numbers::MaxOrNan};
 use discrete_herglotz::{DiscreteLagrangian, rules::LeftMidpoint, theory::discrete_flow};
 use exact_lagrangian::QuadraticExact;
@@ -13,7 +13,8 @@ fn oscillator() {
     on_random("harmonic oscillator", 5, |u| {
         let (q0, q1, z0) = (4.0 * u[0] - 2.0, 4.0 * u[1] - 2.0, u[2] - 0.5);
         let (g, h) = (-1.0 + 1.5 * u[3], 0.05 + 0.5 * u[4]);
-        let ld = LeftMidpoint::new(HarmonicOscillator { gamma: g }, h).map_err(|e| e.to_string())?;
+        let ld =
+            LeftMidpoint::new(OneCoordinate::from(HarmonicOscillator { gamma: g }), h).map_err(|e| e.to_string())?;
         let next = discrete_flow(&ld, 0.0, &DiscretePoint::new([q0], [q1], z0)).map_err(|e| e.to_string())?;
         let h3 = h.powi(3);
         let q2 = -((h3 * g + 4.0 * h * g + h * h + 4.0) * q0 + (h3 * g - 4.0 * h * g + 2.0 * h * h - 8.0) * q1)
@@ -32,7 +33,7 @@ fn exact_dynamics() {
         let x = DiscretePoint::new([4.0 * u[0] - 2.0], [4.0 * u[1] - 2.0], u[2] - 0.5);
         for gamma in [-0.05, -2.0, -2.5, 0.3] {
             let (system, h) = (HarmonicOscillator { gamma }, 0.1 + u[3]);
-            let ld = QuadraticExact::new(&HarmonicOscillator { gamma }, h).map_err(|e| e.to_string())?;
+            let ld = QuadraticExact::new(&OneCoordinate::from(system), h).map_err(|e| e.to_string())?;
             let v0 = system.velocity_through(x.q0[0], x.q1[0], h).ok_or("conjugate")?;
             let at = |t| system.solution(t, &VelocityPoint::new(x.q0, [v0], x.z0));
             let next = discrete_flow(&ld, 0.0, &x).map_err(|e| e.to_string())?;
@@ -44,5 +45,7 @@ fn exact_dynamics() {
         }
         Ok(())
     });
-    assert!(QuadraticExact::new(&HarmonicOscillator { gamma: 0.0 }, std::f64::consts::PI).is_err());
+    assert!(
+        QuadraticExact::new(&OneCoordinate::from(HarmonicOscillator { gamma: 0.0 }), std::f64::consts::PI).is_err()
+    );
 }

@@ -6,7 +6,9 @@
 use crate::common::oracle::motion;
 use crate::common::slope;
 use crate::table::discretise;
-use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, QuadraticInZ, Relativistic, System};
+use contact_geom::systems::{
+    CoupledInZ, CoupledPlane, DoublePendulum, OneCoordinate, QuadraticInZ, Relativistic, System, TwoCoordinates,
+};
 use contact_geom::{PhasePoint, legendre, numbers::MaxAbsOrNan};
 use discrete_herglotz::{
     Stepper,
@@ -67,9 +69,9 @@ fn measure<const N: usize, S: System<N>>(system: &S) {
 /// order one.
 #[test]
 fn orders_by_slope() {
-    measure(&QuadraticInZ { c: 1.0 });
-    measure(&CoupledInZ { gamma: -1.0, ..CoupledInZ::default() });
-    measure(&CoupledPlane { c: 1.5, ..CoupledPlane::default() });
-    measure(&Relativistic { gamma: -1.0 });
-    measure(&DoublePendulum { gamma: -1.0, ..DoublePendulum::default() });
+    measure(&OneCoordinate::from(QuadraticInZ { c: 1.0 }));
+    measure(&OneCoordinate::from(CoupledInZ { gamma: -1.0, ..CoupledInZ::default() }));
+    measure(&TwoCoordinates::from(CoupledPlane { c: 1.5, ..CoupledPlane::default() }));
+    measure(&OneCoordinate::from(Relativistic { gamma: -1.0 }));
+    measure(&TwoCoordinates::from(DoublePendulum { gamma: -1.0, ..DoublePendulum::default() }));
 }
