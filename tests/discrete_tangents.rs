@@ -8,7 +8,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::systems::{CoupledInZ, Kepler, Pendulum, System};
+use contact_geom::systems::{CoupledInZ, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{DiscretePoint, Forced, Parametric, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::rules::{Method, Midpoint};
 use discrete_herglotz::sensitivity::{EndCovector, SensitivityError, StateDerivative, Variable};
@@ -65,11 +65,12 @@ fn the_midpoint_rule() {
         // What the discrete Lagrangian does not tell is no number.
         assert!(a.t0.is_nan() && a.t_end.is_nan() && a.parameters.iter().all(|x| x.is_nan()));
     }
-    compare(&Pendulum { gamma: -0.1 }, VelocityPoint::new([1.0], [0.5], 0.2));
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    compare(&pendulum, VelocityPoint::new([1.0], [0.5], 0.2));
     compare(&Kepler::<2>::default(), Kepler::<2>::default().initial());
-    compare(&CoupledInZ::default(), CoupledInZ::default().initial());
+    compare(&OneCoordinate::from(CoupledInZ::default()), CoupledInZ::default().initial());
     let force = VelocityDrag { linear: SVector::from([0.2]), quadratic: 0.1 };
-    compare(&Forced { lagrangian: Pendulum { gamma: -0.1 }, force }, VelocityPoint::new([1.0], [0.5], 0.2));
+    compare(&Forced { lagrangian: pendulum, force }, VelocityPoint::new([1.0], [0.5], 0.2));
 }
 
 /// A discrete Lagrangian of a pendulum that no rule of the library gives, nonlinear in z0, with discrete forces.
@@ -100,7 +101,7 @@ impl DiscreteLagrangian<1> for Mine {
 /// are extrapolated four times from the distances 1/16 to 1/256, and to round-off.
 #[test]
 fn a_discrete_lagrangian_of_a_user() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let x = [0.9, 0.4, 0.3];
     let until = Until::Time(2.0);
     let run = |x: &[f64; 3]| {
@@ -149,7 +150,7 @@ fn a_discrete_lagrangian_of_a_user() {
 
 #[test]
 fn variables_that_a_discrete_lagrangian_does_not_tell() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
     let mine = || {
         let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));

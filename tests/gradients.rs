@@ -14,6 +14,7 @@ mod gradients {
     mod forces;
     mod impacts;
     mod invalid_input;
+    mod lagrangians;
     mod losses;
     mod lyapunov;
     mod pendulum;

@@ -14,6 +14,7 @@ mod resets {
     mod campaign;
     mod contact;
     mod impacts;
+    mod lagrangians;
     mod runs;
 }
 

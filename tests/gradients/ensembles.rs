@@ -1,6 +1,6 @@
 //! Gradients of the members of an ensemble: those of single runs, bitwise, for any number of threads.
 
-use contact_geom::systems::{Duffing, Kepler, Pendulum, System};
+use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::ensemble::EnsembleError;
 use discrete_herglotz::sensitivity::{BatchGradient, EndCovector, EndState, Loss, SensitivityError, Variable};
@@ -26,7 +26,7 @@ fn start(i: usize) -> VelocityPoint<1> {
 /// Each member has the gradient of its own run, and the total is the sum in the order of the members.
 #[test]
 fn members_are_single_runs_for_any_number_of_threads() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let methods = ["gauss_4", "strang", "blanes_moan_6", "midpoint", "trapezoidal"];
     for method in methods.map(|name| name.parse::<AnyIntegrator>().unwrap()) {
         let of = |threads: usize| -> BatchGradient<1> {
@@ -57,7 +57,7 @@ fn members_are_single_runs_for_any_number_of_threads() {
 #[test]
 fn the_total_is_differentiated() {
     let total = |gamma: f64| {
-        let pendulum = Pendulum { gamma };
+        let pendulum = OneCoordinate::from(Pendulum { gamma });
         let ensemble = Ensemble::new(&pendulum, 0.0, 20, start).by(GaussCollocation { stages: 6 });
         ensemble.steps(Steps::Size(0.25)).gradient(&Mixed, UNTIL).unwrap().total().unwrap()
     };
@@ -71,7 +71,7 @@ fn the_total_is_differentiated() {
 /// Members with Lagrangians of their own, and steps that are chosen for an accuracy: for each member by itself.
 #[test]
 fn a_study_of_parameters() {
-    let many: Vec<Pendulum> = (0..9).map(|i| Pendulum { gamma: -0.02 * i as f64 }).collect();
+    let many: Vec<OneCoordinate> = (0..9).map(|i| Pendulum { gamma: -0.02 * i as f64 }.into()).collect();
     let ensemble = Ensemble::of(0.0, many.len(), |i| (&many[i], start(i))).accuracy(1e-8).threads(2);
     let batch = ensemble.gradient(&Mixed, UNTIL).unwrap();
     for (i, member) in batch.members.iter().enumerate() {
@@ -84,7 +84,7 @@ fn a_study_of_parameters() {
 /// A loss of rows that depends on the member, and the tangents of the same rows.
 #[test]
 fn rows_and_tangents() {
-    let system = Duffing::forced();
+    let system = OneCoordinate::from(Duffing::forced());
     let t0 = system.initial_time();
     let times = [t0, t0 + 0.33, t0 + 1.0, t0 + 2.0];
     let ensemble = Ensemble::new(&system, t0, 12, start).by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.1));
@@ -135,7 +135,7 @@ fn members_that_fail() {
 
 #[test]
 fn invalid_input() {
-    let pendulum = Pendulum::default();
+    let pendulum = OneCoordinate::from(Pendulum::default());
     let of = |count| Ensemble::new(&pendulum, 0.0, count, start);
     let gauss = GaussCollocation { stages: 4 };
     let ready = |count| of(count).by(gauss).steps(Steps::Size(0.1));

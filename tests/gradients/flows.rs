@@ -1,11 +1,12 @@
 //! Derivatives of runs by splittings, quadrature rules and compositions.
 
-use crate::gradients::forces::Stirring;
+use crate::gradients::forces::{Forces, Stirring};
+use crate::gradients::lagrangians::ForcedPlane;
 use crate::gradients::runs::{Case, Method, weyl};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    Chain, CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
-    UniformField, visit_catalogue,
+    Chain, CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
+    SystemVisitor, TwoCoordinates, UniformField, visit_catalogue,
 };
 use contact_geom::{Force, ForceStructure, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, SensitivityError, Variable};
@@ -63,7 +64,7 @@ fn quadrature_rules() {
 
 /// A drag with equal coefficients of all velocities, `-c v - k |v| v`, beside a force of time and positions.
 #[derive(Clone, Copy, Debug)]
-struct EqualDrag {
+pub struct EqualDrag {
     c: f64,
     k: f64,
     push: f64,
@@ -102,25 +103,34 @@ impl<const N: usize> ParametricForce<N> for EqualDrag {
     }
 }
 
-fn forced<const N: usize, S: System<N> + Clone, F: ParametricForce<N>, M: Method>(
+fn forced<const N: usize, S: System<N>, L: Parametric<N>, M: Method>(
     system: &S,
-    force: F,
+    lagrangian: &L,
     method: M,
     name: &str,
 ) {
-    let lagrangian = Forced { lagrangian: system.clone(), force };
     let mut start = system.initial();
     // No velocity vanishes, where |v| is not smooth.
     start.v = SVector::from_fn(|i, _| 0.6 + 0.2 * i as f64);
     for from_momentum in [false, true] {
-        let case = Case { lagrangian: &lagrangian, t0: 0.3, start, from_momentum, t_end: 0.6, steps: 3, method };
+        let case = Case { lagrangian, t0: 0.3, start, from_momentum, t_end: 0.6, steps: 3, method };
         case.compare(&format!("{}, {name}", system.name()), 3e-13, 1e-8);
     }
 }
 
+fn forced_line<M: Method>(system: impl Into<OneCoordinate>, force: impl Into<Forces<1>>, method: M, name: &str) {
+    let system = system.into();
+    forced(&system, &Forced::new(system, force.into()), method, name);
+}
+
+fn forced_plane<M: Method>(system: impl Into<TwoCoordinates>, force: impl Into<Forces<2>>, method: M, name: &str) {
+    let system = system.into();
+    forced(&system, &ForcedPlane::from(Forced::new(system, force.into())), method, name);
+}
+
 /// A linear drag with a coefficient for each velocity, which are its parameters.
 #[derive(Clone, Copy, Debug)]
-struct LinearDrag<const N: usize>([f64; N]);
+pub struct LinearDrag<const N: usize>([f64; N]);
 
 impl<const N: usize> Force<N> for LinearDrag<N> {
     fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -156,13 +166,14 @@ fn drags_of_the_velocity() {
     for scheme in SplittingScheme::ALL.into_iter().filter(|scheme| scheme.order() <= 8) {
         let name = scheme.name();
         for c in [0.3, 0.0] {
-            forced(&Pendulum { gamma: -0.2 }, LinearDrag([c]), scheme, name);
-            forced(&UniformField::default(), LinearDrag([c, 0.1]), scheme, name);
+            forced_line(Pendulum { gamma: -0.2 }, LinearDrag([c]), scheme, name);
+            forced_plane(UniformField::default(), LinearDrag([c, 0.1]), scheme, name);
         }
         if !scheme.is_nystrom() {
             for (c, k) in [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, -0.2)] {
-                forced(&HarmonicOscillator::default(), EqualDrag { c, k, push: 0.4 }, scheme, name);
-                forced(&Kepler::<2>::default(), EqualDrag { c, k, push: 0.2 }, scheme, name);
+                forced_line(HarmonicOscillator::default(), EqualDrag { c, k, push: 0.4 }, scheme, name);
+                let (kepler, force) = (Kepler::<2>::default(), EqualDrag { c, k, push: 0.2 });
+                forced(&kepler, &ForcedPlane::from(Forced::new(kepler, force.into())), scheme, name);
             }
         }
     }
@@ -173,10 +184,10 @@ fn drags_of_the_velocity() {
 fn rules_with_forces() {
     let force = Stirring { a: 0.4, b: 0.3 };
     for method in rules::Method::RULES {
-        forced(&Pendulum::default(), force, *method, method.name());
-        forced(&QuadraticInZ::default(), force, *method, method.name());
-        forced(&CoupledInZ::default(), force, *method, method.name());
-        forced(&DoublePendulum::default(), force, *method, method.name());
+        forced_line(Pendulum::default(), force, *method, method.name());
+        forced_line(QuadraticInZ::default(), force, *method, method.name());
+        forced_line(CoupledInZ::default(), force, *method, method.name());
+        forced_plane(DoublePendulum::default(), force, *method, method.name());
     }
 }
 
@@ -190,8 +201,9 @@ fn parameters_that_a_splitting_excludes() {
         }
     }
     let force = VelocityDrag { linear: [0.2, 0.2].into(), quadratic: 0.1 };
-    let lagrangian = Forced { lagrangian: Kepler::<2>::default(), force };
-    let problem = Problem::new(&lagrangian, 0.0, lagrangian.lagrangian.initial()).unwrap();
+    let kepler = Kepler::<2>::default();
+    let lagrangian = ForcedPlane::from(Forced::new(kepler, force.into()));
+    let problem = Problem::new(&lagrangian, 0.0, kepler.initial()).unwrap();
     let run = || problem.by(SplittingScheme::STRANG).steps(Steps::Count(10));
     let found = run().tangent(&[Variable::Parameter("linear[0]".into())], Until::Time(1.0)).unwrap_err();
     assert!(matches!(found, SensitivityError::NoTangent { .. }), "{found}");

@@ -1,5 +1,6 @@
 //! Derivatives of runs with impacts.
 
+use crate::gradients::lagrangians::{SwitchingLine, SwitchingPlane};
 use crate::gradients::runs::{Case, weyl};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
@@ -21,7 +22,7 @@ impl<const N: usize> Surface<N> for Floor {
 
 /// A curved floor that moves, with two parameters.
 #[derive(Clone, Copy, Debug)]
-struct Ground {
+pub struct Ground {
     slope: f64,
     velocity: f64,
 }
@@ -51,17 +52,12 @@ impl Surface<2> for Ground {
     }
 }
 
-fn ball(field: f64, gamma: f64, law: Impact) -> Impacts<UniformField<1>, Floor> {
-    Impacts::new(UniformField { field: [field], gamma }, Floor, law)
+fn ball(field: f64, gamma: f64, law: Impact) -> SwitchingLine {
+    Impacts::new(UniformField { field: [field], gamma }, Floor, law).into()
 }
 
 /// The derivatives of q and v in variables, forward and by the adjoint, with the end.
-fn both(
-    system: &Impacts<UniformField<1>, Floor>,
-    steps: Steps,
-    t: f64,
-    variables: &[Variable],
-) -> ([f64; 2], Vec<[[f64; 2]; 2]>) {
+fn both(system: &SwitchingLine, steps: Steps, t: f64, variables: &[Variable]) -> ([f64; 2], Vec<[[f64; 2]; 2]>) {
     let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 8 }).steps(steps);
     let tangent = run().tangent(variables, Until::Time(t)).unwrap();
@@ -152,6 +148,7 @@ fn random_impacts() {
         };
         let ground = Ground { slope: 0.3 * (u[1] - 0.5), velocity: 0.1 * (u[2] - 0.5) };
         let system = Impacts::new(UniformField { field: [0.2 * u[3], -1.0], gamma: -0.2 * u[4] }, ground, law);
+        let system = SwitchingPlane::from(system);
         let start = VelocityPoint::new([u[5], 0.8 + 0.3 * u[6]], [u[7] - 0.5, 0.3 * (u[8] - 0.5)], 0.1);
         let case = Case {
             lagrangian: &system,
@@ -199,19 +196,23 @@ fn losses_of_rows_across_impacts() {
     }
 }
 
+/// The half line below a height.
+#[derive(Clone, Copy)]
+pub struct Ceiling(f64);
+
+impl Surface<1> for Ceiling {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
+        -q[0] + self.0
+    }
+}
+
 /// A ball that just reaches a ceiling: either the derivative is refused, or its growth tells how ill-conditioned it is.
 #[test]
 fn grazing_impacts() {
-    #[derive(Clone, Copy)]
-    struct Ceiling(f64);
-    impl Surface<1> for Ceiling {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
-            -q[0] + self.0
-        }
-    }
     for exponent in 2..=16 {
         let height = 0.5 - 10.0_f64.powi(-exponent);
         let system = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Ceiling(height), Impact::Elastic);
+        let system = SwitchingLine::from(system);
         let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
         let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.3));
         match run().tangent(&[Variable::Velocity(0)], Until::Time(1.7)) {

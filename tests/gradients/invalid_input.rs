@@ -1,6 +1,7 @@
 //! Input that cannot be differentiated.
 
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System};
+use crate::gradients::lagrangians::{SmoothLine, SwitchingLine};
+use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::rules;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
@@ -16,7 +17,7 @@ impl<const N: usize> Loss<N> for Constant {
 
 #[test]
 fn names_starts_and_coordinates() {
-    let pendulum = Pendulum::default();
+    let pendulum = OneCoordinate::from(Pendulum::default());
     let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
     let tangent =
         |variable: Variable| problem.steps(Steps::Size(0.1)).tangent(&[variable], Until::Time(1.0)).unwrap_err();
@@ -41,9 +42,9 @@ fn integrators_without_tangents() {
 }
 
 /// A Lagrangian with a kink, across which only collocation is differentiated.
-struct Kinked;
+pub struct Slope;
 
-impl Lagrangian<1> for Kinked {
+impl Lagrangian<1> for Slope {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
         v[0] * v[0] * 0.5 - q[0].abs()
@@ -53,11 +54,12 @@ impl Lagrangian<1> for Kinked {
     }
 }
 
-impl Parametric<1> for Kinked {}
+impl Parametric<1> for Slope {}
 
 #[test]
 fn switching_functions() {
-    let problem = Problem::new(&Kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let system = SwitchingLine::from(Slope);
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let found =
         problem.by(rules::Method::Midpoint).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
     assert!(found.unwrap_err().to_string().contains("switching functions"));
@@ -65,7 +67,7 @@ fn switching_functions() {
 
 #[test]
 fn losses_that_are_not_finite() {
-    let oscillator = HarmonicOscillator::default();
+    let oscillator = OneCoordinate::from(HarmonicOscillator::default());
     let problem = Problem::new(&oscillator, 0.0, oscillator.initial()).unwrap();
     let run = || problem.steps(Steps::Size(0.1));
     let found = run().gradient(&Constant(f64::NAN), Until::Time(1.0)).unwrap_err();
@@ -75,18 +77,23 @@ fn losses_that_are_not_finite() {
     assert_eq!((value, gradient.q[0], gradient.parameters[0], gradient.t_end), (2.0, 0.0, 0.0, 0.0));
 }
 
+/// A fall where the square root of the height is defined.
+pub struct Falling;
+
+impl Lagrangian<1> for Falling {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0] + q[0].sqrt() * 1e-3
+    }
+}
+
+impl Parametric<1> for Falling {}
+
 /// A run that fails has a status and no gradient; its tangent is that of the last state. The square root is not defined
 /// below 0, where a fall from 1 arrives after a time of 1.4.
 #[test]
 fn runs_that_end_early() {
-    struct Falling;
-    impl Lagrangian<1> for Falling {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0] + q[0].sqrt() * 1e-3
-        }
-    }
-    impl Parametric<1> for Falling {}
-    let problem = Problem::new(&Falling, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let system = SmoothLine::from(Falling);
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let found = run().gradient(&Constant(1.0), Until::Time(2.0)).unwrap();
     assert!(matches!(found.outcome.status, Status::Failed { .. }), "{}", found.outcome.status);

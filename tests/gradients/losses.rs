@@ -1,6 +1,6 @@
 //! Losses of the end and of rows.
 
-use contact_geom::systems::{CoupledPlane, DoublePendulum, System};
+use contact_geom::systems::{CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, System, TwoCoordinates};
 use contact_geom::{Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, EndState, Gradient, Loss, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
@@ -22,7 +22,7 @@ fn all<const N: usize>(gradient: &Gradient<N>) -> Vec<f64> {
 /// The gradient of a loss is the sum of its partial derivatives times the columns of the tangent.
 #[test]
 fn a_loss_of_the_end() {
-    let system = DoublePendulum::default();
+    let system = TwoCoordinates::from(DoublePendulum::default());
     let problem = Problem::new(&system, 0.2, system.initial()).unwrap();
     let run = || problem.by(GaussCollocation { stages: 8 }).steps(Steps::Count(20));
     let found = run().gradient(&Mixed, Until::Time(2.0)).unwrap();
@@ -44,7 +44,7 @@ fn a_loss_of_the_end() {
 /// of the rows, and these are derivatives of runs that end there.
 #[test]
 fn losses_of_rows() {
-    let system = CoupledPlane::default();
+    let system = TwoCoordinates::from(CoupledPlane::default());
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
     let run = || problem.by(GaussCollocation { stages: 6 }).steps(Steps::Count(100));
     let times = [0.0, 0.03, 0.1, 0.333, 1.0, 1.7125, 4.999, 5.0];
@@ -92,7 +92,7 @@ fn losses_of_rows() {
 /// Many blocks of steps, with states kept at intervals, and a run from which gradients are taken more than once.
 #[test]
 fn long_runs() {
-    let system = contact_geom::systems::Pendulum { gamma: -0.02 };
+    let system = OneCoordinate::from(Pendulum { gamma: -0.02 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(1000));
     let recorded = run().record(Until::Time(100.0)).unwrap();

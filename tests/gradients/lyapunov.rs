@@ -1,14 +1,15 @@
 //! Lyapunov exponents: those of a linear motion in closed form, and their pairing.
 
 use crate::gradients::impacts::Floor;
+use crate::gradients::lagrangians::{SmoothLine, SwitchingLine};
 use crate::gradients::runs::Method;
-use contact_geom::VelocityPoint;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts};
 use contact_geom::systems::{
-    Chain, CoupledInZ, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
-    UniformField, visit_catalogue,
+    Chain, CoupledInZ, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
+    SystemVisitor, TwoCoordinates, UniformField, visit_catalogue,
 };
+use contact_geom::{Parametric, VelocityPoint};
 use discrete_herglotz::sensitivity::{LyapunovExponents, SensitivityError};
 use discrete_herglotz::{
     GaussCollocation, InputError, Problem, SplittingScheme, Status, Steps, TransformedGauss, Until, rules,
@@ -18,10 +19,18 @@ fn exponents<const N: usize, S: System<N>, M: Method>(
     system: &S,
     start: VelocityPoint<N>,
     method: M,
+    steps: (f64, usize),
+) -> LyapunovExponents<N> {
+    exponents_from(system, (system.initial_time(), start), method, steps)
+}
+
+fn exponents_from<const N: usize, L: Parametric<N>, M: Method>(
+    lagrangian: &L,
+    (t0, start): (f64, VelocityPoint<N>),
+    method: M,
     (h, steps): (f64, usize),
 ) -> LyapunovExponents<N> {
-    let t0 = system.initial_time();
-    let problem = Problem::new(system, t0, start).unwrap();
+    let problem = Problem::new(lagrangian, t0, start).unwrap();
     let run = method.run(&problem).steps(Steps::Count(steps));
     let found = run.lyapunov_exponents(Until::Time(t0 + h * steps as f64)).unwrap();
     assert_eq!(found.exponents.len(), 2 * N + 1);
@@ -32,7 +41,8 @@ fn exponents<const N: usize, S: System<N>, M: Method>(
 /// frame has the directions of the motion, so that the exponents are those of the discrete motion to round-off.
 #[test]
 fn a_linear_motion() {
-    let oscillator = HarmonicOscillator { gamma: -2.5 };
+    let gamma = -2.5;
+    let oscillator = OneCoordinate::from(HarmonicOscillator { gamma });
     let (h, steps) = (0.1, 600);
     let found =
         exponents(&oscillator, VelocityPoint::new([1.0], [0.3], 0.2), GaussCollocation { stages: 8 }, (h, steps));
@@ -44,7 +54,7 @@ fn a_linear_motion() {
         // The initial directions are within a factor 10 of those of the motion.
         assert!((exponent - expected).abs() <= 10.0_f64.ln() / (h * steps as f64), "{exponent} and {expected}");
     }
-    assert!((found.rate - oscillator.gamma).abs() <= 1e-13, "{}", found.rate);
+    assert!((found.rate - gamma).abs() <= 1e-13, "{}", found.rate);
 }
 
 /// For a constant rate, one exponent is the rate, and the others are pairs whose sum is the rate: after any number of steps,
@@ -75,8 +85,8 @@ fn the_exponents_are_paired() {
         check(system, SplittingScheme::BLANES_MOAN_6, "blanes_moan_6");
         check(system, rules::Method::Midpoint, "midpoint");
     }
-    all(&Duffing::forced());
-    all(&Pendulum { gamma: -0.1 });
+    all(&OneCoordinate::from(Duffing::forced()));
+    all(&OneCoordinate::from(Pendulum { gamma: -0.1 }));
     all(&Chain::<4>::default());
 }
 
@@ -97,10 +107,10 @@ fn their_sum_is_the_contraction_of_volume() {
         }
     }
     visit_catalogue(&mut Visit);
-    let nonlinear = QuadraticInZ::default();
+    let nonlinear = OneCoordinate::from(QuadraticInZ::default());
     let found = exponents(&nonlinear, nonlinear.initial(), SplittingScheme::KAHAN_LI_8, (0.05, 200));
     assert!((found.exponents.iter().sum::<f64>() - 2.0 * found.rate).abs() <= 1e-11);
-    let coupled = CoupledInZ::default();
+    let coupled = OneCoordinate::from(CoupledInZ::default());
     let found = exponents(&coupled, coupled.initial(), rules::Method::Trapezoidal, (0.05, 200));
     assert!((found.exponents.iter().sum::<f64>() - 2.0 * found.rate).abs() <= 1e-11);
 }
@@ -109,7 +119,7 @@ fn their_sum_is_the_contraction_of_volume() {
 /// a finite run.
 #[test]
 fn a_chaotic_motion() {
-    let duffing = Duffing::forced();
+    let duffing = OneCoordinate::from(Duffing::forced());
     let start = VelocityPoint::new([0.5], [0.1], 0.0);
     let gauss = exponents(&duffing, start, GaussCollocation { stages: 6 }, (0.1, 5000));
     let splitting = exponents(&duffing, start, SplittingScheme::BLANES_MOAN_6, (0.1, 5000));
@@ -127,10 +137,11 @@ fn a_chaotic_motion() {
 /// Coordinates at rest that act on nothing can be left out: the others have the exponents that they have alone.
 #[test]
 fn some_of_the_coordinates() {
-    let (one, two) =
-        (UniformField::<1> { field: [-1.0], gamma: -0.3 }, UniformField::<2> { field: [-1.0, 0.0], gamma: -0.3 });
+    let one = SmoothLine::from(UniformField { field: [-1.0], gamma: -0.3 });
+    let two = TwoCoordinates::from(UniformField { field: [-1.0, 0.0], gamma: -0.3 });
     let until = Until::Time(4.0);
-    let alone = exponents(&one, VelocityPoint::new([1.0], [0.3], 0.2), GaussCollocation { stages: 4 }, (0.1, 40));
+    let start = VelocityPoint::new([1.0], [0.3], 0.2);
+    let alone = exponents_from(&one, (0.0, start), GaussCollocation { stages: 4 }, (0.1, 40));
     let problem = Problem::new(&two, 0.0, VelocityPoint::new([1.0, 0.5], [0.3, 0.0], 0.2)).unwrap();
     let within = |n| {
         let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(40));
@@ -155,6 +166,7 @@ fn some_of_the_coordinates() {
 #[test]
 fn elastic_impacts_keep_the_pairing() {
     let ball = Impacts::new(UniformField { field: [-1.0], gamma: -0.1 }, Floor, Impact::Elastic);
+    let ball = SwitchingLine::from(ball);
     let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.37));
     let found = run.lyapunov_exponents(Until::Time(14.8)).unwrap();

@@ -1,7 +1,7 @@
 //! A damped pendulum over ten periods, against derivatives that were computed with 30 digits.
 
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
+use contact_geom::systems::{OneCoordinate, Pendulum};
 use discrete_herglotz::sensitivity::{EndCovector, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 
@@ -16,7 +16,7 @@ const DERIVATIVES: [[f64; 3]; 3] = [
 /// Each number is given to twelve digits.
 #[test]
 fn the_pendulum_of_the_issue() {
-    let pendulum = Pendulum { gamma: -0.01 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
     let variables = [Variable::Position(0), Variable::Velocity(0), Variable::Parameter("gamma".into())];
     for (stages, h) in [(8, 0.25), (16, 1.0)] {

@@ -1,13 +1,14 @@
 //! Random impacts: none is missed, none occurs twice.
 
 use crate::draws::Draws;
+use crate::resets::lagrangians::Plane;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, Problem, Resets, Status, StepError, Steps, Until};
 
 /// A flight in a uniform field with linear drag, in closed form.
 #[derive(Clone, Copy, Debug)]
-struct Flight {
+pub struct Flight {
     g: f64,
     gamma: f64,
 }
@@ -36,11 +37,11 @@ impl Flight {
 
 /// An inclined plane `n . q >= 0`.
 #[derive(Clone, Copy, Debug)]
-struct Plane {
+pub struct Slope {
     slope: f64,
 }
 
-impl Surface<2> for Plane {
+impl Surface<2> for Slope {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>) -> T {
         q[1] - q[0] * self.slope
@@ -48,7 +49,7 @@ impl Surface<2> for Plane {
 }
 
 /// The times of the impacts until `t_end`, each by bisection on the closed form, after its first sample below.
-fn impacts(flight: &Flight, plane: &Plane, law: Impact, start: ([f64; 2], [f64; 2]), t_end: f64) -> Vec<f64> {
+fn impacts(flight: &Flight, plane: &Slope, law: Impact, start: ([f64; 2], [f64; 2]), t_end: f64) -> Vec<f64> {
     let height = |q: [f64; 2]| q[1] - plane.slope * q[0];
     let (mut times, mut t, mut state) = (Vec::new(), 0.0, start);
     while times.len() < 40 {
@@ -101,12 +102,12 @@ fn ten_thousand_impacts_occur_once_each() {
         case += 1;
         let draws = &mut Draws::of(case);
         let flight = Flight { g: draws.between(0.3, 3.0), gamma: [0.0, draws.between(-0.3, -0.01)][case as usize % 2] };
-        let plane = Plane { slope: draws.between(-0.5, 0.5) };
+        let plane = Slope { slope: draws.between(-0.5, 0.5) };
         let law = if case % 3 == 0 { Impact::Elastic } else { Impact::Restitution(draws.between(0.3, 1.0)) };
         let start = ([0.0, draws.between(0.1, 3.0)], [draws.between(-1.0, 1.0), draws.between(-1.0, 1.0)]);
         let (h, t_end) = (f64::exp(draws.between(f64::ln(0.02), f64::ln(5.0))), 20.0);
         let expected = impacts(&flight, &plane, law, start, t_end);
-        let system = Impacts::new(flight, plane, law);
+        let system = Plane::from(Impacts::new(flight, plane, law));
         let problem = Problem::new(&system, 0.0, VelocityPoint::new(start.0, start.1, 0.0)).unwrap();
         let mut resets = Resets::new();
         let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Size(h)).observe(&mut resets);

@@ -1,17 +1,18 @@
 //! Impacts against closed forms.
 
 use crate::Floor;
+use crate::resets::lagrangians::{Line, Plane};
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
-use contact_geom::systems::UniformField;
+use contact_geom::systems::{Pendulum, UniformField};
 use contact_geom::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, GaussCollocation, Outcome, Problem, Resets, Status, StepError, Steps, Until};
 
-fn ball(gamma: f64, g: f64, law: Impact) -> Impacts<UniformField<1>, Floor> {
-    Impacts::new(UniformField { field: [-g], gamma }, Floor, law)
+fn ball(gamma: f64, g: f64, law: Impact) -> Line {
+    Impacts::new(UniformField { field: [-g], gamma }, Floor, law).into()
 }
 
 /// The run of a ball from the height 1 at rest, with its impacts.
-fn dropped(ball: &Impacts<UniformField<1>, Floor>, steps: Steps, t_end: f64) -> (Outcome<1>, Vec<f64>) {
+fn dropped(ball: &Line, steps: Steps, t_end: f64) -> (Outcome<1>, Vec<f64>) {
     let problem = Problem::new(ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let mut resets = Resets::new();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(steps);
@@ -40,7 +41,7 @@ fn an_elastic_ball_with_drag_meets_its_closed_form() {
 /// two of the order, up to a factor of two, or it is round-off.
 #[test]
 fn every_integrator_takes_impacts() {
-    let ball = Impacts::new(contact_geom::systems::Pendulum { gamma: -0.1 }, Floor, Impact::Elastic);
+    let ball = Line::from(Impacts::new(Pendulum { gamma: -0.1 }, Floor, Impact::Elastic));
     let end = |integrator: AnyIntegrator, count: usize| {
         let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
         problem.by(integrator).steps(Steps::Count(count)).run(Until::Time(8.0)).unwrap().q[0]
@@ -92,7 +93,7 @@ fn a_ball_without_restitution_stops_where_it_falls() {
 
 /// A ball that rests after its last impact: the second coordinate is a mode, 1 in contact, in which the floor carries
 /// the weight.
-struct Resting;
+pub struct Resting;
 
 impl Lagrangian<2> for Resting {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
@@ -121,14 +122,15 @@ impl Lagrangian<2> for Resting {
 
 #[test]
 fn a_resting_contact_continues_where_it_is_asked_for() {
-    let problem = Problem::new(&Resting, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
+    let system = Plane::from(Resting);
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
     let outcome = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).run(Until::Time(6.0)).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.q[1]), (Status::Completed, 0.0, 1.0));
 }
 
 /// A wall that moves with the velocity u: an elastic impact reverses the velocity relative to the wall, `v+ = 2u - v-`.
 #[derive(Clone, Copy)]
-struct Piston {
+pub struct Piston {
     u: f64,
 }
 
@@ -142,6 +144,7 @@ impl Surface<1> for Piston {
 fn a_moving_wall_changes_the_energy() {
     for (law, after) in [(Impact::Elastic, 2.0 * 0.25 + 1.0), (Impact::Restitution(0.5), 0.25 + 0.5 * 1.25)] {
         let particle = Impacts::new(UniformField { field: [0.0], gamma: 0.0 }, Piston { u: 0.25 }, law);
+        let particle = Line::from(particle);
         let problem = Problem::new(&particle, 0.0, VelocityPoint::new([2.5], [-1.0], 0.0)).unwrap();
         let outcome =
             problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Count(3)).run(Until::Time(4.0)).unwrap();
@@ -150,17 +153,20 @@ fn a_moving_wall_changes_the_energy() {
     }
 }
 
+/// A uniform field whose potential is 3 at the floor.
+pub struct High;
+
+impl Lagrangian<1> for High {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0] - 3.0
+    }
+}
+
 /// The law that takes more energy than there is has no state after it.
 #[test]
 fn a_law_without_a_state_after_it_is_refused() {
-    // The potential is 3 at the floor, of which the law takes nine tenths.
-    struct High;
-    impl Lagrangian<1> for High {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0] - 3.0
-        }
-    }
-    let ball = Impacts::new(High, Floor, Impact::Conformal(0.1));
+    // The law takes nine tenths of the potential at the floor.
+    let ball = Line::from(Impacts::new(High, Floor, Impact::Conformal(0.1)));
     let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let outcome = problem.by(GaussCollocation { stages: 2 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
     assert!(

@@ -1,6 +1,7 @@
 //! Runs with resets: rows, events, resumed runs, ensembles.
 
 use crate::Floor;
+use crate::resets::lagrangians::{Line, Plane};
 use contact_geom::switching::{Control, Impact, Impacts};
 use contact_geom::systems::UniformField;
 use contact_geom::{Hints, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
@@ -9,8 +10,8 @@ use discrete_herglotz::{
 };
 
 /// A ball between a floor and a ceiling of a corner, with drag.
-fn ball() -> Impacts<UniformField<2>, Floor> {
-    Impacts::new(UniformField { field: [0.2, -1.0], gamma: -0.05 }, Floor, Impact::Restitution(0.9))
+fn ball() -> Plane {
+    Impacts::new(UniformField { field: [0.2, -1.0], gamma: -0.05 }, Floor, Impact::Restitution(0.9)).into()
 }
 
 const START: ([f64; 2], [f64; 2]) = ([0.0, 1.0], [0.5, 0.0]);
@@ -94,7 +95,7 @@ fn runs_are_resumed_across_impacts_bit_by_bit() {
 /// the conformal factor is that of the drag.
 #[test]
 fn elastic_impacts_keep_the_checks_of_the_energy() {
-    let ball = Impacts::new(UniformField { field: [-1.0], gamma: -0.05 }, Floor, Impact::Elastic);
+    let ball = Line::from(Impacts::new(UniformField { field: [-1.0], gamma: -0.05 }, Floor, Impact::Elastic));
     let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let outcome =
         problem.by(AnyIntegrator::Gauss { stages: 3 }).steps(Steps::Size(0.1)).run(Until::Time(30.0)).unwrap();
@@ -105,12 +106,12 @@ fn elastic_impacts_keep_the_checks_of_the_energy() {
 }
 
 /// Walls at which the state is replaced: a list of cases of what happens at one instant.
-struct Box2 {
+pub struct Walls {
     /// What a reset assigns, by its index.
     reset: fn(usize, &VelocityPoint<2>) -> Option<VelocityPoint<2>>,
 }
 
-impl Lagrangian<2> for Box2 {
+impl Lagrangian<2> for Walls {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
 
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
@@ -125,8 +126,9 @@ impl Lagrangian<2> for Box2 {
     }
 }
 
-fn through(system: &Box2, start: ([f64; 2], [f64; 2]), h: f64, t: f64) -> (Status, [f64; 2], usize) {
-    let problem = Problem::new(system, 0.0, VelocityPoint::new(start.0, start.1, 0.0)).unwrap();
+fn through(walls: Walls, start: ([f64; 2], [f64; 2]), h: f64, t: f64) -> (Status, [f64; 2], usize) {
+    let system = Plane::from(walls);
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new(start.0, start.1, 0.0)).unwrap();
     let mut resets = Resets::new();
     let run = problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(h)).observe(&mut resets);
     let outcome = run.run(Until::Time(t)).unwrap();
@@ -145,7 +147,7 @@ fn two_resets_at_one_instant_both_occur() {
     for (start, h) in
         [(([1.0, 1.0], [-1.0, -1.0]), 0.3), (([1.0, 2.0], [-1.0, -2.0]), 0.7), (([1.0, 1.0], [-1.0, -1.0]), 1.0)]
     {
-        let (status, q, resets) = through(&Box2 { reset: mirrored }, start, h, 2.1);
+        let (status, q, resets) = through(Walls { reset: mirrored }, start, h, 2.1);
         assert_eq!((status, resets), (Status::Completed, 2), "{start:?}");
         assert!((q[0] + 1.1 * start.1[0]).abs() <= 1e-14 && (q[1] + 1.1 * start.1[1]).abs() <= 1e-14, "{q:?}");
     }
@@ -155,18 +157,18 @@ fn two_resets_at_one_instant_both_occur() {
 #[test]
 fn a_reset_at_the_end_of_a_step_occurs_once() {
     for h in [0.25, 0.5, 1.0] {
-        let (status, q, resets) = through(&Box2 { reset: mirrored }, ([1.0, 1.0], [-1.0, 0.0]), h, 3.0);
+        let (status, q, resets) = through(Walls { reset: mirrored }, ([1.0, 1.0], [-1.0, 0.0]), h, 3.0);
         assert_eq!((status, resets), (Status::Completed, 1), "h = {h}");
         assert!((q[0] - 2.0).abs() <= 1e-14);
     }
     // The end of the run: the reset belongs to it or to its continuation, but the state is on the wall.
-    let (status, q, resets) = through(&Box2 { reset: mirrored }, ([1.0, 1.0], [-1.0, 0.0]), 0.25, 1.0);
+    let (status, q, resets) = through(Walls { reset: mirrored }, ([1.0, 1.0], [-1.0, 0.0]), 0.25, 1.0);
     assert!(status == Status::Completed && q[0].abs() <= 1e-15 && resets <= 1);
     // A start on the wall that leaves it.
-    let (_, q, resets) = through(&Box2 { reset: mirrored }, ([0.0, 1.0], [1.0, 0.0]), 0.25, 1.0);
+    let (_, q, resets) = through(Walls { reset: mirrored }, ([0.0, 1.0], [1.0, 0.0]), 0.25, 1.0);
     assert!((q[0] - 1.0).abs() <= 1e-15 && resets == 0);
     // A start on the wall that goes into it is on its other side.
-    let (_, q, resets) = through(&Box2 { reset: mirrored }, ([0.0, 1.0], [-1.0, 0.0]), 0.25, 1.0);
+    let (_, q, resets) = through(Walls { reset: mirrored }, ([0.0, 1.0], [-1.0, 0.0]), 0.25, 1.0);
     assert!((q[0] + 1.0).abs() <= 1e-15 && resets == 0);
 }
 
@@ -177,7 +179,7 @@ fn a_reset_may_trigger_another_one() {
         0 => Some(VelocityPoint::new([0.5, 0.0], [0.25, -1.0], x.z)),
         _ => mirrored(index, x),
     };
-    let (status, q, resets) = through(&Box2 { reset: onto_the_other }, ([1.0, 1.0], [-1.0, 0.0]), 0.3, 2.0);
+    let (status, q, resets) = through(Walls { reset: onto_the_other }, ([1.0, 1.0], [-1.0, 0.0]), 0.3, 2.0);
     // The state after the first reset is on the second wall, and goes beyond it: that is its other side.
     assert_eq!((status, resets), (Status::Completed, 1));
     assert!((q[0] - 0.75).abs() <= 1e-14 && (q[1] + 1.0).abs() <= 1e-14, "{q:?}");
@@ -186,7 +188,7 @@ fn a_reset_may_trigger_another_one() {
         0 => Some(VelocityPoint::new([0.5, 1e-9], [0.25, -1.0], x.z)),
         _ => mirrored(index, x),
     };
-    let (status, q, resets) = through(&Box2 { reset: before_the_other }, ([1.0, 1.0], [-1.0, 0.0]), 0.3, 2.0);
+    let (status, q, resets) = through(Walls { reset: before_the_other }, ([1.0, 1.0], [-1.0, 0.0]), 0.3, 2.0);
     assert_eq!((status, resets), (Status::Completed, 2));
     assert!((q[1] - (1.0 - 1e-9)).abs() <= 1e-14, "{q:?}");
 }
@@ -194,7 +196,7 @@ fn a_reset_may_trigger_another_one() {
 #[test]
 fn impossible_resets_end_with_a_status() {
     let cause = |reset: fn(usize, &VelocityPoint<2>) -> Option<VelocityPoint<2>>| match through(
-        &Box2 { reset },
+        Walls { reset },
         ([1.0, 1.0], [-1.0, 0.0]),
         0.3,
         2.0,

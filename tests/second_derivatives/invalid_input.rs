@@ -1,8 +1,9 @@
 //! Runs and directions without second derivatives.
 
+use crate::second_derivatives::systems::{Falling, Line};
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::systems::{Pendulum, System};
-use contact_geom::{Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
+use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Status, Steps, Until};
@@ -18,7 +19,8 @@ impl<const N: usize> Loss<N> for Constant {
 #[test]
 fn integrators_without_second_derivatives() {
     let pendulum = Pendulum::default();
-    let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
+    let (pendulum, start) = (Line::from(pendulum), pendulum.initial());
+    let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let variables = Variable::all(&problem);
     let (steps, until) = (Steps::Size(0.1), Until::Time(1.0));
     let found = problem.by(SplittingScheme::STRANG).steps(steps).second_tangent(&variables, until).unwrap_err();
@@ -31,7 +33,8 @@ fn integrators_without_second_derivatives() {
 #[test]
 fn directions_and_losses() {
     let pendulum = Pendulum::default();
-    let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
+    let (pendulum, start) = (Line::from(pendulum), pendulum.initial());
+    let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let (variables, until) = ([Variable::Position(0), Variable::Action], Until::Time(1.0));
     for direction in [vec![1.0], vec![1.0, f64::NAN], vec![1.0, f64::INFINITY]] {
@@ -56,14 +59,8 @@ fn directions_and_losses() {
 /// after a time of 1.4.
 #[test]
 fn runs_that_end_early() {
-    struct Falling;
-    impl Lagrangian<1> for Falling {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0] + q[0].sqrt() * 1e-3
-        }
-    }
-    impl Parametric<1> for Falling {}
-    let problem = Problem::new(&Falling, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let falling = Line::from(Falling);
+    let problem = Problem::new(&falling, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let (variables, until) = ([Variable::Position(0)], Until::Time(2.0));
     let found = run().hessian(&Constant(1.0), &variables, until).unwrap();
