@@ -1,6 +1,7 @@
 //! Runs with a requested accuracy: the error is at most the requested one, or the run is refused with the cause; and
 //! false declarations of structure, which are found along the motion.
 
+use crate::lagrangians::One;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{
@@ -8,8 +9,7 @@ use discrete_herglotz::{
 };
 use exact_lagrangian::herglotz_flow;
 
-/// One type for all systems of this file, since each type is compiled with every integrator: a mechanical system, and
-/// others with a false structure.
+/// A mechanical system, and others with a false structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     /// The formula of [`Bench`].
@@ -30,7 +30,7 @@ enum Kind {
 
 /// `v^2/2 - k q^2/2 - quartic q^4/4 + gamma z - c z^2 + q (force sin(omega t) + kick e^(-((t - at)/width)^2))`.
 #[derive(Clone, Copy)]
-struct Bench {
+pub struct Bench {
     gamma: f64,
     c: f64,
     k: f64,
@@ -97,18 +97,18 @@ impl Lagrangian<1> for Bench {
 }
 
 /// (q, p) after a span by the exact flow.
-fn truth(system: &Bench, start: &VelocityPoint<1>, span: f64) -> [f64; 2] {
+fn truth(system: &One, start: &VelocityPoint<1>, span: f64) -> [f64; 2] {
     let end = herglotz_flow(system, 0.0, start, span).unwrap().end;
     let end = legendre(system, span, &end);
     [end.q[0], end.p[0]]
 }
 
-fn problem(system: &Bench, start: VelocityPoint<1>) -> Problem<'_, Bench, 1> {
+fn problem(system: &One, start: VelocityPoint<1>) -> Problem<'_, One, 1> {
     Problem::new(system, 0.0, start).unwrap()
 }
 
 /// The error in (q, p) of a run up to a time, relative to their size.
-fn error(run: Run<'_, '_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
+fn error(run: Run<'_, '_, One, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
     let outcome = run.run(Until::Time(t))?;
     assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
     let size = truth[0].hypot(truth[1]);
@@ -126,7 +126,7 @@ fn by(name: &str) -> AnyIntegrator {
 /// The steps of the first trial runs resonate with the drive: runs of 4 and 8 steps evaluate no force at all.
 #[test]
 fn steps_that_resonate_with_the_drive() {
-    let driven = Bench { gamma: -0.1, force: 1.0, omega: std::f64::consts::TAU, ..FREE };
+    let driven = One::from(Bench { gamma: -0.1, force: 1.0, omega: std::f64::consts::TAU, ..FREE });
     let start = VelocityPoint::new([0.3], [0.0], 0.0);
     let truth = truth(&driven, &start, 16.0);
     for name in ["strang", "midpoint", "gauss_2", "gauss_8", "blanes_moan_6"] {
@@ -139,10 +139,10 @@ fn steps_that_resonate_with_the_drive() {
 /// With steps of a thousand periods an oscillator does not move; spans of a thousand to a million periods.
 #[test]
 fn steps_far_beyond_the_period() {
-    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    let (oscillator, start) = (One::from(OSCILLATOR), VelocityPoint::new([1.0], [0.0], 0.0));
     for span in [1e3, 3.3e4, 1.7e6, 9.1e6] {
         let (sin, cos) = f64::sin_cos(span);
-        let problem = problem(&OSCILLATOR, start);
+        let problem = problem(&oscillator, start);
         let to = |wanted| problem.accuracy(wanted);
         for (run, wanted) in [(to(1e-2).by(by("gauss_8")), 1e-2), (to(1e-7), 1e-7)] {
             let error = error(run, span, [cos, -sin]).unwrap();
@@ -152,7 +152,7 @@ fn steps_far_beyond_the_period() {
 }
 
 /// A run with a relative error of a millionth, by a named integrator or by the default.
-fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>) -> Run<'p, 'o, Bench, 1> {
+fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, One, 1>, name: Option<&str>) -> Run<'p, 'o, One, 1> {
     let run = problem.accuracy(1e-6);
     if let Some(name) = name { run.by(by(name)) } else { run }
 }
@@ -162,7 +162,7 @@ fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>
 fn short_kicks() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     for width in [1.0, 0.1, 0.016] {
-        let kicked = Bench { gamma: -0.1, kick: 1.0 / width, at: 7.3, width, ..OSCILLATOR };
+        let kicked = One::from(Bench { gamma: -0.1, kick: 1.0 / width, at: 7.3, width, ..OSCILLATOR });
         // In three parts, so that the exact flow cannot miss the kick.
         let (before, after) = (7.3 - 6.0 * width, 7.3 + 6.0 * width);
         let mut x = start;
@@ -180,7 +180,7 @@ fn short_kicks() {
 /// Amplitudes near the smallest numbers, and a start at rest in an equilibrium.
 #[test]
 fn tiny_motions_and_none() {
-    let damped = Bench { gamma: -0.1, quartic: 1.0, ..OSCILLATOR };
+    let damped = One::from(Bench { gamma: -0.1, quartic: 1.0, ..OSCILLATOR });
     for size in [1e-160, 1e-300, 0.0] {
         let start = VelocityPoint::new([size], [0.0], 0.0);
         // The quartic term is below round-off, so that the closed form is that of the oscillator.
@@ -202,6 +202,7 @@ fn spans_that_go_back() {
     let start = VelocityPoint::new([1.0], [0.5], 0.0);
     let kicked = Bench { gamma: -0.1, kick: 1.0, at: -4.0, ..OSCILLATOR };
     for (system, span) in [(DUFFING, -5.0), (kicked, -12.0)] {
+        let system = One::from(system);
         let (problem, truth) = (problem(&system, start), truth(&system, &start, span));
         for name in [None, Some("strang"), Some("midpoint"), Some("gauss_3"), Some("gauss_8")] {
             let error = error(to_a_millionth(&problem, name), span, truth).unwrap();
@@ -214,23 +215,25 @@ fn spans_that_go_back() {
 #[test]
 fn causes() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
-    let refused = |system: &Bench, start: VelocityPoint<1>, span: f64| {
-        let problem = Problem::new(system, 0.0, start);
+    let refused = |system: Bench, start: VelocityPoint<1>, span: f64| {
+        let system = One::from(system);
+        let problem = Problem::new(&system, 0.0, start);
         problem.and_then(|problem| to_a_millionth(&problem, None).plan(Until::Time(span)).map(drop)).err()
     };
     let chaotic = Bench { gamma: -0.1, force: 0.35, omega: 1.4, ..DUFFING };
-    let cause = refused(&chaotic, start, 500.0);
+    let cause = refused(chaotic, start, 500.0);
     let Some(InputError::Accuracy { cause: SelectionFailure::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
     assert!(t < 500.0);
     // Up to half of that time the run is accepted and accurate: the round-off of the exact flow grows to at most 1e-7
     // there.
     let trusted = 0.5 * t;
+    let chaotic = One::from(chaotic);
     let problem = problem(&chaotic, start);
     let error = error(to_a_millionth(&problem, None), trusted, truth(&chaotic, &start, trusted));
     assert!(error.as_ref().is_ok_and(|e| *e <= 1e-6), "{trusted}: {error:?}");
     // Blow-up of z in a finite time.
     let pole = Bench { c: -1.0, ..FREE };
-    let cause = refused(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0);
+    let cause = refused(pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0);
     let Some(InputError::Accuracy { cause: SelectionFailure::StepFailed { t, .. }, .. }) = cause else {
         panic!("{cause:?}")
     };
@@ -239,9 +242,9 @@ fn causes() {
     let pole = 1.0 / (1.0 + 0.5f64.sqrt());
     assert!((t - pole).abs() < 1e-3, "{t}, not {pole}");
     let nan = Bench { gamma: f64::NAN, ..OSCILLATOR };
-    assert_eq!(refused(&nan, start, 10.0), Some(InputError::Undefined));
+    assert_eq!(refused(nan, start, 10.0), Some(InputError::Undefined));
     let singular = Bench { kind: Kind::Singular, claims: Some(Structure::default()), ..FREE };
-    let refused = refused(&singular, start, 10.0);
+    let refused = refused(singular, start, 10.0);
     assert!(matches!(refused, Some(InputError::FirstStep(StepError::Singular { .. }))), "{refused:?}");
 }
 
@@ -269,10 +272,10 @@ fn claims_are_checked_along_the_motion() {
         ),
     ];
     for (kind, structure, start, claim) in cases {
-        let system = Bench { kind, claims: Some(structure), ..FREE };
+        let system = One::from(Bench { kind, claims: Some(structure), ..FREE });
         for steps in [Some(Steps::Count(400)), Some(Steps::Size(0.01)), None] {
             for integrator in ["gauss_6", "strang"] {
-                let run = |problem: Problem<'_, Bench, 1>| {
+                let run = |problem: Problem<'_, One, 1>| {
                     let run = problem.by(by(integrator));
                     let run = if let Some(steps) = steps { run.steps(steps) } else { run.accuracy(1e-6) };
                     run.run(Until::Time(8.0))
@@ -300,8 +303,9 @@ fn claims_are_checked_along_the_motion() {
 #[test]
 fn the_estimate_is_of_the_run() {
     let start = VelocityPoint::new([1.5], [0.0], 0.0);
-    let truth = truth(&DUFFING, &start, 20.0);
-    let (problem, until) = (problem(&DUFFING, start), Until::Time(20.0));
+    let duffing = One::from(DUFFING);
+    let truth = truth(&duffing, &start, 20.0);
+    let (problem, until) = (problem(&duffing, start), Until::Time(20.0));
     for wanted in [1e-4, 1e-8] {
         let plan = problem.accuracy(wanted).plan(until).unwrap();
         assert!(plan.error().is_some_and(|e| e <= wanted));

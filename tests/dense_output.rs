@@ -3,6 +3,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::gauss::cut;
+use crate::lagrangians::{One, one};
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{
     ChartVector, Lagrangian, PhasePoint, VelocityPoint, legendre,
@@ -18,7 +19,7 @@ use discrete_herglotz::{
 #[test]
 fn curves_have_the_order_of_the_stages() {
     let oscillator = HarmonicOscillator { gamma: -0.5 };
-    let system = OneCoordinate::from(oscillator);
+    let system = one(oscillator);
     let x = VelocityPoint::new([1.0], [0.5], 0.3);
     let exact = |t: f64| legendre(&system, t, &oscillator.solution(t, &x));
     for s in 1..=4 {
@@ -26,8 +27,8 @@ fn curves_have_the_order_of_the_stages() {
         for route in [GaussRoute::Linear, GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
             let errors = [20, 40].map(|steps| {
                 let h = 2.0 / f64::from(steps);
-                let claims = WithStructure(system, cut(&system, route));
-                let gauss = Gauss::new(&claims, s, h);
+                let claims = WithStructure(OneCoordinate::from(oscillator), cut(&system, route));
+                let gauss = Gauss::new(One::from(claims), s, h);
                 let stepper = gauss.as_ref().map(|g| g.stepper(0.0, legendre(&system, 0.0, &x), x.v));
                 let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
                 let mut worst = [0.0f64; 3];
@@ -76,7 +77,7 @@ fn events<'f, const N: usize, L: Lagrangian<N>>(
 #[test]
 fn crossings_are_those_of_the_closed_form() {
     let oscillator = HarmonicOscillator { gamma: -0.1 };
-    let system = OneCoordinate::from(oscillator);
+    let system = one(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     // q = e^(a t) (cos w t - (a/w) sin w t) vanishes where tan w t = w/a, a < 0.
     let a = 0.5 * oscillator.gamma;
@@ -115,7 +116,7 @@ fn crossings_are_those_of_the_closed_form() {
 #[test]
 fn events_within_one_step() {
     let oscillator = HarmonicOscillator { gamma: -0.1 };
-    let system = OneCoordinate::from(oscillator);
+    let system = one(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     // q < -0.8 only for a short time around the first turning point, within one step.
     let dip = || Event::new(|_, x: &PhasePoint<1>| x.q[0] + 0.8);
@@ -135,16 +136,11 @@ fn events_within_one_step() {
 fn a_zero_at_a_node_is_one_crossing() {
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     let steps = (4, 6, 3.0);
-    let (_, crossings) =
-        events(&OneCoordinate::from(Pendulum::default()), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
+    let (_, crossings) = events(&one(Pendulum::default()), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
     assert_eq!(crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
     // It touches zero without a change of sign.
-    let (_, crossings) = events(
-        &OneCoordinate::from(Pendulum::default()),
-        x,
-        steps,
-        [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))],
-    );
+    let (_, crossings) =
+        events(&one(Pendulum::default()), x, steps, [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))]);
     assert_eq!(crossings, []);
 }
 
@@ -154,8 +150,7 @@ fn a_function_that_is_not_finite_is_a_status() {
     let x = VelocityPoint::new([1.0], [0.0], 1.0);
     let passes = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     let undefined = Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 });
-    let (outcome, crossings) =
-        events(&OneCoordinate::from(QuadraticInZ { c: 0.1 }), x, (5, 20, 6.0), [passes(), undefined]);
+    let (outcome, crossings) = events(&one(QuadraticInZ { c: 0.1 }), x, (5, 20, 6.0), [passes(), undefined]);
     let Status::Failed { step, t: ended, cause: StepError::Event { t } } = outcome.status else {
         panic!("{outcome:?}")
     };
@@ -163,7 +158,7 @@ fn a_function_that_is_not_finite_is_a_status() {
     assert!(t > 2.0 && t <= 2.1 && ended <= 2.1, "{t}, {ended}");
     assert_eq!((outcome.steps, outcome.t, crossings.len()), (step, ended, 1));
     // A run without steps is refused.
-    let (pendulum, mut none) = (OneCoordinate::from(Pendulum::default()), Events::new([]));
+    let (pendulum, mut none) = (one(Pendulum::default()), Events::new([]));
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let refused = problem.steps(Steps::Count(0)).observe(&mut none).run(Until::Time(1.0));
     assert!(matches!(refused, Err(InputError::Count { found: 0, .. })), "{refused:?}");
@@ -172,7 +167,7 @@ fn a_function_that_is_not_finite_is_a_status() {
 /// Where the action is not requested, z keeps its value, and the rest of the curve is the same.
 #[test]
 fn without_action() {
-    let system = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let system = one(Pendulum { gamma: -0.1 });
     let start = PhasePoint::new([1.0], [0.5], 0.25);
     let gauss = Gauss::new(system, 6, 0.3);
     let Ok(gauss) = &gauss else { panic!("no method") };

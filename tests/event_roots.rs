@@ -1,7 +1,8 @@
 //! All sign changes of an event function within one step, and a status where they cannot be told apart.
 
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
+use contact_geom::systems::{FreeParticle, HarmonicOscillator, OneCoordinate};
 use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, GaussCollocation, Outcome, Problem, Status, StepError, Steps, Until, rules::Method,
@@ -9,7 +10,7 @@ use discrete_herglotz::{
 use std::f64::consts::PI;
 
 /// `v^2/2 + (6t + 12) x`: the motion from `x = -120` with `v = 92` at t = -8 is `(t + 6)(t + 2)(t - 2)`.
-struct Cubic;
+pub struct Cubic;
 
 impl Lagrangian<1> for Cubic {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -17,11 +18,11 @@ impl Lagrangian<1> for Cubic {
     }
 }
 
-const LINE: FreeParticle = FreeParticle { gamma: 0.0 };
+const LINE: One = One::Catalogue(OneCoordinate::FreeParticle(FreeParticle { gamma: 0.0 }));
 
 /// The outcome of a run, and the times of the sign changes of one event.
-fn times_of<L: Lagrangian<1>>(
-    system: &L,
+fn times_of(
+    system: &One,
     (t0, x, v): (f64, f64, f64),
     (stages, steps, to): (usize, usize, f64),
     event: Event<'_, 1>,
@@ -45,8 +46,9 @@ fn assert_times(name: &str, found: &[f64], expected: &[f64], bound: f64) {
 fn three_sign_changes_of_a_motion_in_one_step() {
     let position = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     // The curve of a step with two stages is a parabola.
+    let cubic = One::from(Cubic);
     for stages in 3..=16 {
-        let of = |event| times_of(&Cubic, (-8.0, -120.0, 92.0), (stages, 1, 4.0), event);
+        let of = |event| times_of(&cubic, (-8.0, -120.0, 92.0), (stages, 1, 4.0), event);
         let name = format!("{stages} stages");
         // Roundings of a step of length 12 over speeds of 16 and more.
         assert_times(&name, &of(position()).1, &[-6.0, -2.0, 2.0], 1e-12);
@@ -55,7 +57,7 @@ fn three_sign_changes_of_a_motion_in_one_step() {
         assert_times(&name, &found, &[-6.0], 1e-12);
         assert!(ended.t == found[0] && matches!(ended.status, Status::Stopped { by: "an event", .. }), "{ended:?}");
     }
-    let (_, back) = times_of(&Cubic, (4.0, 120.0, 92.0), (4, 1, -8.0), position());
+    let (_, back) = times_of(&cubic, (4.0, 120.0, 92.0), (4, 1, -8.0), position());
     assert_times("backward", &back, &[2.0, -2.0, -6.0], 1e-12);
 }
 
@@ -116,7 +118,7 @@ fn an_almost_tangent_surface() {
         }
     }
     // In the middle of a step of a motion that the curve of the step has only to 1e-6.
-    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     let of = |offset: f64| {
         let event = Event::new(move |_, x: &PhasePoint<1>| x.q[0] + 1.0 + offset);
         times_of(&oscillator, (0.0, 1.0, 0.0), (8, 3, 6.0), event)
@@ -152,7 +154,7 @@ fn functions_that_are_not_smooth() {
     }
     // A conserved quantity is zero up to round-off: whatever is found, the run continues.
     let energy = Event::new(|_, x: &PhasePoint<1>| (x.q[0].powi(2) + x.p[0].powi(2)) * 0.5 - 0.5);
-    let (outcome, _) = times_of(&HarmonicOscillator { gamma: 0.0 }, (0.0, 1.0, 0.0), (8, 400, 40.0), energy);
+    let (outcome, _) = times_of(&one(HarmonicOscillator { gamma: 0.0 }), (0.0, 1.0, 0.0), (8, 400, 40.0), energy);
     assert_eq!(outcome.status, Status::Completed);
 }
 

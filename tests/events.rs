@@ -1,7 +1,8 @@
 //! Events of consecutive runs: each change of sign is counted once, in exactly one of the runs.
 
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, UniformField};
+use contact_geom::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, StepView, Steps,
@@ -12,7 +13,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 /// An oscillation of frequency one about a place.
-struct About(f64);
+pub struct About(f64);
 
 impl Lagrangian<1> for About {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -22,7 +23,7 @@ impl Lagrangian<1> for About {
 }
 
 /// A damped oscillation under a force that depends on time.
-struct Driven {
+pub struct Driven {
     force: f64,
     frequency: f64,
 }
@@ -34,8 +35,8 @@ impl Lagrangian<1> for Driven {
 }
 
 /// A run from a start to a time, with its end and the crossings of events.
-fn run_to<'f, L: Lagrangian<1>>(
-    system: &L,
+fn run_to<'f>(
+    system: &One,
     (t0, start): (f64, impl Into<Start<1>>),
     (by, steps): (AnyIntegrator, Steps),
     to: f64,
@@ -67,7 +68,7 @@ fn a_run_from_a_crossing_finds_the_next() {
                 if jump && place != 0.0 {
                     continue;
                 }
-                let system = About(place);
+                let system = One::from(About(place));
                 let (mut t, mut start) = (0.0, Start::from(VelocityPoint::new([place + 1.0], [0.0], 0.0)));
                 for k in 0..12 {
                     let event = Event::new(|_, x: &PhasePoint<1>| {
@@ -94,7 +95,7 @@ fn a_run_from_a_crossing_finds_the_next() {
 /// acceleration, in long and short steps.
 #[test]
 fn a_start_within_rounding_crosses_by_its_rate() {
-    let ball = UniformField { field: [-9.81], gamma: 0.0 };
+    let ball = One::from(UniformField { field: [-9.81], gamma: 0.0 });
     for below in [-2e-16, 0.0, 2e-16, -1e-17] {
         for (count, h) in [(1, 20.0), (20, 1.0), (2000, 0.01)] {
             let floor = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
@@ -124,7 +125,7 @@ fn a_start_within_rounding_crosses_by_its_rate() {
 /// run and it is resumed.
 #[test]
 fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
-    let system = HarmonicOscillator { gamma: 0.0 };
+    let system = one(HarmonicOscillator { gamma: 0.0 });
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(8));
     let at_one = || Event::new(|t, _: &PhasePoint<1>| t - 1.0);
@@ -155,7 +156,7 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
 /// events are not reported.
 #[test]
 fn all_events_of_an_instant_are_reported() {
-    let system = HarmonicOscillator { gamma: 0.0 };
+    let system = one(HarmonicOscillator { gamma: 0.0 });
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     for (stages, steps) in [(4, 7), (8, 3), (16, 1)] {
         let all = || {
@@ -178,7 +179,7 @@ fn all_events_of_an_instant_are_reported() {
 }
 
 /// A fall towards the end of the potential: `v^2/2 - x^(5/2)` for x >= 0.
-struct EndsAtZero;
+pub struct EndsAtZero;
 
 impl Lagrangian<1> for EndsAtZero {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -187,7 +188,7 @@ impl Lagrangian<1> for EndsAtZero {
 }
 
 /// `v^2/2 + 1/x`: an attractive centre, beyond which the motion is not defined.
-struct Well;
+pub struct Well;
 
 impl Lagrangian<1> for Well {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -199,10 +200,11 @@ impl Lagrangian<1> for Well {
 /// start, for any span and integrator.
 #[test]
 fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
+    let (ending, well) = (One::from(EndsAtZero), One::from(Well));
     let floor = |at: f64| Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at).terminal();
     for (to, at) in [(10.0, 1e-3), (1e3, 1e-3), (10.0, 1e-6), (10.0, 0.5)] {
         for v in [-1.0, 0.0, 0.5] {
-            let problem = Problem::new(&EndsAtZero, 0.0, VelocityPoint::new([1.0], [v], 0.0)).unwrap();
+            let problem = Problem::new(&ending, 0.0, VelocityPoint::new([1.0], [v], 0.0)).unwrap();
             for by in [None, Some(AnyIntegrator::Gauss { stages: 8 }), Some(AnyIntegrator::Gauss { stages: 16 })] {
                 let mut events = Events::new([floor(at)]);
                 let run = by.map_or_else(|| problem.accuracy(1e-9), |by| problem.by(by).accuracy(1e-9));
@@ -219,7 +221,7 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
         }
     }
     // With dissipation, towards a pole: against a finer run to the same place.
-    let problem = Problem::new(&Well, 0.0, VelocityPoint::new([1.0], [0.1], 0.0)).unwrap();
+    let problem = Problem::new(&well, 0.0, VelocityPoint::new([1.0], [0.1], 0.0)).unwrap();
     let [coarse, fine] = [1e-6, 1e-10].map(|wanted| {
         let mut events = Events::new([floor(0.01)]);
         problem.accuracy(wanted).observe(&mut events).run(Until::Time(50.0)).unwrap()
@@ -229,7 +231,7 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
     // Without the event the motion does not reach the end of the span.
     assert!(problem.accuracy(1e-6).run(Until::Time(50.0)).is_err());
     // An event that does not occur changes nothing.
-    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     let problem = Problem::new(&oscillator, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let mut events = Events::new([floor(2.0)]);
     let with = problem.accuracy(1e-9).observe(&mut events).run(Until::Time(30.0)).unwrap();
@@ -240,7 +242,8 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
 /// step.
 #[test]
 fn a_step_that_cannot_be_taken_may_end_in_an_event() {
-    let problem = Problem::new(&EndsAtZero, 0.0, VelocityPoint::new([1.0], [-1.0], 0.0)).unwrap();
+    let system = One::from(EndsAtZero);
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [-1.0], 0.0)).unwrap();
     let times: Vec<f64> = (0..64).map(|k| 0.01 * f64::from(k)).collect();
     for count in [20, 30, 50] {
         let mut events = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0] - 1e-3).terminal()]);
@@ -258,7 +261,7 @@ fn a_step_that_cannot_be_taken_may_end_in_an_event() {
 /// not.
 #[test]
 fn a_crossing_before_the_function_ends_is_found() {
-    let ball = UniformField { field: [-9.81], gamma: 0.0 };
+    let ball = One::from(UniformField { field: [-9.81], gamma: 0.0 });
     let root = || Event::new(|_, x: &PhasePoint<1>| x.q[0].sqrt() - 0.5);
     let start = VelocityPoint::new([3.0], [0.0], 0.0);
     let expected = f64::sqrt(2.0 * 2.75 / 9.81);
@@ -295,7 +298,7 @@ proptest! {
         own in prop::collection::vec(any::<bool>(), 40),
         stages in 6usize..12,
     ) {
-        let system = Driven { force, frequency };
+        let system = One::from(Driven { force, frequency });
         let way = (AnyIntegrator::Gauss { stages }, Steps::Size(0.05));
         let all = || [
             Event::new(|_, x: &PhasePoint<1>| x.q[0]),
@@ -344,7 +347,7 @@ proptest! {
 /// without the action.
 #[test]
 fn a_crossing_is_a_state_of_the_motion() {
-    let pendulum = contact_geom::systems::Pendulum { gamma: -0.02 };
+    let pendulum = one(Pendulum { gamma: -0.02 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.2], 0.3)).unwrap();
     let until = Until::Time(40.0);
     for (by, h) in [

@@ -1,5 +1,6 @@
 //! All features of a run, by integrators without a name in the table: the exact flow, and a user's discrete Lagrangian.
 
+use crate::lagrangians::{One, one};
 use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{
@@ -30,10 +31,11 @@ impl<L: Lagrangian<1>> DiscreteLagrangian<1> for Own<L> {
 }
 
 /// Every feature of a run, for one integrator on one system.
-fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, L, 1> + Clone, order: i32) {
+fn everything(known: OneCoordinate, integrator: impl for<'a> Integrator<'a, One, 1> + Clone, order: i32) {
     let name = integrator.info().name;
-    let problem = Problem::new(system, 0.25, system.initial()).unwrap();
-    let of = |problem: &Problem<'_, L, 1>, until: f64| -> Outcome<1> {
+    let (system, initial) = (&one(known), known.initial());
+    let problem = Problem::new(system, 0.25, initial).unwrap();
+    let of = |problem: &Problem<'_, One, 1>, until: f64| -> Outcome<1> {
         problem.by(integrator.clone()).steps(Steps::Size(0.05)).run(Until::Time(until)).unwrap()
     };
     let error = |order: i32| f64::powi(0.15, order) + 1e-12;
@@ -42,7 +44,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
 
     // Backward.
     let back = of(&Problem::new(system, whole.t, &whole).unwrap(), 0.25);
-    assert!((back.q[0] - system.initial().q[0]).abs() <= 1e-12, "{name}: back at {}", back.q[0]);
+    assert!((back.q[0] - initial.q[0]).abs() <= 1e-12, "{name}: back at {}", back.q[0]);
 
     // Rows at times; between steps they are as accurate as at the ends: the energy decays as the conformal factor.
     let mut rows = Rows::at([0.25, 0.3, 1.111, 2.0, 3.25]).unwrap().with_energy().with_conformal_factor();
@@ -53,7 +55,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     assert!(rows.rows.len() == 5 && off <= error(order), "{name}: {off:e}");
 
     // Events, and a run that ends in one of them.
-    let top = system.initial().q[0];
+    let top = initial.q[0];
     let mut passes = Events::new([Event::new(|_, x| x.q[0] - 0.5 * top).terminal()]);
     let stopped =
         problem.by(integrator.clone()).steps(Steps::Size(0.05)).observe(&mut passes).run(Until::Time(9.0)).unwrap();
@@ -61,14 +63,14 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     assert!((stopped.q[0] - 0.5 * top).abs() <= 8.0 * f64::EPSILON, "{name}");
 
     // A run that an observer stops, and its continuation from an earlier checkpoint, which is the same to the last bit.
-    let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", system.name()));
+    let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", known.name()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
     let mut seen = 0;
     let mut enough = |at: &StepView<'_, 1>| {
         seen = at.k;
         if at.k == 30 { ControlFlow::Break(Stop::here("the user")) } else { ControlFlow::Continue(()) }
     };
-    let run = || -> Run<'_, '_, L, 1> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
+    let run = || -> Run<'_, '_, One, 1> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
     let cut = run().observe(&mut saved).observe(&mut enough).run(Until::Time(3.25)).unwrap();
     assert_eq!((cut.status, seen), (Status::Stopped { step: 30, t: cut.t, by: "the user" }, 30), "{name}");
     let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(3.25)).unwrap();
@@ -78,30 +80,28 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
 
 #[test]
 fn by_the_exact_flow() {
-    everything(&OneCoordinate::from(Pendulum { gamma: -0.1 }), ExactFlow, 16);
-    everything(&OneCoordinate::from(QuadraticInZ::default()), ExactFlow, 16);
+    everything(Pendulum { gamma: -0.1 }.into(), ExactFlow, 16);
+    everything(QuadraticInZ::default().into(), ExactFlow, 16);
 }
 
 #[test]
 fn by_a_users_discrete_lagrangian() {
-    fn of<L: System<1> + Copy + 'static>(system: &L) {
-        let lagrangian = *system;
-        everything(system, CustomMethod::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
+    fn of(lagrangian: OneCoordinate) {
+        everything(lagrangian, CustomMethod::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
     }
-    of(&OneCoordinate::from(Pendulum { gamma: -0.1 }));
-    of(&OneCoordinate::from(QuadraticInZ::default()));
+    of(Pendulum { gamma: -0.1 }.into());
+    of(QuadraticInZ::default().into());
 }
 
 /// A run may start from a velocity or a momentum; the velocity of the outcome is that of its momentum.
 #[test]
 fn starts() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = one(Pendulum { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
     let by_velocity = Problem::new(&pendulum, 0.0, start).unwrap();
     let by_momentum = Problem::new(&pendulum, 0.0, contact_geom::legendre(&pendulum, 0.0, &start)).unwrap();
-    let end = |problem: &Problem<'_, OneCoordinate, 1>| {
-        problem.by(ExactFlow).steps(Steps::Count(3)).run(Until::Time(1.0)).unwrap()
-    };
+    let end =
+        |problem: &Problem<'_, One, 1>| problem.by(ExactFlow).steps(Steps::Count(3)).run(Until::Time(1.0)).unwrap();
     assert_eq!(end(&by_velocity), end(&by_momentum));
     let outcome = end(&by_velocity);
     assert!((outcome.v.unwrap()[0] - outcome.p[0]).abs() <= f64::EPSILON);

@@ -1,12 +1,13 @@
 //! Forces: closed forms, orders, routes, and what a force leaves of the geometry.
 
 mod rules;
-mod splittings;
+pub mod splittings;
 
-use crate::common::forces::{AnyForce, Drag, DragInLagrangian, Fall, G, Swirl, Undeclared};
+use crate::common::forces::{Drag, DragInLagrangian, Fall, G};
 use crate::common::oracle::motion;
 use crate::common::{relative_distance, slope};
-use contact_geom::systems::{CoupledPlane, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates};
+use crate::lagrangians::{Applied, One, one, two};
+use contact_geom::systems::{CoupledPlane, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Forced, Lagrangian, PhasePoint, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan};
 use discrete_herglotz::gauss::{GaussRoute, GaussStepper, VirtualWork};
 use discrete_herglotz::{GaussCollocation, Problem, Stepper, StepperOptions, Steps, Until};
@@ -34,7 +35,8 @@ fn gauss<const N: usize>(
 #[test]
 fn a_fall_with_quadratic_drag() {
     let (k, start) = (0.2, VelocityPoint::new([0.0], [0.0], 0.0));
-    let (forced, contact) = (Forced { lagrangian: Fall, force: Drag { c: 0.0, k } }, DragInLagrangian { k });
+    let drag = Applied::Drag(Drag { c: 0.0, k });
+    let (forced, contact) = (Forced { lagrangian: One::from(Fall), force: drag }, One::from(DragInLagrangian { k }));
     let mut t = 0.0;
     for _ in 0..5 {
         t += 0.4;
@@ -63,9 +65,9 @@ fn a_fall_with_quadratic_drag() {
 /// q and z, against 16 stages; and those against the oracle, an ODE solver of another library.
 #[test]
 fn orders_are_twice_the_stages() {
-    fn of<const N: usize, S: System<N>>(system: &S, finest: [[usize; 4]; 3]) {
+    fn of<const N: usize, S: System<N>>(system: &S, lagrangian: impl Lagrangian<N>, finest: [[usize; 4]; 3]) {
         let (t, x) = (system.initial_time(), system.initial());
-        let forced = Forced { lagrangian: system, force: AnyForce };
+        let forced = Forced { lagrangian, force: Applied::Any };
         let (truth, route) = gauss(&forced, t, x, 16, 1.0 / 32.0, 32);
         assert!(matches!(route, GaussRoute::General | GaussRoute::ConstantMass), "{} {route:?}", system.name());
         let oracle = legendre(&forced, t + 1.0, &motion(&forced, t, &x, 1.0));
@@ -92,38 +94,38 @@ fn orders_are_twice_the_stages() {
             }
         }
     }
-    of(&OneCoordinate::from(QuadraticInZ { c: 1.0 }), [[64, 90, 128, 180], [24, 32, 48, 64], [12, 16, 20, 24]]);
-    of(
-        &TwoCoordinates::from(CoupledPlane { c: 1.5, ..CoupledPlane::default() }),
-        [[64, 90, 128, 180], [24, 32, 48, 64], [12, 16, 20, 24]],
-    );
+    let square = QuadraticInZ { c: 1.0 };
+    of(&square, one(square), [[64, 90, 128, 180], [24, 32, 48, 64], [12, 16, 20, 24]]);
+    let plane = CoupledPlane { c: 1.5, ..CoupledPlane::default() };
+    of(&plane, two(plane), [[64, 90, 128, 180], [24, 32, 48, 64], [12, 16, 20, 24]]);
 }
 
 /// A separable Lagrangian with a force of positions and time takes the condensed route; without that claim it takes the
 /// general one. The two are equal to round-off, after 100 steps to the 30 eps that `gauss::routes_agree` allows.
 #[test]
 fn a_force_of_positions_takes_the_condensed_route() {
-    fn of<const N: usize, S: System<N>>(system: &S, s: usize, h: f64) {
+    fn of<const N: usize, L: Lagrangian<N>>(system: &impl System<N>, lagrangian: fn() -> L, s: usize, h: f64) {
         let x = system.initial();
-        let condensed = gauss(&Forced { lagrangian: system, force: Swirl }, 0.0, x, s, h, 100);
-        let general = gauss(&Forced { lagrangian: system, force: Undeclared(Swirl) }, 0.0, x, s, h, 100);
+        let forced = |force| Forced { lagrangian: lagrangian(), force };
+        let condensed = gauss(&forced(Applied::Swirl), 0.0, x, s, h, 100);
+        let general = gauss(&forced(Applied::UndeclaredSwirl), 0.0, x, s, h, 100);
         assert_eq!((condensed.1, general.1), (GaussRoute::Condensed, GaussRoute::ConstantMass), "{}", system.name());
         let off = relative_distance(condensed.0, general.0) / f64::EPSILON;
         assert!(off <= 30.0, "{} s = {s}: {off} eps", system.name());
     }
     for s in [3, 8, 13] {
-        of(&OneCoordinate::from(Pendulum { gamma: -0.1 }), s, 0.1);
-        of(&Kepler::<3>::default(), s, 0.05);
+        of(&Pendulum { gamma: -0.1 }, || one(Pendulum { gamma: -0.1 }), s, 0.1);
+        of(&Kepler::<3>::default(), Kepler::<3>::default, s, 0.05);
     }
 }
 
 /// Long steps with a force of positions, which Newton's method solves, agree with the general route.
 #[test]
 fn long_steps_by_newtons_method() {
-    let system = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let forced = |force| Forced { lagrangian: one(Pendulum { gamma: -0.1 }), force };
     let x = VelocityPoint::new([2.0], [1.0], 0.0);
-    let condensed = gauss(&Forced { lagrangian: &system, force: Swirl }, 0.0, x, 4, 5.0, 3).0;
-    let general = gauss(&Forced { lagrangian: &system, force: Undeclared(Swirl) }, 0.0, x, 4, 5.0, 3).0;
+    let condensed = gauss(&forced(Applied::Swirl), 0.0, x, 4, 5.0, 3).0;
+    let general = gauss(&forced(Applied::UndeclaredSwirl), 0.0, x, 4, 5.0, 3).0;
     let off = relative_distance(condensed, general);
     assert!(off <= 1e-12, "{off:e}");
 }
@@ -134,10 +136,10 @@ fn long_steps_by_newtons_method() {
 fn stiff_drag_converges() {
     for (s, ch) in [(1, 10.0), (2, 1.0), (2, 10.0), (3, 10.0), (4, 30.0), (8, 100.0)] {
         let free = Structure { autonomous: true, z_free: true, constant_mass: true, ..Structure::default() };
-        let system = crate::common::lagrangians::WithStructure(Fall, free);
+        let system = One::from(crate::common::lagrangians::WithStructure(Fall, free));
         let (h, steps) = (0.1, 5);
         let c = ch / h;
-        let forced = Forced { lagrangian: &system, force: Drag { c, k: 0.0 } };
+        let forced = Forced { lagrangian: system, force: Applied::Drag(Drag { c, k: 0.0 }) };
         let start = VelocityPoint::new([0.0], [1.0], 0.0);
         let (end, _) = gauss(&forced, 0.0, start, s, h, steps);
         // P(-x)/P(x) with P(x) = sum_k (2s-k)! s! / ((2s)! k! (s-k)!) x^k.
@@ -157,7 +159,8 @@ fn stiff_drag_converges() {
 /// plane, to the round-off of 1000 steps; its size decreases.
 #[test]
 fn drag_keeps_the_direction_of_angular_momentum() {
-    let forced = Forced { lagrangian: Kepler::<3> { gamma: 0.0, mu: 1.0 }, force: Drag { c: 0.0, k: 0.005 } };
+    let drag = Applied::Drag(Drag { c: 0.0, k: 0.005 });
+    let forced = Forced { lagrangian: Kepler::<3> { gamma: 0.0, mu: 1.0 }, force: drag };
     let x = VelocityPoint::new([0.8, 0.3, 0.1], [-0.3, 0.9, 0.4], 0.0);
     let (end, _) = gauss(&forced, 0.0, x, 6, 0.05, 1000);
     let (before, after) = (x.q.cross(&x.v), end.q.cross(&end.p));
@@ -170,7 +173,7 @@ fn drag_keeps_the_direction_of_angular_momentum() {
 /// A run by its builder: the outcome is that of the stepper, and accuracy can be requested.
 #[test]
 fn runs_take_forces() {
-    let forced = Forced { lagrangian: Fall, force: Drag { c: 0.0, k: 0.2 } };
+    let forced = Forced { lagrangian: One::from(Fall), force: Applied::Drag(Drag { c: 0.0, k: 0.2 }) };
     let problem = Problem::new(&forced, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages: 6 }).steps(Steps::Count(40)).run(Until::Time(2.0)).unwrap();
     let q = -((G * 0.2_f64).sqrt() * 2.0).cosh().ln() / 0.2;

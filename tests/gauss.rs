@@ -6,6 +6,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::common::{relative_distance, slope};
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
@@ -33,14 +34,14 @@ pub fn cut<const N: usize>(system: &impl Lagrangian<N>, route: GaussRoute) -> St
 
 /// A run from the natural start; panics where it fails.
 fn run<const N: usize, S: Lagrangian<N>>(
-    system: &S,
+    system: S,
     (t, x): (f64, VelocityPoint<N>),
     s: usize,
     h: f64,
     steps: usize,
 ) -> (PhasePoint<N>, u64, GaussRoute) {
+    let start = legendre(&system, t, &x);
     let gauss = Gauss::new(system, s, h);
-    let start = legendre(system, t, &x);
     let outcome = gauss.as_ref().map_err(|e| e.to_string()).and_then(|gauss| {
         let mut stepper = gauss.stepper(t, start, x.v).map_err(|e| e.to_string())?;
         stepper.advance(steps).map_err(|halt| format!("{halt:?}"))?;
@@ -52,7 +53,7 @@ fn run<const N: usize, S: Lagrangian<N>>(
 
 /// A relativistic particle of mass and speed of light 1 in a field that grows with time: its momentum is a polynomial,
 /// and its velocity is not.
-struct InField {
+pub struct InField {
     growth: f64,
 }
 
@@ -67,8 +68,8 @@ impl Lagrangian<1> for InField {
 fn momenta_that_are_polynomials_leave_the_order() {
     let start = VelocityPoint::new([0.0], [-0.8], 0.0);
     for (s, growth) in [(2, 0.0), (3, 0.0), (3, 0.5)] {
-        let system = InField { growth };
-        let (truth, ..) = run(&system, (0.0, start), 16, 1.0 / 16.0, 64);
+        let system = || One::from(InField { growth });
+        let (truth, ..) = run(system(), (0.0, start), 16, 1.0 / 16.0, 64);
         if growth == 0.0 {
             // q = sqrt(1 + p^2) from its start, in a field of 1; to the rounding of 64 steps.
             let energy = |p: f64| (1.0 + p * p).sqrt();
@@ -81,7 +82,7 @@ fn momenta_that_are_polynomials_leave_the_order() {
             .iter()
             .map(|steps| {
                 let h = 4.0 / f64::from(*steps);
-                let (e, ..) = run(&system, (0.0, start), s, h, *steps as usize);
+                let (e, ..) = run(system(), (0.0, start), s, h, *steps as usize);
                 (h, (e.q - truth.q).max_abs_or_nan())
             })
             .collect();
@@ -178,8 +179,8 @@ fn decayed_states_keep_their_accuracy() {
     // Steps that are exact in binary, so that the time is exact.
     for (stages, h) in [(8, 0.5), (8, 0.625), (16, 2.5), (16, 5.0)] {
         for (route, bound) in [(GaussRoute::Linear, 4.0), (GaussRoute::Condensed, 400.0)] {
-            let claims = WithStructure(system, cut(&system, route));
-            let (end, _, taken) = run(&claims, (0.0, x), stages, h, (t / h) as usize);
+            let claims = One::from(WithStructure(system, cut(&system, route)));
+            let (end, _, taken) = run(claims, (0.0, x), stages, h, (t / h) as usize);
             let error = (end.q[0] - q).abs().max_or_nan((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
             assert_eq!(taken, route);
             assert!(error <= bound, "s = {stages} {route:?}: {error} eps");
@@ -194,7 +195,7 @@ fn angular_momentum_decays_exactly() {
     let x = VelocityPoint::new([0.5, 0.0], [0.0, 3f64.sqrt()], 0.0);
     for (gamma, steps, bound) in [(-1e-4, 100_000, 1e-13), (-1e-6, 1_000_000, 5e-13)] {
         let h = 0.0625;
-        let (end, ..) = run(&Kepler::<2> { gamma, mu: 1.0 }, (0.0, x), 8, h, steps);
+        let (end, ..) = run(Kepler::<2> { gamma, mu: 1.0 }, (0.0, x), 8, h, steps);
         let momentum = |q: &SVector<f64, 2>, p: &SVector<f64, 2>| q[0] * p[1] - q[1] * p[0];
         let expected = momentum(&x.q, &x.v) * (gamma * h * steps as f64).exp();
         let error = (momentum(&end.q, &end.p) / expected - 1.0).abs();
@@ -206,12 +207,17 @@ fn angular_momentum_decays_exactly() {
 /// each adds up at random to 10 eps, and to at most 30.
 #[test]
 fn routes_agree() {
-    fn of<const N: usize, S: System<N>>(system: &S, s: usize, h: f64, routes: &[GaussRoute]) {
+    fn of<const N: usize, S: System<N> + Copy, L: Lagrangian<N> + From<WithStructure<S>>>(
+        system: &S,
+        s: usize,
+        h: f64,
+        routes: &[GaussRoute],
+    ) {
         let ends: Vec<_> = routes
             .iter()
             .map(|route| {
-                let claims = WithStructure(system, cut(system, *route));
-                let (end, _, taken) = run(&claims, (0.0, system.initial()), s, h, 100);
+                let claims = WithStructure(*system, cut(system, *route));
+                let (end, _, taken) = run(L::from(claims), (0.0, system.initial()), s, h, 100);
                 assert_eq!(taken, *route, "{}", system.name());
                 end
             })
@@ -223,9 +229,10 @@ fn routes_agree() {
     }
     use GaussRoute::{Condensed, ConstantMass, General, Linear};
     for s in [3, 8, 13] {
-        of(&OneCoordinate::from(HarmonicOscillator::default()), s, 0.1, &[Linear, Condensed, ConstantMass, General]);
-        of(&OneCoordinate::from(Pendulum::default()), s, 0.1, &[Condensed, ConstantMass, General]);
-        of(&Kepler::<3>::default(), s, 0.05, &[Condensed, ConstantMass, General]);
+        let (all, nonlinear) = ([Linear, Condensed, ConstantMass, General], [Condensed, ConstantMass, General]);
+        of::<1, _, One>(&OneCoordinate::from(HarmonicOscillator::default()), s, 0.1, &all);
+        of::<1, _, One>(&OneCoordinate::from(Pendulum::default()), s, 0.1, &nonlinear);
+        of::<3, _, WithStructure<_>>(&Kepler::<3>::default(), s, 0.05, &nonlinear);
     }
 }
 
@@ -236,7 +243,7 @@ fn few_iterations() {
     let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     let x = VelocityPoint::new([1.0], [1.0], 0.0);
     for (route, most) in [(GaussRoute::Condensed, 4.85), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
-        let (_, evaluations, _) = run(&WithStructure(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
+        let (_, evaluations, _) = run(One::from(WithStructure(system, cut(&system, route))), (0.0, x), 8, 0.5, 1000);
         let iterations = evaluations as f64 / 8e3;
         assert!(iterations <= most, "{route:?}: {iterations} iterations");
     }
@@ -264,9 +271,9 @@ fn repeated_runs_are_the_same() {
 /// discrete Lagrangian; without Newton's method they are refused, and the state does not change.
 #[test]
 fn newton_takes_over() {
-    fn of<const N: usize, S: Lagrangian<N>>(system: &S, x: VelocityPoint<N>, s: usize, h: f64, bound: f64) {
+    fn of(system: One, x: VelocityPoint<1>, s: usize, h: f64, bound: f64) {
+        let start = legendre(&system, 0.0, &x);
         let gauss = Gauss::new(system, s, h);
-        let start = legendre(system, 0.0, &x);
         let stepper = || gauss.as_ref().ok().and_then(|g| g.stepper(0.0, start, x.v).ok());
         let (Some(mut stepper), Some(without)) = (stepper(), stepper()) else { panic!("no stepper") };
         assert_eq!(stepper.advance(1), Ok(()), "{:?}", stepper.route());
@@ -300,12 +307,12 @@ fn newton_takes_over() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let x = VelocityPoint::new([2.0], [1.0], 0.0);
     for route in [GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
-        of(&WithStructure(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
+        of(One::from(WithStructure(pendulum, cut(&pendulum, route))), x, 4, 5.0, 1e-12);
     }
     // Damping by e^20 in one step: the factors of stages are negative at the solution, which is refused also by
     // Newton's method.
     let damped = WithStructure(OneCoordinate::from(HarmonicOscillator { gamma: -20.0 }), Structure::default());
-    let gauss = Gauss::new(&damped, 8, 1.0).unwrap();
+    let gauss = Gauss::new(One::from(damped), 8, 1.0).unwrap();
     let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), [1.0].into()).unwrap();
     let halt = stepper.advance(1);
     let refused = match halt {
@@ -319,7 +326,7 @@ fn newton_takes_over() {
 /// Invalid input: a number of stages that does not exist, and a step whose conformal factor is not positive.
 #[test]
 fn bad_input_is_refused() {
-    let system = OneCoordinate::from(Pendulum::default());
+    let system = one(Pendulum::default());
     for stages in [0, 17] {
         let error = Gauss::new::<1>(&system, stages, 0.1).err();
         assert_eq!(error, Some(InputError::Stages { found: stages }));
@@ -327,7 +334,7 @@ fn bad_input_is_refused() {
     // sigma_d = (1 + gamma h/2) / (1 - gamma h/2) with one stage.
     let start = PhasePoint::new([1.0], [0.0], 0.0);
     for gamma in [-30.0, 30.0] {
-        let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma }), 1, 0.1);
+        let gauss = Gauss::new(one(Pendulum { gamma }), 1, 0.1);
         let error = gauss.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).err());
         // With damping the factor of the stage, 1 / (1 + gamma h/2), is negative, with growth that of the end.
         let refused = match error {
@@ -337,7 +344,8 @@ fn bad_input_is_refused() {
         };
         assert!(refused, "{error:?}");
         // The general route finds it during the step.
-        let general = Gauss::new(WithStructure(OneCoordinate::from(Pendulum { gamma }), Structure::default()), 1, 0.1);
+        let general = WithStructure(OneCoordinate::from(Pendulum { gamma }), Structure::default());
+        let general = Gauss::new(One::from(general), 1, 0.1);
         let halt = general.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).map(|mut s| s.advance(1)));
         let same = match halt {
             Ok(Ok(Err(StepFailure { taken: 0, cause: StepError::StageFactor { rho } }))) => gamma < 0.0 && rho < 0.0,
@@ -350,29 +358,31 @@ fn bad_input_is_refused() {
     }
 }
 
+/// A well that ends at q0 = 2 in one coordinate, uncoupled from the other.
+pub struct Ends;
+
+impl Lagrangian<2> for Ends {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        v.dot(v) * 0.5 + (-q[0] + 2.0).sqrt() - q[1] * q[1] * 0.5
+    }
+    fn structure(&self) -> Structure {
+        Structure {
+            autonomous: true,
+            z_free: true,
+            z_affine: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
+}
+
 /// A step to a state that is not finite is refused, with the last finite state kept, whether one coordinate is affected
 /// or all.
 #[test]
 fn what_is_not_finite_is_refused() {
-    /// A well that ends at q0 = 2 in one coordinate, uncoupled from the other.
-    struct Ends;
-    impl Lagrangian<2> for Ends {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-            v.dot(v) * 0.5 + (-q[0] + 2.0).sqrt() - q[1] * q[1] * 0.5
-        }
-        fn structure(&self) -> Structure {
-            Structure {
-                autonomous: true,
-                z_free: true,
-                z_affine: true,
-                separable: true,
-                constant_mass: true,
-                ..Structure::default()
-            }
-        }
-    }
     for claims in [Ends.structure(), Structure::default()] {
-        let gauss = Gauss::new(WithStructure(Ends, claims), 4, 0.02);
+        let gauss = Gauss::new(Two::from(WithStructure(Ends, claims)), 4, 0.02);
         let start = PhasePoint::new([0.0, 1.0], [2.5, 0.0], 0.0);
         let stepper = gauss.as_ref().map(|g| g.stepper(0.0, start, [2.5, 0.0].into()));
         let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
@@ -380,7 +390,7 @@ fn what_is_not_finite_is_refused() {
         assert!(matches!(halt, Err(StepFailure { taken: 10..100, .. })), "{halt:?}");
         assert!(ChartVector::from(stepper.state()).is_finite() && stepper.state().q[0] < 2.0);
     }
-    let gauss = Gauss::new(OneCoordinate::from(HarmonicOscillator { gamma: 1.0 }), 4, 0.5);
+    let gauss = Gauss::new(one(HarmonicOscillator { gamma: 1.0 }), 4, 0.5);
     let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
     let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
     let halt = stepper.advance(10_000);

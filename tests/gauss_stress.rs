@@ -5,6 +5,7 @@
 
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{
@@ -58,7 +59,7 @@ fn stiff_chains_are_solved_by_fixed_point_iterations() {
 
 /// Two particles, where one direction is heavy and has a force, and the other is lighter by a factor of up to 1e14 and
 /// free.
-struct IllConditioned(f64);
+pub struct IllConditioned(f64);
 
 impl IllConditioned {
     fn w(&self) -> SMatrix<f64, 2, 2> {
@@ -84,7 +85,7 @@ fn ill_conditioned_w_is_accepted() {
         let system = IllConditioned(1.0 / condition);
         let p = system.w() * SVector::from([0.5, 0.25]);
         let start = PhasePoint { q: SVector::from([1.0, 0.5]), p, z: 0.0 };
-        let gauss = Gauss::new(&system, 4, 0.1).unwrap();
+        let gauss = Gauss::new(Two::from(system), 4, 0.1).unwrap();
         let mut stepper = gauss.stepper(0.0, start, [0.0; 2].into()).unwrap();
         stepper.advance(10).unwrap();
         // 2 Q'' + 0.2 Q' = -2 Q with Q = q0 + q1: w^2 = 1 - 0.05^2.
@@ -100,22 +101,25 @@ fn ill_conditioned_w_is_accepted() {
     }
     // Singular to round-off, and exactly singular.
     for light in [1e-17, 0.0] {
-        let gauss = Gauss::new(IllConditioned(light), 4, 0.1).unwrap();
+        let gauss = Gauss::new(Two::from(IllConditioned(light)), 4, 0.1).unwrap();
         let refused = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [1.0, 1.0], 0.0), [0.0; 2].into()).err();
         assert!(matches!(refused, Some(InputError::FirstStep(StepError::Singular { .. }))), "{refused:?}");
+    }
+}
+
+/// Two oscillators with masses of 1 and 1e-14.
+pub struct Masses;
+
+impl Lagrangian<2> for Masses {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0]) * 0.5 + (v[1] * v[1] - q[1] * q[1]) * 0.5e-14
     }
 }
 
 /// Masses of 1 and 1e-14 side by side do not make W ill-conditioned.
 #[test]
 fn light_particles_are_no_singularity() {
-    struct Masses;
-    impl Lagrangian<2> for Masses {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-            (v[0] * v[0] - q[0] * q[0]) * 0.5 + (v[1] * v[1] - q[1] * q[1]) * 0.5e-14
-        }
-    }
-    let gauss = Gauss::new(Masses, 8, 0.5).unwrap();
+    let gauss = Gauss::new(Two::from(Masses), 8, 0.5).unwrap();
     let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0, 1.0], [0.0, 0.0], 0.0), [0.0; 2].into()).unwrap();
     stepper.advance(20).unwrap();
     let q = stepper.state().q;
@@ -150,10 +154,10 @@ fn strong_damping_is_refused_by_all_routes() {
         let system = OneCoordinate::from(HarmonicOscillator { gamma });
         let x = VelocityPoint::new([1.0], [0.0], 0.0);
         let start = legendre(&system, 0.0, &x);
-        let claimed = Gauss::new(system, s, 0.1).unwrap();
+        let claimed = Gauss::new(one(system), s, 0.1).unwrap();
         let refused = claimed.stepper(0.0, start, x.v).err().unwrap();
         assert!(refused.to_string().contains("integrating factor of a stage"), "{refused}");
-        let gauss = Gauss::new(WithStructure(system, Structure::default()), s, 0.1).unwrap();
+        let gauss = Gauss::new(One::from(WithStructure(system, Structure::default())), s, 0.1).unwrap();
         let mut general = gauss.stepper(0.0, start, x.v).unwrap();
         let halt = general.advance(1).unwrap_err();
         assert!(matches!(halt.cause, StepError::StageFactor { rho } if rho < 0.0), "s = {s}: {halt:?}");
@@ -163,7 +167,7 @@ fn strong_damping_is_refused_by_all_routes() {
     let system = OneCoordinate::from(star);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     for s in 1..=16 {
-        let gauss = Gauss::new(system, s, 0.3).unwrap();
+        let gauss = Gauss::new(one(system), s, 0.3).unwrap();
         let mut stepper = gauss.stepper(0.01, legendre(&system, 0.01, &x), x.v).unwrap();
         let outcome = stepper.advance(1);
         let error = (stepper.state().q[0] - star.solution(0.31).unwrap().q[0]).abs();
@@ -196,9 +200,9 @@ fn unresolved_steps_are_flagged() {
     for s in 1..=16 {
         for h in [0.1, 0.5] {
             let x = VelocityPoint::new([1.0], [1.0], 0.0);
-            let pendulum = Gauss::new(OneCoordinate::from(Pendulum::default()), s, h).unwrap();
+            let pendulum = Gauss::new(one(Pendulum::default()), s, h).unwrap();
             unflagged(Box::new(pendulum.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), x.v).unwrap()), 1000);
-            let square = Gauss::new(OneCoordinate::from(QuadraticInZ { c: 0.1 }), s, h).unwrap();
+            let square = Gauss::new(one(QuadraticInZ { c: 0.1 }), s, h).unwrap();
             unflagged(Box::new(square.stepper(0.0, PhasePoint::new([1.0], [0.0], 1.0), [0.0].into()).unwrap()), 1000);
         }
     }

@@ -20,6 +20,8 @@ mod forces;
 mod gauss;
 mod gauss_catalogue;
 mod gauss_stress;
+#[path = "integrators/lagrangians.rs"]
+mod lagrangians;
 mod round_off;
 mod runs;
 mod transformed_time;

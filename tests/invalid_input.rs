@@ -21,6 +21,8 @@ mod geometry;
 mod known_issues;
 #[path = "invalid_input/numbers.rs"]
 mod numbers;
+#[path = "invalid_input/one.rs"]
+mod one;
 #[path = "invalid_input/refusals.rs"]
 mod refusals;
 #[path = "invalid_input/sentences.rs"]

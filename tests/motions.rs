@@ -16,6 +16,7 @@ mod motions {
     mod claims;
     mod coarse;
     mod draws;
+    mod lagrangians;
     mod many_coordinates;
     mod observed;
     mod resolution;

@@ -2,10 +2,10 @@
 
 use crate::common::lagrangians::WithStructure;
 use crate::common::oracle::motion;
+use crate::lagrangians::{One, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, SystemVisitor,
-    TwoCoordinates,
+    DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
 };
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, OneParameterGroup, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
@@ -53,9 +53,9 @@ fn titles<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: boo
 #[test]
 fn every_integrator() {
     struct Visitor(usize);
-    impl SystemVisitor for Visitor {
-        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            let (t0, initial) = (system.initial_time(), system.initial());
+    impl Visitor {
+        fn visit<const N: usize>(&mut self, of: &impl System<N>, system: &impl Lagrangian<N>) {
+            let (t0, initial) = (of.initial_time(), of.initial());
             let truth = legendre(system, t0 + 0.5, &motion(system, t0, &initial, 0.5));
             let problem = Problem::new(system, t0, initial).unwrap();
             for integrator in AnyIntegrator::all() {
@@ -69,7 +69,7 @@ fn every_integrator() {
                 let Ok(Outcome { status: Status::Completed, q, p, z: Some(z), .. }) = outcome else {
                     // No system declares a constant rate; it is verified when the plan is made.
                     let refused = matches!(outcome, Err(InputError::Hypothesis { .. }));
-                    assert!(refused, "{} by {integrator}: {outcome:?}", system.name());
+                    assert!(refused, "{} by {integrator}: {outcome:?}", of.name());
                     continue;
                 };
                 let size = truth.q.max_abs_or_nan().max_or_nan(truth.p.max_abs_or_nan()).max_or_nan(truth.z.abs());
@@ -79,18 +79,18 @@ fn every_integrator() {
                     .max_or_nan((z - truth.z).abs())
                     / size;
                 let bound = (1.0f64 / 4.0).powi(integrator.order().min(10) as i32).max_or_nan(1e-8);
-                assert!(error <= bound, "{} by {integrator}: {error:e}, not {bound:e}", system.name());
+                assert!(error <= bound, "{} by {integrator}: {error:e}, not {bound:e}", of.name());
                 self.0 += 1;
             }
         }
     }
     // One system of each kind of structure, since each is compiled with every method.
     let mut visitor = Visitor(0);
-    visitor.visit(&OneCoordinate::from(HarmonicOscillator::default()));
-    visitor.visit(&OneCoordinate::from(Duffing::forced()));
-    visitor.visit(&OneCoordinate::from(QuadraticInZ::default()));
-    visitor.visit(&Kepler::<2>::default());
-    visitor.visit(&TwoCoordinates::from(DoublePendulum::default()));
+    visitor.visit(&HarmonicOscillator::default(), &one(HarmonicOscillator::default()));
+    visitor.visit(&Duffing::forced(), &one(Duffing::forced()));
+    visitor.visit(&QuadraticInZ::default(), &one(QuadraticInZ::default()));
+    visitor.visit(&Kepler::<2>::default(), &Kepler::<2>::default());
+    visitor.visit(&DoublePendulum::default(), &two(DoublePendulum::default()));
     // The rules, the Gauss methods and the compositions apply to all systems.
     assert!(visitor.0 >= 5 * 25, "{}", visitor.0);
 }
@@ -99,11 +99,8 @@ fn every_integrator() {
 /// without.
 #[test]
 fn outputs_do_not_change_the_motion() {
-    let (pendulum, square, kepler) = (
-        OneCoordinate::from(Pendulum { gamma: -0.1 }),
-        OneCoordinate::from(QuadraticInZ { c: 0.3 }),
-        Kepler::<2>::default(),
-    );
+    let (pendulum, square, kepler) =
+        (one(Pendulum { gamma: -0.1 }), one(QuadraticInZ { c: 0.3 }), Kepler::<2>::default());
     fn compare<L: Lagrangian<N>, const N: usize>(
         lagrangian: &L,
         start: VelocityPoint<N>,
@@ -176,7 +173,7 @@ fn the_conformal_factor() {
 /// The factor of a long run underflows, and its logarithm does not.
 #[test]
 fn the_factor_of_a_long_run_has_a_logarithm() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -1.0 });
+    let pendulum = one(Pendulum { gamma: -1.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = problem.by(gauss(4)).steps(Steps::Count(8000)).with_conformal_factor();
     let outcome = run.run(Until::Time(800.0)).unwrap();
@@ -189,10 +186,8 @@ fn the_factor_of_a_long_run_has_a_logarithm() {
 /// A plan describes what it computes and skips, as follows from the structure and the outputs.
 #[test]
 fn plans_in_words() {
-    let (pendulum, oscillator) =
-        (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(HarmonicOscillator::default()));
-    let (square, double) =
-        (OneCoordinate::from(QuadraticInZ::default()), TwoCoordinates::from(DoublePendulum::default()));
+    let (pendulum, oscillator) = (one(Pendulum::default()), one(HarmonicOscillator::default()));
+    let (square, double) = (one(QuadraticInZ::default()), two(DoublePendulum::default()));
     let (until, of_pendulum, of_square) = (Until::Time(10.0), from_start(&pendulum), from_start(&square));
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().plan(until).unwrap();
     for skipped in ["action z", "conformal factor", "mass matrix", "Jacobian", "Newton's method", "time at the stages"]
@@ -225,7 +220,7 @@ fn plans_in_words() {
     // A linear motion needs no iteration, and a mass matrix that varies is evaluated.
     let of_oscillator = from_start(&oscillator);
     assert!(titles(&ten_steps(&of_oscillator, gauss(8)).plan(until).unwrap(), false).contains(&"iteration"));
-    let of_double = Problem::new(&double, 0.0, double.initial()).unwrap();
+    let of_double = Problem::new(&double, 0.0, DoublePendulum::default().initial()).unwrap();
     assert!(titles(&ten_steps(&of_double, gauss(8)).plan(until).unwrap(), true).contains(&"mass matrix"));
     // Splittings are explicit, and discrete flows are not.
     for (by, computed) in [
@@ -241,7 +236,7 @@ fn plans_in_words() {
 /// The step that is chosen for a requested accuracy keeps it, and is at most moderately finer than necessary.
 #[test]
 fn steps_from_an_error() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
+    let pendulum = one(Pendulum { gamma: -0.05 });
     let (problem, until) = (from_start(&pendulum), Until::Time(20.0));
     let truth = legendre(&pendulum, 20.0, &motion(&pendulum, 0.0, &start(), 20.0));
     let size = (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
@@ -273,7 +268,7 @@ fn steps_from_an_error() {
 /// of rows.
 #[test]
 fn a_run_to_its_start_is_the_start() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = one(Pendulum { gamma: -0.1 });
     for t0 in [0.0, 2.5, -1e9] {
         let start = VelocityPoint::new([1.0], [0.5], 0.25);
         let problem = Problem::new(&pendulum, t0, start).unwrap();
@@ -304,7 +299,7 @@ fn a_run_to_its_start_is_the_start() {
 }
 
 /// `-cos(v) - x/10`: many velocities have the momentum sin(v). From v = 4 the motion has pi/2 < v < 3 pi/2.
-struct ManyVelocities;
+pub struct ManyVelocities;
 
 impl Lagrangian<1> for ManyVelocities {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -325,7 +320,8 @@ fn the_velocity_is_that_of_the_motion() {
     let energy = 4.0 * 4f64.sin() + 4f64.cos();
     // The error of order two with 400 steps, for a motion of size 60 near the end of the branch.
     for (by, bound) in [(gauss(2), 1e-6), (gauss(8), 1e-11), (AnyIntegrator::Discrete(Method::Midpoint), 2e-3)] {
-        let problem = Problem::new(&ManyVelocities, 0.0, VelocityPoint::new([0.0], [4.0], 0.0)).unwrap();
+        let system = One::from(ManyVelocities);
+        let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0], [4.0], 0.0)).unwrap();
         let times: Vec<f64> = (0..=70).map(|k| -0.2377 * f64::from(k)).collect();
         let mut rows = Rows::at(times).unwrap().with_velocity().with_energy();
         let mut lines = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0] + 30.0)]);
@@ -342,7 +338,7 @@ fn the_velocity_is_that_of_the_motion() {
         assert!((there[0] - v(-16.8)).abs() <= bound, "{by}: {there}");
         // A run from the end continues with the velocity there.
         let state = PhasePoint { q: ended.q, p: ended.p, z: ended.z.unwrap() };
-        let onward = Problem::new(&ManyVelocities, ended.t, discrete_herglotz::Start::Momentum(state, there)).unwrap();
+        let onward = Problem::new(&system, ended.t, discrete_herglotz::Start::Momentum(state, there)).unwrap();
         let onward = onward.by(by).steps(Steps::Count(20)).run(Until::Time(-17.0)).unwrap();
         assert!((onward.q[0] - q(-17.0)).abs() <= bound, "{by}: {onward:?}");
     }
@@ -351,7 +347,7 @@ fn the_velocity_is_that_of_the_motion() {
 /// Invalid input is refused before work begins, with an error that names it.
 #[test]
 fn bad_runs() {
-    let (pendulum, square) = (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(QuadraticInZ::default()));
+    let (pendulum, square) = (one(Pendulum::default()), one(QuadraticInZ::default()));
     let (problem, until) = (from_start(&pendulum), Until::Time(1.0));
     let by = |integrator| ten_steps(&problem, integrator).plan(until).err();
     let steps = |steps| problem.steps(steps).plan(until).err();
@@ -390,7 +386,8 @@ fn bad_runs() {
     assert!(matches!(Problem::new(&pendulum, 0.0, nowhere).err(), Some(InputError::Geometry(_))));
     // The error names the hypothesis.
     let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
-    let unclaimed = WithStructure(pendulum, Structure::default());
+    let of_pendulum = |structure| One::from(WithStructure(OneCoordinate::from(Pendulum::default()), structure));
+    let unclaimed = of_pendulum(Structure::default());
     let refused = ten_steps(&from_start(&unclaimed), nystrom).plan(until).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "separable" }));
     let refused = ten_steps(&from_start(&square), nystrom).plan(until).err();
@@ -400,7 +397,7 @@ fn bad_runs() {
     let of_rectangle = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4);
     assert!(matches!(by(of_rectangle), Some(InputError::Hypothesis { .. })));
     // A false property is found when the structure is checked.
-    let quadratic = WithStructure(pendulum, Structure { quadratic: true, ..pendulum.structure() });
+    let quadratic = of_pendulum(Structure { quadratic: true, ..pendulum.structure() });
     let refused = Problem::new(&quadratic, 0.0, start()).err();
     assert!(matches!(refused, Some(InputError::FalseClaim { claim: "quadratic", .. })));
 }
@@ -408,7 +405,7 @@ fn bad_runs() {
 /// A run to a time before its start runs backward on the same motion.
 #[test]
 fn a_span_may_be_negative() {
-    let pendulum = OneCoordinate::from(Pendulum::default());
+    let pendulum = one(Pendulum::default());
     let back = ten_steps(&from_start(&pendulum), gauss(8)).run(Until::Time(-1.0)).unwrap();
     assert_eq!((back.status, back.unresolved, back.steps, back.t), (Status::Completed, None, 10, -1.0));
     let truth = legendre(&pendulum, -1.0, &herglotz_flow(&pendulum, 0.0, &start(), -1.0).unwrap().end);
@@ -421,7 +418,7 @@ fn a_span_may_be_negative() {
 /// refused.
 #[test]
 fn from_two_points() {
-    let pendulum = OneCoordinate::from(Pendulum::default());
+    let pendulum = one(Pendulum::default());
     let ld = Midpoint::new(&pendulum, 0.1).unwrap();
     let points = DiscretePoint::new([0.3], [0.35], 0.1);
     let problem = Problem::from_points(&pendulum, &ld, 0.5, points).unwrap();

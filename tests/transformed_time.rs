@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::common::gauss::GaussSteppers;
+use crate::lagrangians::{one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
 use contact_geom::{
@@ -145,7 +146,7 @@ fn bad_input_is_refused() {
         let refused = gauss.transformed_stepper(ConstantRate(bad), 0.0, state, start.v).err();
         assert!(matches!(refused, Some(InputError::TimeTransformation { .. })), "{bad}: {refused:?}");
     }
-    let driven = Gauss::new(PerturbedKepler::default(), 3, 0.1).unwrap();
+    let driven = Gauss::new(two(PerturbedKepler::default()), 3, 0.1).unwrap();
     let refused = driven.transformed_stepper(Radial { exponent: 1.0 }, 0.0, state, start.v).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "autonomous" }));
     let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, state, start.v).unwrap();
@@ -317,8 +318,8 @@ fn invalid_time_transformations_are_refused() {
         AnyIntegrator::TransformedGauss { stages: 17 }.check(&Planar::default()),
         Err(InputError::Stages { found: 17 })
     );
-    assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::NoTimeTransformation)));
-    assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::NoTimeTransformation)));
+    assert!(matches!(by.check(&one(Pendulum { gamma: -0.1 })), Err(InputError::NoTimeTransformation)));
+    assert!(matches!(by.check(&two(PerturbedKepler::default())), Err(InputError::NoTimeTransformation)));
     let driven = Transformed { rate: 1.0, autonomous: false };
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);

@@ -2,8 +2,9 @@
 
 use crate::common::forces::{AnyForce, Drag, Fall, G, Swirl};
 use crate::common::{relative_distance, slope};
+use crate::lagrangians::{Applied, One, Two, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ};
+use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until};
 
@@ -21,7 +22,7 @@ fn run<L: Lagrangian<N>, I: for<'a> Integrator<'a, L, N> + 'static, const N: usi
 }
 
 /// A force of positions with a drag of the velocity.
-struct SwirlAndDrag(Drag);
+pub struct SwirlAndDrag(pub Drag);
 
 impl<const N: usize> Force<N> for SwirlAndDrag {
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -54,7 +55,7 @@ fn assert_order<const N: usize>(
 /// pendulum does, where a quadratic drag has no second derivative, so that no method has a higher order.
 #[test]
 fn schemes_keep_their_orders() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.2 });
+    let pendulum = || one(Pendulum { gamma: -0.2 });
     let x = VelocityPoint::new([1.0], [1.5], 0.1);
     let kepler = Kepler::<2> { gamma: -0.1, mu: 1.0 };
     let orbit = VelocityPoint::new([1.0, 0.2], [-0.1, 0.9], 0.1);
@@ -76,46 +77,49 @@ fn schemes_keep_their_orders() {
             if c != 0.0 && scheme.order() == 10 {
                 continue;
             }
-            let force = SwirlAndDrag(Drag { c, k });
-            assert_order(&Forced { lagrangian: &kepler, force: &force }, orbit, scheme, counts);
+            let force = Applied::SwirlAndDrag(Drag { c, k });
+            assert_order(&Forced { lagrangian: kepler, force }, orbit, scheme, counts);
             if k == 0.0 && scheme.order() < 10 {
-                assert_order(&Forced { lagrangian: &pendulum, force: &force }, x, scheme, counts);
+                assert_order(&Forced { lagrangian: pendulum(), force }, x, scheme, counts);
             }
         }
     }
-    let nonlinear = Forced { lagrangian: OneCoordinate::from(QuadraticInZ { c: 1.0 }), force: Swirl };
+    let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::Swirl };
     assert_order(&nonlinear, VelocityPoint::new([0.5], [0.8], 0.1), SplittingScheme::STRANG, &[128, 180, 256, 360]);
+}
+
+/// A body of mass 2 without a field.
+pub struct Free;
+
+impl Lagrangian<2> for Free {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        v.dot(v)
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, z_free: true, separable: true, quadratic: true, ..Structure::default() }
+    }
 }
 
 /// A fall with drag, linear, quadratic and both, has a closed form; its error is that of the splitting. Without gravity
 /// the splitting is exact: the distance is `(1/k) ln(1 + k v t)`.
 #[test]
 fn drag_without_a_field_is_exact() {
-    #[derive(Clone, Copy)]
-    struct Free;
-    impl<const N: usize> Lagrangian<N> for Free {
-        fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, N>, v: &SVector<T, N>, _z: T) -> T {
-            v.dot(v)
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, z_free: true, separable: true, quadratic: true, ..Structure::default() }
-        }
-    }
     // The mass is 2.
     let (k, t) = (0.6, 3.0);
     let x = VelocityPoint::new([0.0, 0.0], [1.2, -1.6], 0.0);
-    let forced = Forced { lagrangian: Free, force: Drag { c: 0.0, k } };
+    let free = |drag| Forced { lagrangian: Two::from(Free), force: Applied::Drag(drag) };
+    let forced = free(Drag { c: 0.0, k });
     let end = run(&forced, x, SplittingScheme::STRANG, t, 10);
     let (path, speed) = ((1.0 + 0.5 * k * 2.0 * t).ln() * 2.0 / k, 2.0 / (1.0 + 0.5 * k * 2.0 * t));
     let expected = [x.v * (path / 2.0), x.v * speed];
     assert!((end.q - expected[0]).norm() <= 8.0 * f64::EPSILON * path, "{:?} {:?}", end.q, expected[0]);
     assert!((end.p - expected[1]).norm() <= 8.0 * f64::EPSILON * speed, "{:?} {:?}", end.p, expected[1]);
-    let linear = Forced { lagrangian: Free, force: Drag { c: k, k: 0.0 } };
+    let linear = free(Drag { c: k, k: 0.0 });
     let end = run(&linear, x, SplittingScheme::BLANES_MOAN_6, t, 10);
     let expected = x.v * (2.0 * (-0.5 * k * t).exp());
     assert!((end.p - expected).norm() <= 8.0 * f64::EPSILON * expected.norm(), "{:?} {expected:?}", end.p);
     // With a field the terminal speed is kept.
-    let falling = Forced { lagrangian: Fall, force: Drag { c: 0.0, k: 0.2 } };
+    let falling = Forced { lagrangian: One::from(Fall), force: Applied::Drag(Drag { c: 0.0, k: 0.2 }) };
     let end = run(&falling, VelocityPoint::new([0.0], [0.0], 0.0), SplittingScheme::KAHAN_LI_8, 10.0, 400);
     assert!((end.p[0] + (G / 0.2).sqrt()).abs() <= 1e-6, "{}", end.p[0]);
 }
@@ -141,21 +145,18 @@ fn ensembles_take_forces() {
             .unwrap();
         assert_eq!(seen, 19);
     }
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = |force| Forced { lagrangian: one(Pendulum { gamma: -0.1 }), force };
+    let dragged = Applied::SwirlAndDrag(Drag { c: 0.2, k: 0.1 });
     // Lanes add in another order: a hundred units of round-off in 200 steps.
     let bound = 100.0 * f64::EPSILON;
-    of(&Forced { lagrangian: pendulum, force: Swirl }, SplittingScheme::BLANES_MOAN_6, bound);
-    of(&Forced { lagrangian: pendulum, force: Swirl }, GaussCollocation { stages: 6 }, bound);
-    of(&Forced { lagrangian: pendulum, force: SwirlAndDrag(Drag { c: 0.2, k: 0.1 }) }, SplittingScheme::YOSHIDA_4, 0.0);
-    of(
-        &Forced { lagrangian: pendulum, force: SwirlAndDrag(Drag { c: 0.2, k: 0.1 }) },
-        GaussCollocation { stages: 4 },
-        0.0,
-    );
+    of(&pendulum(Applied::Swirl), SplittingScheme::BLANES_MOAN_6, bound);
+    of(&pendulum(Applied::Swirl), GaussCollocation { stages: 6 }, bound);
+    of(&pendulum(dragged), SplittingScheme::YOSHIDA_4, 0.0);
+    of(&pendulum(dragged), GaussCollocation { stages: 4 }, 0.0);
 }
 
 /// A Lagrangian `v.Mv/2` with a mass matrix.
-struct Massive([[f64; 2]; 2]);
+pub struct Massive([[f64; 2]; 2]);
 
 impl Lagrangian<2> for Massive {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
@@ -168,7 +169,7 @@ impl Lagrangian<2> for Massive {
 }
 
 /// A force of another form than it declares.
-struct FalseForce;
+pub struct FalseForce;
 
 impl<const N: usize> Force<N> for FalseForce {
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -191,12 +192,14 @@ fn other_forces_are_refused() {
         assert!(matches!(found, Some(InputError::Forced { .. })) && named, "{found:?}");
     }
     let (strang, nystrom) = (SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6);
-    let quadratic = Drag { c: 0.1, k: 0.2 };
-    refused(&Forced { lagrangian: Fall, force: AnyForce }, x, strang);
-    refused(&Forced { lagrangian: Fall, force: quadratic }, x, nystrom);
-    refused(&Forced { lagrangian: Massive([[1.0, 0.2], [0.2, 1.0]]), force: Drag { c: 0.1, k: 0.0 } }, x, strang);
-    refused(&Forced { lagrangian: Massive([[1.0, 0.0], [0.0, 2.0]]), force: quadratic }, x, strang);
-    refused(&Forced { lagrangian: OneCoordinate::from(QuadraticInZ { c: 1.0 }), force: quadratic }, start, strang);
-    let found = Problem::new(&Forced { lagrangian: Fall, force: FalseForce }, 0.0, x).err();
+    let (linear, quadratic) = (Applied::Drag(Drag { c: 0.1, k: 0.0 }), Applied::Drag(Drag { c: 0.1, k: 0.2 }));
+    let fall = |force| Forced { lagrangian: Two::from(Fall), force };
+    let massive = |masses, force| Forced { lagrangian: Two::from(Massive(masses)), force };
+    refused(&fall(Applied::Any), x, strang);
+    refused(&fall(quadratic), x, nystrom);
+    refused(&massive([[1.0, 0.2], [0.2, 1.0]], linear), x, strang);
+    refused(&massive([[1.0, 0.0], [0.0, 2.0]], quadratic), x, strang);
+    refused(&Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: quadratic }, start, strang);
+    let found = Problem::new(&fall(Applied::False), 0.0, x).err();
     assert!(matches!(found, Some(InputError::FalseClaim { claim: "force_structure", .. })), "{found:?}");
 }

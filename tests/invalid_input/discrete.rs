@@ -16,7 +16,7 @@ mod lagrangians;
 #[path = "discrete/observers.rs"]
 mod observers;
 #[path = "discrete/runs.rs"]
-mod runs;
+pub mod runs;
 #[path = "discrete/steppers.rs"]
 mod steppers;
 

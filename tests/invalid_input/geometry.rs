@@ -43,6 +43,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Gas::ideal", "takes no number"),
     ("Gas::van_der_waals", "stores its arguments; every start checks them"),
     ("VectorField::is_autonomous", "the implementor's, and takes no number"),
+    ("Hints::of_any", "takes no number"),
     ("Structure::has_constant_rate", "takes no number"),
     ("Structure::is_affine_in_z", "takes no number"),
     ("Forced::new", "stores its arguments; every start checks them"),

@@ -1,6 +1,7 @@
 //! The limits that `KNOWN_ISSUES.md` lists, each asserted; a limit that no longer holds is removed from both.
 
 use crate::common::gauss::GaussSteppers;
+use crate::one::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::{
@@ -32,7 +33,8 @@ fn the_page_names_its_tests() {
 }
 
 /// An oscillator with a pulse of force.
-struct Pulse {
+#[derive(Clone, Copy, Debug)]
+pub struct Pulse {
     height: f64,
     width: f64,
 }
@@ -48,7 +50,7 @@ impl Lagrangian<1> for Pulse {
 }
 
 /// The position after two units of time.
-fn position(system: &Pulse, integrator: AnyIntegrator, steps: usize) -> f64 {
+fn position(system: &One, integrator: AnyIntegrator, steps: usize) -> f64 {
     let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let outcome = problem.by(integrator).steps(Steps::Count(steps)).run(Until::Time(2.0)).unwrap();
     assert_eq!(outcome.status, Status::Completed);
@@ -58,7 +60,7 @@ fn position(system: &Pulse, integrator: AnyIntegrator, steps: usize) -> f64 {
 #[test]
 fn fixed_steps_pass_over_what_is_narrower() {
     let pulse = Pulse { height: 300.0, width: 1e-3 };
-    let quiet = Pulse { height: 0.0, ..pulse };
+    let (pulse, quiet) = (One::from(pulse), One::from(Pulse { height: 0.0, ..pulse }));
     for integrator in [AnyIntegrator::Gauss { stages: 4 }, AnyIntegrator::Splitting(SplittingScheme::STRANG)] {
         // None of the points of four steps is within forty widths of the pulse, which changes the motion by half a
         // unit.
@@ -70,7 +72,7 @@ fn fixed_steps_pass_over_what_is_narrower() {
 
 #[test]
 fn a_pulse_between_the_nodes_of_a_step_is_not_seen() {
-    let pendulum = Pendulum::default();
+    let pendulum = one(Pendulum::default());
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let found = |h: f64| {
         let mut narrow = Events::new([Event::new(|t, _| if (0.503..0.511).contains(&t) { -1.0 } else { 1.0 })]);
@@ -84,7 +86,7 @@ fn a_pulse_between_the_nodes_of_a_step_is_not_seen() {
 
 #[test]
 fn dense_output_has_the_order_of_the_stages_between_the_ends() {
-    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     let error = |h: f64, at: f64| {
         let gauss = Gauss::new(oscillator, 3, h).unwrap();
         let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()).unwrap();
@@ -100,7 +102,7 @@ fn dense_output_has_the_order_of_the_stages_between_the_ends() {
 #[test]
 fn a_composition_takes_its_rule_on_trust() {
     // The rectangle rule has order 1 and is not symmetric: no composition raises its order, and there is no error.
-    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     let error = |steps: usize| {
         let h = 1.0 / steps as f64;
         let start = PhasePoint::new([1.0], [0.0], 0.0);
@@ -115,7 +117,7 @@ fn a_composition_takes_its_rule_on_trust() {
 
 #[test]
 fn two_points_lose_the_digits_that_their_difference_loses() {
-    let ld = Midpoint::new(Pendulum::default(), 1e-8).unwrap();
+    let ld = Midpoint::new(one(Pendulum::default()), 1e-8).unwrap();
     let start = PhasePoint::new([1.0], [0.5], 0.0);
     let mut flow = Flow::new(&ld, 0.0, start).unwrap();
     flow.step().unwrap();
@@ -128,7 +130,7 @@ fn two_points_lose_the_digits_that_their_difference_loses() {
 
 #[test]
 fn quadrature_rules_have_a_rational_rate() {
-    let pendulum = Pendulum { gamma: -3.0 };
+    let pendulum = one(Pendulum { gamma: -3.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let factor = |integrator| {
         let run = problem.by(integrator).steps(Steps::Count(10)).with_conformal_factor();

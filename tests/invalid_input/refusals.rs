@@ -1,6 +1,8 @@
 //! Invalid input is a typed error before the first step; a failure later is a status that keeps what was computed.
 
-use crate::common::lagrangians::{Bratu, Explosive, Massless};
+use crate::common::lagrangians::{Bratu, Massless};
+use crate::one::{One, one};
+use crate::sentences::input::Odd;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -16,13 +18,13 @@ use exact_lagrangian::{
 /// Equal points are invalid only where a discrete Lagrangian is singular on the diagonal.
 #[test]
 fn equal_points() {
-    let ld = Rectangle::new(FreeParticle::default(), 0.1).unwrap();
+    let ld = Rectangle::new(one(FreeParticle::default()), 0.1).unwrap();
     assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
 }
 
 /// A run of a rule by a number of steps of a size from t = 0, with a row of each.
 fn every_step(
-    lagrangian: &impl Lagrangian<1>,
+    lagrangian: &One,
     start: PhasePoint<1>,
     method: Method,
     (h, steps): (f64, usize),
@@ -38,18 +40,23 @@ fn all_finite(rows: &[Row<1>]) -> bool {
     rows.iter().all(|row| [row.t, row.q[0], row.p[0], row.z.unwrap_or(f64::NAN)].iter().all(|x| x.is_finite()))
 }
 
+/// A drag that grows with time.
+#[derive(Clone, Copy, Debug)]
+pub struct GrowingDrag;
+
+impl Lagrangian<1> for GrowingDrag {
+    fn value<T: Scalar>(&self, t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - t * z
+    }
+}
+
 /// Where sigma_d crosses zero during a run, the status has the step, and every row before it is kept.
 #[test]
 fn sigma_crosses_zero() {
-    struct GrowingDrag;
-    impl Lagrangian<1> for GrowingDrag {
-        fn value<T: Scalar>(&self, t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - t * z
-        }
-    }
     // sigma = 1 - h t_mid with t_mid = (k + 1/2) h: not positive from k = 100 on, for h = 0.1.
     let start = PhasePoint::new([0.0], [1.0], 0.0);
-    let (Outcome { status, t, .. }, rows) = every_step(&GrowingDrag, start, Method::LeftMidpoint, (0.1, 200));
+    let (Outcome { status, t, .. }, rows) =
+        every_step(&One::from(GrowingDrag), start, Method::LeftMidpoint, (0.1, 200));
     let failed =
         matches!(status, Status::Failed { step: 100, cause: StepError::SigmaVanished { .. }, t: at } if at == t);
     assert!(failed, "{status:?}");
@@ -63,7 +70,7 @@ fn blow_up() {
     let start = PhasePoint::new([0.0], [0.1], 1.0);
     // A rule that is explicit in z, and one that is implicit.
     for method in [Method::LeftMidpoint, Method::Midpoint] {
-        let (Outcome { status, .. }, rows) = every_step(&Explosive, start, method, (0.01, 400));
+        let (Outcome { status, .. }, rows) = every_step(&One::from(Odd::Explosive), start, method, (0.01, 400));
         let failed = matches!(status, Status::Failed { step, .. } if step + 1 == rows.len());
         assert!(failed, "{status:?} with {} rows", rows.len());
         assert!(all_finite(&rows));
@@ -74,18 +81,18 @@ fn blow_up() {
 #[test]
 fn exact_input() {
     for h in [0.0, -0.5, f64::INFINITY] {
-        assert_eq!(ExactLagrangian::<_, 1>::new(Pendulum::default(), h).err(), Some(InputError::Step { h }));
-        assert_eq!(ContactExponential::new(Pendulum::default(), h).err(), Some(InputError::Step { h }));
+        assert_eq!(ExactLagrangian::<_, 1>::new(one(Pendulum::default()), h).err(), Some(InputError::Step { h }));
+        assert_eq!(ContactExponential::new(one(Pendulum::default()), h).err(), Some(InputError::Step { h }));
         let orders = error_orders(
-            &Pendulum::default(),
-            |h| Midpoint::new(Pendulum::default(), h),
+            &one(Pendulum::default()),
+            |h| Midpoint::new(one(Pendulum::default()), h),
             0.0,
             &VelocityPoint::new([1.0], [0.5], 0.0),
             h,
         );
         assert_eq!(orders.err(), Some(ExactError::Input(InputError::Step { h })));
     }
-    let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
+    let exp = ContactExponential::new(one(Pendulum::default()), 0.5).unwrap();
     let bad = exp.retract(0.0, &DiscretePoint::new([0.1], [f64::NAN], 0.0));
     assert!(matches!(bad, Err(ExactError::Input(InputError::Geometry(GeometryError::NonFinite { what: "q1", .. })))));
     let exp = ContactExponential::new(Massless, 0.5).unwrap();
@@ -93,7 +100,7 @@ fn exact_input() {
     let ok = matches!(singular, Err(ExactError::Input(InputError::Geometry(GeometryError::Singular { .. }))));
     assert!(ok, "{singular:?}");
     // Equal points are valid: the pendulum at rest joins them.
-    let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
+    let exp = ContactExponential::new(one(Pendulum::default()), 0.5).unwrap();
     assert!(exp.retract(0.0, &DiscretePoint::new([0.0], [0.0], 0.0)).is_ok_and(|r| r.start.v[0] == 0.0));
 }
 

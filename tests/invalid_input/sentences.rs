@@ -34,11 +34,12 @@ fn variants(of: &str, source: &str) -> BTreeSet<String> {
 }
 
 #[path = "sentences/input.rs"]
-mod input;
+pub mod input;
 #[path = "sentences/steps.rs"]
-mod steps;
+pub mod steps;
 
-use crate::common::lagrangians::{Bratu, Explosive, Massless};
+use crate::common::lagrangians::{Bratu, Massless};
+use crate::one::{One, one};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::support::linear;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator};
@@ -46,6 +47,7 @@ use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, Symmetry
 use discrete_herglotz::rules::{LeftMidpoint, Method, Rectangle, UnknownMethod};
 use discrete_herglotz::{AnyIntegrator, UnknownIntegrator, UnresolvedStep};
 use exact_lagrangian::{ContactExponential, ExactError, herglotz_flow};
+use input::Odd;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -54,8 +56,8 @@ fn pendulum_at(p: f64) -> PhasePoint<1> {
 }
 
 /// A drag that makes the conformal factor of a step of 0.1 negative.
-fn strong() -> LeftMidpoint<FreeParticle> {
-    LeftMidpoint::new(FreeParticle { gamma: -20.0 }, 0.1).unwrap()
+fn strong() -> LeftMidpoint<One> {
+    LeftMidpoint::new(one(FreeParticle { gamma: -20.0 }), 0.1).unwrap()
 }
 
 #[test]
@@ -69,7 +71,7 @@ fn geometry_errors() {
             herglotz_field(&Massless, 0.0, &VelocityPoint::new([0.1], [0.2], 0.0)).unwrap_err()
         }, ["singular", "pivot 0e0"];
         GeometryError::Undefined { .. } => {
-            let ld = Rectangle::new(Explosive, 0.1).unwrap();
+            let ld = Rectangle::new(One::from(Odd::Explosive), 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
             discrete_herglotz::theory::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];
@@ -86,11 +88,11 @@ fn geometry_errors() {
 
 #[test]
 fn exact_errors() {
-    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     every!(ExactError<1>, "exact-lagrangian/src/error.rs" {
         ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite nonzero number", "positive"];
         ExactError::OutsideDomain { .. } => {
-            herglotz_flow(&Explosive, 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()
+            herglotz_flow(&One::from(Odd::Explosive), 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()
         }, ["only until t = ", "smaller h", "another start"];
         ExactError::Unfinished { .. } => {
             herglotz_flow(&oscillator, 0.0, &VelocityPoint::new([1.0], [0.0], 0.0), 1e9).unwrap_err()

@@ -1,5 +1,6 @@
 //! The choice of steps for a requested accuracy: motions that are refused, and motions that come to rest.
 
+use super::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, SelectionFailure, Status, Until};
@@ -16,7 +17,7 @@ fn run_to<L: Lagrangian<N>, const N: usize>(
 }
 
 /// `v^2/2 - V(q) + gamma (1 + swing cos t) z`.
-struct Line {
+pub struct Line {
     gamma: f64,
     swing: f64,
     potential: Potential,
@@ -69,7 +70,7 @@ fn jumps_of_the_potential_are_refused() {
         // Some of the jumps are at the ends of steps.
         let place = if i % 4 == 0 { 10.0 * (i + 1) as f64 / 64.0 } else { 0.5 + 0.137 * i as f64 };
         let height = [-0.8, -0.02, 0.003, 0.3][i / 4 % 4];
-        let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } };
+        let line = One::from(Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } });
         let problem = Problem::new(&line, 0.0, at(0.0, 1.0)).unwrap();
         let cause = match problem.accuracy(1e-6).plan(Until::Time(10.0)) {
             Err(InputError::Accuracy { cause, .. }) => cause,
@@ -89,7 +90,7 @@ fn jumps_of_the_potential_are_refused() {
 /// says nothing about other steps.
 #[test]
 fn kinks_are_met_or_refused() {
-    let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Kink };
+    let line = One::from(Line { gamma: 0.0, swing: 0.0, potential: Potential::Kink });
     let mut met = 0;
     for wanted in [1e-3, 1e-6, 1e-9] {
         for j in 1..=10 {
@@ -111,7 +112,7 @@ fn kinks_are_met_or_refused() {
 /// A motion that has come to rest, up to round-off, is continued to the end of the span.
 #[test]
 fn motions_that_come_to_rest_are_followed() {
-    let line = Line { gamma: -0.89, swing: 0.0, potential: Potential::Well };
+    let line = One::from(Line { gamma: -0.89, swing: 0.0, potential: Potential::Well });
     for span in [40.0, 90.0, 400.0] {
         let outcome = run_to(&line, at(0.3, -0.5), span, 1e-8).unwrap();
         assert_eq!(outcome.status, Status::Completed, "{span}");
@@ -125,7 +126,7 @@ fn motions_that_come_to_rest_are_followed() {
 /// A position at rest stays at rest, while z changes.
 #[test]
 fn rest_is_followed() {
-    let line = Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole };
+    let line = One::from(Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole });
     let start = VelocityPoint::new([0.0], [0.0], -0.98);
     let outcome = run_to(&line, start, 20.0, 1e-8).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.p[0]), (Status::Completed, 0.0, 0.0));
@@ -138,7 +139,7 @@ fn rest_is_followed() {
 /// A singularity is recognised in bounded work, by every method.
 #[test]
 fn singularities_end_the_search_soon() {
-    let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Pole };
+    let line = One::from(Line { gamma: 0.0, swing: 0.0, potential: Potential::Pole });
     for integrator in ["gauss_8", "midpoint", "strang", "midpoint_by_kahan_li_8"] {
         let integrator: AnyIntegrator = integrator.parse().unwrap();
         let clock = Instant::now();
@@ -163,7 +164,7 @@ fn singularities_end_the_search_soon() {
 /// chaos.
 #[test]
 fn what_decays_below_the_numbers_is_rounded() {
-    let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
+    let system = one(contact_geom::systems::HarmonicOscillator { gamma: -0.1 });
     let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
     let refused = run_to(&system, start, 1e3, 1e-9).err();
     assert!(matches!(refused, Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, .. })), "{refused:?}");

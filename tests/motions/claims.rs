@@ -1,6 +1,7 @@
 //! Declared structure that holds at the start of a motion, and not along it.
 
 use super::draws::Draws;
+use super::lagrangians::One;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Status, Steps, Until};
@@ -13,8 +14,9 @@ enum Bumped {
     Force,
 }
 
+/// A body on a slope with a bump.
 #[derive(Clone, Copy, Debug)]
-struct Bump {
+pub struct Bump {
     of: Bumped,
     /// Its centre and half width.
     at: f64,
@@ -69,9 +71,10 @@ fn claims_that_are_false_beyond_the_start_are_found_along_the_motion() {
             slope: draws.between(0.0, 0.5),
         };
         let start = VelocityPoint::new([draws.between(-1.0, 1.0)], [draws.between(1.5, 5.0)], 0.0);
-        let problem = Problem::new(&bump, 0.0, start).unwrap();
+        let system = One::from(bump);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
-        if integrator.check::<1, _>(&bump).is_err() {
+        if integrator.check(&system).is_err() {
             continue;
         }
         let span = draws.between(15.0, 60.0);

@@ -1,10 +1,11 @@
 //! Steps that are far too long are flagged as unresolved or refused, by every integrator; and properties that must not
 //! affect this.
 
+use super::lagrangians::{One, Two, one};
 use crate::common::gauss::GaussSteppers;
 use crate::run_of;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};
+use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, SplittingScheme, Status, Stepper, Steps, UnresolvedStep, gauss::Gauss, rules::Method,
@@ -44,16 +45,16 @@ fn every_integrator<L: Lagrangian<1>>(system: &L) {
 
 #[test]
 fn coarse_steps_of_a_linear_motion_are_flagged() {
-    every_integrator(&OneCoordinate::from(HarmonicOscillator { gamma: -0.01 }));
+    every_integrator(&one(HarmonicOscillator { gamma: -0.01 }));
 }
 
 #[test]
 fn coarse_steps_of_a_pendulum_are_flagged() {
-    every_integrator(&OneCoordinate::from(Pendulum { gamma: -0.01 }));
+    every_integrator(&one(Pendulum { gamma: -0.01 }));
 }
 
 /// `-v^2/6 + 2 q^4`, a force that grows without bound: long steps are solved by Newton's method, or have no solution.
-struct Runaway;
+pub struct Runaway;
 
 impl Lagrangian<1> for Runaway {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -70,7 +71,7 @@ impl Lagrangian<1> for Runaway {
 fn the_action_does_not_decide_where_a_run_ends() {
     let mut by_newton = 0;
     for (stages, tenths) in [1, 2, 4, 8].into_iter().flat_map(|s| (1..20).map(move |k| (s, k))) {
-        let gauss = Gauss::new(Runaway, stages, 0.05 * f64::from(tenths)).unwrap();
+        let gauss = Gauss::new(One::from(Runaway), stages, 0.05 * f64::from(tenths)).unwrap();
         let (start, v) = (PhasePoint::new([-0.585], [0.63], 1e3), SVector::from([-1.89]));
         let (mut with, mut without) =
             (gauss.stepper(0.0, start, v).unwrap(), gauss.stepper_without_action(0.0, start, v).unwrap());
@@ -87,7 +88,7 @@ fn the_action_does_not_decide_where_a_run_ends() {
 /// velocity has lost all digits.
 #[test]
 fn a_guess_of_the_velocity_may_be_of_any_size() {
-    let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma: -0.01 }), 8, 0.1).unwrap();
+    let gauss = Gauss::new(one(Pendulum { gamma: -0.01 }), 8, 0.1).unwrap();
     let end = |guess: f64| {
         let mut run = gauss.stepper(0.0, PhasePoint::new([0.5], [0.4], 0.1), SVector::from([guess])).unwrap();
         run.advance(1).unwrap();
@@ -104,7 +105,7 @@ fn a_guess_of_the_velocity_may_be_of_any_size() {
 }
 
 /// `v^2/2 - q^2/2 - slope |q - at|`, whose force jumps.
-struct Kinked {
+pub struct Kinked {
     at: f64,
     slope: f64,
 }
@@ -130,7 +131,7 @@ fn without_check_between_nodes() -> impl Iterator<Item = AnyIntegrator> {
 fn an_error_of_the_energy_at_a_kink_is_flagged() {
     let (mut lost, mut kept) = (Vec::new(), 0);
     for (at, slope) in [(0.3, 1.0), (0.0, 5.0), (-0.2, 100.0)] {
-        let system = Kinked { at, slope };
+        let system = One::from(Kinked { at, slope });
         let energy = |q: f64, p: f64| 0.5 * (p * p + q * q) + slope * (q - at).abs();
         for (integrator, count) in without_check_between_nodes().flat_map(|i| [10, 50, 200].map(|n| (i, n))) {
             let start = VelocityPoint::new([1.0], [0.0], 0.0);
@@ -178,7 +179,7 @@ fn a_centre_that_is_passed_in_a_step_is_flagged() {
 #[test]
 fn a_suspect_interval_is_not_flagged() {
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
-    let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
+    let system = one(Pendulum { gamma: -0.01 });
     for integrator in AnyIntegrator::all().into_iter().filter(|i| i.order() > 1 && i.check::<1, _>(&system).is_ok()) {
         let parts =
             if let AnyIntegrator::Gauss { stages } = integrator { max_or_nan(0.5 * stages as f64, 1.0) } else { 1.0 };
@@ -197,7 +198,7 @@ fn a_suspect_interval_is_not_flagged() {
 }
 
 /// A pendulum by `sin(q + pi/2)`, whose forces near the origin have the rounding of numbers near pi/2.
-struct Shifted;
+pub struct Shifted;
 
 impl Lagrangian<1> for Shifted {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -218,11 +219,12 @@ impl Lagrangian<1> for Shifted {
 /// A motion that has come to rest near the origin moves by rounding alone, which is no motion to be resolved.
 #[test]
 fn a_motion_at_rest_is_not_flagged() {
+    let shifted = One::from(Shifted);
     for scheme in SplittingScheme::ALL {
         for count in [1000, 1024] {
             let start = VelocityPoint::new([1.0], [0.3], 0.0);
             let (span, steps) = (0.1 * f64::from(count), Steps::Count(count as usize));
-            let end = run_of(&Shifted, start, span, AnyIntegrator::Splitting(scheme), steps).unwrap();
+            let end = run_of(&shifted, start, span, AnyIntegrator::Splitting(scheme), steps).unwrap();
             assert_eq!((end.status, end.unresolved), (Status::Completed, None), "{}, {:e}", scheme.name(), end.q[0]);
             assert!(end.q[0].abs() < 1e-14, "{}, {:e}", scheme.name(), end.q[0]);
         }
@@ -230,7 +232,7 @@ fn a_motion_at_rest_is_not_flagged() {
     // The equations of an implicit step have no solution there, as the forces jump from one number to the next: they
     // are solved up to that.
     let (start, midpoint) = (VelocityPoint::new([1.0], [0.3], 0.0), AnyIntegrator::Discrete(Method::Midpoint));
-    let end = run_of(&Shifted, start, 100.0, midpoint, Steps::Count(1000)).unwrap();
+    let end = run_of(&shifted, start, 100.0, midpoint, Steps::Count(1000)).unwrap();
     assert_eq!((end.status, end.unresolved), (Status::Completed, None));
     assert!(end.q[0].abs() < 1e-14, "{:e}", end.q[0]);
 }
@@ -263,7 +265,7 @@ fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
 /// Steps so short that each is rounded in the same way: the sum of many of them is accurate.
 #[test]
 fn tiny_steps_lose_nothing() {
-    let (system, count) = (OneCoordinate::from(Pendulum { gamma: -0.1 }), 1000);
+    let (system, count) = (one(Pendulum { gamma: -0.1 }), 1000);
     let (q, v) = (1.0, 0.7);
     for (scheme, h) in SplittingScheme::ALL.into_iter().flat_map(|s| [1e-12, 1e-11, 1e-10].map(|h| (s, h))) {
         let (start, steps) = (VelocityPoint::new([q], [v], 0.0), Steps::Count(count as usize));
@@ -278,7 +280,7 @@ fn tiny_steps_lose_nothing() {
 }
 
 /// Two coordinates, the first with a mass that grows with z from a negative value: the motion ends where it vanishes.
-struct Massless;
+pub struct Massless;
 
 impl Lagrangian<2> for Massless {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
@@ -289,12 +291,13 @@ impl Lagrangian<2> for Massless {
 /// The equations of a step may have a solution beyond the end of the motion, and so may those of all later steps.
 #[test]
 fn a_step_past_the_end_of_a_motion_is_flagged() {
+    let massless = Two::from(Massless);
     let start = VelocityPoint::new([-0.674, 0.863], [1.348, 0.541], 0.0);
     let (mut silent, mut whole) = (Vec::new(), 0);
     for integrator in without_check_between_nodes() {
         // The mass vanishes after 0.0017.
         for count in [10, 20, 40] {
-            let Ok(end) = run_of(&Massless, start, 1.6, integrator, Steps::Count(count)) else { continue };
+            let Ok(end) = run_of(&massless, start, 1.6, integrator, Steps::Count(count)) else { continue };
             whole += u32::from(end.status == Status::Completed);
             if (end.status, end.unresolved) == (Status::Completed, None) {
                 silent.push((integrator.to_string(), count));

@@ -1,7 +1,8 @@
 //! Output of runs by every integrator: rows at times, events, runs backward, stopped and resumed runs.
 
+use super::lagrangians::{one, two};
 use crate::run_of;
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, UniformField};
 use contact_geom::{
     Lagrangian, PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -76,8 +77,8 @@ fn there_and_back() {
         count
     }
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
-    assert!(check(&OneCoordinate::from(Pendulum { gamma: -0.1 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 40);
-    assert!(check(&OneCoordinate::from(QuadraticInZ { c: 0.3 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 30);
+    assert!(check(&one(Pendulum { gamma: -0.1 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 40);
+    assert!(check(&one(QuadraticInZ { c: 0.3 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 30);
     assert!(check(&kepler, kepler.initial()) > 50);
 }
 
@@ -110,7 +111,7 @@ fn rows_at_times() {
 /// Rows by steps and at the end, with columns; a run backward records them in its own order.
 #[test]
 fn rows_every_so_many_steps() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = one(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 1.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     for (to, way) in [(2.0, 1.0), (0.0, -1.0)] {
         let mut rows = Rows::every(4).unwrap().column("t + q", |t, x: &PhasePoint<1>| t + x.q[0]);
@@ -127,8 +128,8 @@ fn rows_every_so_many_steps() {
 /// steps.
 #[test]
 fn columns_of_rows() {
-    let system = OneCoordinate::from(QuadraticInZ::default());
-    let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
+    let system = one(QuadraticInZ::default());
+    let problem = Problem::new(&system, 0.0, QuadraticInZ::default().initial()).unwrap();
     for integrator in applicable(&system) {
         let mut rows = Rows::at((0..=7).map(|k| f64::from(k) / 7.0)).unwrap();
         rows = rows.with_velocity().with_energy().with_conformal_factor();
@@ -172,7 +173,7 @@ fn progress_is_reported() {
 /// are not.
 #[test]
 fn quotients_are_conserved() {
-    let system = contact_geom::systems::UniformField { field: [0.0, 0.0], gamma: -0.3 };
+    let system = two(UniformField { field: [0.0, 0.0], gamma: -0.3 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0, 0.0], [0.3, 0.7], 0.0)).unwrap();
     for integrator in applicable(&system) {
         let mut momenta = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1]);
@@ -187,7 +188,7 @@ fn quotients_are_conserved() {
 /// Events by every integrator: as accurate as its steps, in both directions, and terminal ones end the run.
 #[test]
 fn events_by_every_integrator() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = one(Pendulum { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let lowest = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
@@ -225,8 +226,8 @@ fn events_by_every_integrator() {
 /// The factor of a run that an event ends within a step is that of a run to the time of the event.
 #[test]
 fn the_factor_of_a_stop_is_that_up_to_it() {
-    let system = OneCoordinate::from(QuadraticInZ::default());
-    let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
+    let system = one(QuadraticInZ::default());
+    let problem = Problem::new(&system, 0.0, QuadraticInZ::default().initial()).unwrap();
     for integrator in applicable(&system) {
         let mut events = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.53).terminal()]);
         let run = run_in(&problem, integrator, 20, 1.0).with_conformal_factor();
@@ -244,7 +245,7 @@ fn the_factor_of_a_stop_is_that_up_to_it() {
 /// A function that is not finite ends the run; a function that is zero at the start has no sign before it changes.
 #[test]
 fn events_that_are_not_defined() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
+    let pendulum = one(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let run = |events: &mut Events<'_, 1>| {
         problem
@@ -312,7 +313,7 @@ fn observers_ask_and_stop() {
 /// Output times that are not in order, outside of the span, or not finite.
 #[test]
 fn what_cannot_be_observed_is_refused() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
+    let pendulum = one(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     for times in [vec![1.0, 0.5, 2.0], vec![0.0, f64::NAN], vec![f64::INFINITY], vec![1.0, 1.0]] {
         assert!(matches!(Rows::<1>::at(times.clone()), Err(InputError::Times { .. })), "{times:?}");
@@ -371,11 +372,11 @@ fn interrupted_runs_are_resumed() {
         places
     }
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
-    let oscillator = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
+    let oscillator = one(HarmonicOscillator { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
-    let places = check(&OneCoordinate::from(Pendulum { gamma: -0.1 }), start, "pendulum")
+    let places = check(&one(Pendulum { gamma: -0.1 }), start, "pendulum")
         + check(&oscillator, start, "oscillator")
-        + check(&OneCoordinate::from(QuadraticInZ { c: 0.3 }), start, "square")
+        + check(&one(QuadraticInZ { c: 0.3 }), start, "square")
         + check(&kepler, kepler.initial(), "kepler");
     assert!(places > 400, "{places}");
 }
@@ -415,7 +416,7 @@ fn unresolved_steps_are_resumed() {
 /// A file that does not exist, belongs to no run or to another version, or is truncated or changed.
 #[test]
 fn damaged_checkpoints_are_refused() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = one(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     let path = std::env::temp_dir().join(format!("damaged_{}", std::process::id()));
     assert!(matches!(ResumeState::read(&path), Err(CheckpointError::Unreadable(_))));

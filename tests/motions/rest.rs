@@ -1,6 +1,7 @@
 //! Motions that come to rest: none of their steps is flagged as unresolved, wherever they come to rest.
 
 use super::draws::Draws;
+use super::lagrangians::{One, one};
 use crate::common::lagrangians::WithStructure;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
@@ -9,7 +10,7 @@ use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, S
 
 /// Systems of one coordinate that come to rest away from 0, with a drag.
 #[derive(Clone, Copy, Debug)]
-enum Resting {
+pub enum Resting {
     /// A pendulum with a constant torque, of less than its weight.
     Torque { torque: f64, gamma: f64 },
     /// Two wells.
@@ -74,7 +75,7 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
     let cases = 1000;
     let integrators: Vec<_> = AnyIntegrator::all()
         .into_iter()
-        .filter(|i| i.check(&Resting::Hoop { square: 2.0, gamma: -1.0 }).is_ok())
+        .filter(|i| i.check(&One::from(Resting::Hoop { square: 2.0, gamma: -1.0 })).is_ok())
         .collect();
     let (mut flagged, mut done) = (Vec::new(), 0);
     for case in 0..cases {
@@ -88,7 +89,8 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
         // Until e^(gamma t/2) is between 1e-3 and 1e-40; above the critical drag it takes longer.
         let span = draws.between(14.0, 180.0) / -max_or_nan(-gamma.abs(), -2.0 / gamma.abs());
-        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let lagrangian = One::from(system);
+        let problem = Problem::new(&lagrangian, 0.0, start).unwrap();
         let by_accuracy = draws.next() < 0.25;
         // Linearity is only declared: a transient that ends within one step is flagged, since a false declaration looks
         // the same.
@@ -134,7 +136,8 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
         // Until its oscillation, or the slower of the two decays above the critical drag, is between 1e-9 and 1e-43 of
         // the start.
         let span = drawn.between(20.0, 100.0) / -max_or_nan(0.5 * gamma, 2.0 / gamma);
-        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let lagrangian = One::from(system);
+        let problem = Problem::new(&lagrangian, 0.0, start).unwrap();
         let integrator: AnyIntegrator = integrators[case % integrators.len()].parse().unwrap();
         let wanted = f64::powf(10.0, -drawn.between(4.0, 9.0));
         let (run, what) = match case % 3 {
@@ -159,7 +162,7 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
 fn general_steps_are_solved_to_the_rounding_of_forces() {
     for gamma in [-0.1, -0.5, -2.0] {
         // Without declared structure the steps solve the general equations of the stages.
-        let system = WithStructure(Resting::Morse { gamma }, Structure::default());
+        let system = One::from(WithStructure(Resting::Morse { gamma }, Structure::default()));
         let start = VelocityPoint::new([0.4], [-0.3], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         // Until the oscillation is below 1e-25 of the start.
@@ -178,7 +181,7 @@ fn general_steps_are_solved_to_the_rounding_of_forces() {
 /// A damped pendulum down to the smallest numbers.
 #[test]
 fn a_motion_at_rest_ends_with_a_status() {
-    for (system, gamma) in [-0.05, -0.1, -1.0].map(|gamma| (Pendulum { gamma }, gamma)) {
+    for (system, gamma) in [-0.05, -0.1, -1.0].map(|gamma| (one(Pendulum { gamma }), gamma)) {
         let start = VelocityPoint::new([1.0], [0.5], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let mut rows = Rows::at((0..=100).map(|k| 1e4 * f64::from(k))).unwrap();
@@ -200,7 +203,7 @@ fn a_motion_at_rest_ends_with_a_status() {
 
 /// `v^2/2 + q^2/2 + gamma z` from the stable direction of its hill: the motion approaches the hill up to round-off, and
 /// leaves it.
-struct Hill;
+pub struct Hill;
 
 impl Lagrangian<1> for Hill {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -212,7 +215,7 @@ impl Lagrangian<1> for Hill {
 }
 
 /// A pendulum with a pulse of force after a long time.
-struct Pushed;
+pub struct Pushed;
 
 impl Lagrangian<1> for Pushed {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -228,10 +231,11 @@ impl Lagrangian<1> for Pushed {
 fn what_will_move_again_does_not_end() {
     // q = e^(-2t) + 1e-300 e^(t/2), in between far below the numbers that count as rest.
     let start = VelocityPoint::new([1e-200], [-2e-200], 0.0);
-    let problem = Problem::new(&Hill, 0.0, start).unwrap();
+    let (hill, pushed) = (One::from(Hill), One::from(Pushed));
+    let problem = Problem::new(&hill, 0.0, start).unwrap();
     let end = problem.by(SplittingScheme::YOSHIDA_4).steps(Steps::Size(0.05)).run(Until::Time(1000.0)).unwrap();
     assert!(!matches!(end.status, Status::Stopped { .. }), "{end:?}");
-    let problem = Problem::new(&Pushed, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let problem = Problem::new(&pushed, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let end = problem.steps(Steps::Size(0.25)).run(Until::Time(4003.0)).unwrap();
     assert_eq!(end.status, Status::Completed);
     assert!(end.q[0].abs() > 0.1, "{end:?}");
@@ -243,7 +247,7 @@ fn what_will_move_again_does_not_end() {
 fn the_action_of_a_spring_does_not_depend_on_its_place() {
     // Powers of two, so that the distance is the same number.
     let of = |place: f64, by: AnyIntegrator| {
-        let spring = Resting::Spring { stiffness: 1.7, place, gamma: -0.3 };
+        let spring = One::from(Resting::Spring { stiffness: 1.7, place, gamma: -0.3 });
         let problem = Problem::new(&spring, 0.0, VelocityPoint::new([place + 0.75], [0.5], 0.0)).unwrap();
         let outcome = problem.by(by).steps(Steps::Size(0.25)).run(Until::Time(100.0)).unwrap();
         assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "{by}, {place}");

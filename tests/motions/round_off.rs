@@ -1,7 +1,8 @@
 //! Brouwer's law: the rounding of steps accumulates as a random walk, without drift.
 
+use super::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
+use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
     InputError, SplittingScheme, Stepper,
@@ -81,9 +82,9 @@ const H: f64 = 0.1;
 
 #[test]
 fn rounding_is_a_random_walk() -> Result<(), InputError> {
-    let free = OneCoordinate::from(HarmonicOscillator { gamma: 0.0 });
+    let free = one(HarmonicOscillator { gamma: 0.0 });
     for gamma in [0.0, -1e-12, -1e-14] {
-        let damped = OneCoordinate::from(HarmonicOscillator { gamma });
+        let damped = one(HarmonicOscillator { gamma });
         for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_CASAS_8] {
             let name = format!("{} gamma = {gamma:e}", scheme.name());
             let motion = |l, t, start| Splitting::new(l, &scheme, H, t, start);
@@ -131,21 +132,23 @@ fn rounding_is_a_random_walk() -> Result<(), InputError> {
     Ok(())
 }
 
+/// An oscillator with the rate `L_z = -c z`, at an action of 1e3, which changes by one.
+pub struct Slow(f64);
+
+impl Lagrangian<1> for Slow {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 - z * z * (0.5 * self.0)
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
 /// The same with the drag `-c z^2/2` for a small c: the factor of each map of the action is one up to its last digits.
 #[test]
 fn rounding_is_a_random_walk_under_a_nonlinear_drag() -> Result<(), InputError> {
-    /// An oscillator with the rate `L_z = -c z`, at an action of 1e3, which changes by one.
-    struct Slow(f64);
-    impl Lagrangian<1> for Slow {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 - z * z * (0.5 * self.0)
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, separable: true, constant_mass: true, ..Structure::default() }
-        }
-    }
     // The rate is -1e-12 up to 1e-15, with a deviation of mean zero.
-    let (free, slow) = (Slow(0.0), Slow(1e-15));
+    let (free, slow) = (One::from(Slow(0.0)), One::from(Slow(1e-15)));
     let scheme = SplittingScheme::STRANG;
     assert_random_walk(
         "nonlinear drag",

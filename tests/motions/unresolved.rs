@@ -2,6 +2,7 @@
 //! not.
 
 use super::draws::Draws;
+use super::lagrangians::Two;
 use crate::run_of;
 use contact_geom::systems::Kepler;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
@@ -24,8 +25,9 @@ enum Field {
     Wells,
 }
 
+/// A body in the plane with a drag.
 #[derive(Clone, Copy, Debug)]
-struct Plane {
+pub struct Plane {
     field: Field,
     gamma: f64,
 }
@@ -56,8 +58,8 @@ impl Lagrangian<2> for Plane {
     }
 }
 
-fn wall() -> Plane {
-    Plane { field: Field::Wall, gamma: 0.0 }
+fn wall() -> Two {
+    Two::from(Plane { field: Field::Wall, gamma: 0.0 })
 }
 
 /// Runs whose energy has an error of order one are flagged.
@@ -110,7 +112,7 @@ fn steps_of_random_size_are_right_or_flagged() {
             _ => Field::Wells,
         };
         let gamma = if draws.next() < 0.4 { 0.0 } else { -f64::exp(draws.between(-7.0, 0.5)) };
-        let system = Plane { field, gamma };
+        let system = Two::from(Plane { field, gamma });
         let x = match field {
             Field::Wall => draws.between(0.3, 3.0),
             _ => draws.between(-1.5, 1.5),
@@ -173,7 +175,7 @@ fn steps_of_random_size_are_right_or_flagged() {
 /// The error estimate is of the size of the error.
 #[test]
 fn the_error_of_given_steps_is_estimated() {
-    let system = Plane { field: Field::Softened { soft: 0.3 }, gamma: -0.02 };
+    let system = Two::from(Plane { field: Field::Softened { soft: 0.3 }, gamma: -0.02 });
     let start = VelocityPoint::new([1.0, 0.0], [0.0, 0.8], 0.0);
     let problem = Problem::new(&system, 0.0, start).unwrap();
     let truth = problem.accuracy(1e-12).run(Until::Time(40.0)).unwrap();

@@ -1,12 +1,13 @@
 //! The accuracy of velocities: where the momenta determine them badly, and where coordinates differ in size.
 
+use super::lagrangians::Two;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Run, SelectionFailure, Status, Steps, Until};
 
 /// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity rotates by the angle `B t`, and `p = v + B (-y,
 /// x)/2` is much larger than it.
-struct Charge {
+pub struct Charge {
     b: f64,
     structured: bool,
 }
@@ -35,9 +36,9 @@ fn far_away() -> VelocityPoint<2> {
     VelocityPoint::new([1.0, 0.0], V, 0.0)
 }
 
-/// The distance of a velocity from that of the charge, whose speed is 1.
-fn off(charge: &Charge, t: f64, v: Option<SVector<f64, 2>>) -> f64 {
-    let (sin, cos) = (charge.b * t).sin_cos();
+/// The distance of a velocity from that of the charge in a field, whose speed is 1.
+fn off(b: f64, t: f64, v: Option<SVector<f64, 2>>) -> f64 {
+    let (sin, cos) = (b * t).sin_cos();
     // v' = B (v_y, -v_x).
     let exact = SVector::from([V[0] * cos + V[1] * sin, V[1] * cos - V[0] * sin]);
     v.map_or(f64::NAN, |v| (v - exact).norm())
@@ -50,7 +51,7 @@ fn a_strong_magnetic_field() {
     for structured in [false, true] {
         for b in [1.0, 1e3, 1e5, 1e7] {
             for turns in [3.0, 40.0] {
-                let charge = Charge { b, structured };
+                let charge = Two::from(Charge { b, structured });
                 let (problem, t) = (Problem::new(&charge, 0.0, far_away()).unwrap(), turns / b);
                 // In stronger fields the reference of their trial runs is refused because of the rounding between its
                 // nodes.
@@ -60,7 +61,7 @@ fn a_strong_magnetic_field() {
                     let run = stages.map(|stages| AnyIntegrator::Gauss { stages }).into_iter().fold(run, Run::by);
                     let outcome = run.run(Until::Time(t)).unwrap();
                     assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "B = {b:e}");
-                    let off = off(&charge, t, outcome.v);
+                    let off = off(b, t, outcome.v);
                     assert!(off <= 1e-6, "B = {b:e}, {turns} radians, {stages:?}: {off:e}");
                 }
             }
@@ -71,9 +72,10 @@ fn a_strong_magnetic_field() {
 /// Where the rounding of the momentum exceeds the velocity, an accuracy is refused.
 #[test]
 fn a_velocity_below_the_rounding_of_the_momentum() {
-    let charge = Charge { b: 1e13, structured: false };
+    const B: f64 = 1e13;
+    let charge = Two::from(Charge { b: B, structured: false });
     let problem = Problem::new(&charge, 0.0, far_away()).unwrap();
-    let refused = problem.accuracy(1e-6).plan(Until::Time(40.0 / charge.b)).err();
+    let refused = problem.accuracy(1e-6).plan(Until::Time(40.0 / B)).err();
     assert!(
         matches!(refused, Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, reached, .. }) if reached > 1e-4),
         "{refused:?}"
@@ -85,11 +87,11 @@ fn a_velocity_below_the_rounding_of_the_momentum() {
 #[test]
 fn estimates_cover_the_velocity() {
     for (b, h) in [(1.0, 0.5), (1e5, 0.5), (1e7, 0.25)] {
-        let charge = Charge { b, structured: false };
+        let charge = Two::from(Charge { b, structured: false });
         let problem = Problem::new(&charge, 0.0, far_away()).unwrap();
         let run = problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(h / b)).with_error_estimate();
         let outcome = run.run(Until::Time(10.0 / b)).unwrap();
-        let (off, estimate) = (off(&charge, outcome.t, outcome.v), outcome.error_estimate.unwrap_or(f64::NAN));
+        let (off, estimate) = (off(b, outcome.t, outcome.v), outcome.error_estimate.unwrap_or(f64::NAN));
         assert!(estimate >= 0.8 * off && estimate <= 1.1 * off, "B = {b:e}: {off:e}, estimated {estimate:e}");
     }
 }
@@ -97,7 +99,7 @@ fn estimates_cover_the_velocity() {
 /// The error estimate of a motion that begins and ends at rest is relative to its speed in between.
 #[test]
 fn an_end_at_rest_is_no_error_of_the_velocity() {
-    let oscillators = Oscillators { coupling: 0.0 };
+    let oscillators = Two::from(Oscillators { coupling: 0.0 });
     let problem = Problem::new(&oscillators, 0.0, VelocityPoint::new([1.0, 0.5], [0.0; 2], 0.0)).unwrap();
     let (t, steps) = (64.0 * std::f64::consts::TAU, 1024);
     let run = problem.by(AnyIntegrator::Gauss { stages: 4 }).steps(Steps::Count(steps)).with_error_estimate();
@@ -112,7 +114,7 @@ fn an_end_at_rest_is_no_error_of_the_velocity() {
 
 /// Two oscillators, the second the faster the further the first is from its centre: `v.v/2 - x^2/2 - (1 + c x^2)
 /// y^2/2`.
-struct Oscillators {
+pub struct Oscillators {
     coupling: f64,
 }
 
@@ -137,7 +139,7 @@ impl Lagrangian<2> for Oscillators {
 #[test]
 fn each_coordinate_by_its_own_scale() {
     const SMALL: f64 = 1e-8;
-    let system = Oscillators { coupling: 900.0 };
+    let system = Two::from(Oscillators { coupling: 900.0 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0, SMALL], [1.0, 0.0], 0.0)).unwrap();
     for t in [5.0, 33.0] {
         let exact =

@@ -2,7 +2,8 @@
 
 use super::runs::seven;
 use crate::InputTest;
-use crate::numbers::{BASE, Claiming, EXTREME, Report, places, triples};
+use crate::numbers::{BASE, EXTREME, Report, places, triples};
+use crate::one::{CLAIMING, One};
 use contact_geom::{Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, StateDerivative, Variable};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Until};
@@ -18,7 +19,7 @@ pub const TESTS: &[InputTest] = &[InputTest {
     run: second_derivatives,
 }];
 
-impl Parametric<1> for Claiming {}
+impl Parametric<1> for One {}
 
 /// A multiple of the square of the end's position.
 struct Multiple(f64);
@@ -36,7 +37,7 @@ fn numbers(all: &[StateDerivative<1>]) -> Vec<f64> {
 fn second_derivatives(report: &mut Report) {
     let by = Some(AnyIntegrator::Gauss { stages: 6 });
     for (t, x) in places() {
-        let second = Problem::new(&Claiming, t, VelocityPoint::from(x)).map_err(SensitivityError::from);
+        let second = Problem::new(&CLAIMING, t, VelocityPoint::from(x)).map_err(SensitivityError::from);
         let second = second.and_then(|problem| {
             let variables = Variable::all(&problem);
             let run = seven(&problem, by).second_tangent(&variables, Until::Time(t + 0.5))?;
@@ -44,7 +45,7 @@ fn second_derivatives(report: &mut Report) {
         });
         report.entry_point(&(t, x), second);
     }
-    let problem = Problem::new(&Claiming, 0.0, VelocityPoint::from(triples()[0])).unwrap();
+    let problem = Problem::new(&CLAIMING, 0.0, VelocityPoint::from(triples()[0])).unwrap();
     let (variables, until) = ([Variable::Position(0), Variable::Action], Until::Time(BASE[0]));
     for factor in EXTREME {
         let direction = [vec![factor, 1.0]];

@@ -2,7 +2,8 @@
 
 use super::runs::BY;
 use crate::InputTest;
-use crate::numbers::{Claiming, EXTREME, Report, places, triples};
+use crate::numbers::{EXTREME, Report, places, triples};
+use crate::one::{CLAIMING, One};
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{
     Ensemble, Problem, Rows, Status, Steps, Until,
@@ -51,7 +52,7 @@ pub const TESTS: &[InputTest] = &[
 ];
 
 /// The members at their ends.
-fn ends(ensemble: &Ensemble<'_, Claiming, 1>, until: Until) -> Result<(Tally, Vec<Member<1>>), EnsembleError> {
+fn ends(ensemble: &Ensemble<'_, One, 1>, until: Until) -> Result<(Tally, Vec<Member<1>>), EnsembleError> {
     let mut all = Vec::new();
     let tally = ensemble.run(until, |member| all.push(member.clone()))?;
     Ok((tally, all))
@@ -70,7 +71,7 @@ fn ensembles(report: &mut Report) {
         for (t, x) in places() {
             // A member with an invalid start among others.
             let start = |i: usize| if i == 1 { VelocityPoint::from(x) } else { tame };
-            let of = Ensemble::new(&Claiming, t, 3, start).by(by).steps(Steps::Count(5)).threads(1);
+            let of = Ensemble::new(&CLAIMING, t, 3, start).by(by).steps(Steps::Count(5)).threads(1);
             let ended = ends(&of, Until::Time(t + 0.5));
             report.check(good(&ended, 3), || format!("{by}, {x:?} at {t}: {ended:?}"));
             let others = ended.as_ref().map_or(true, |(_, all)| {
@@ -80,7 +81,7 @@ fn ensembles(report: &mut Report) {
             report.check(ended.is_ok() || !(t + 0.5).is_finite() || t + 0.5 == t, || format!("{by} at {t}: {ended:?}"));
         }
         for number in EXTREME {
-            let of = |steps| Ensemble::of(0.4, 2, |_| (&Claiming, tame)).by(by).steps(steps).without_action();
+            let of = |steps| Ensemble::of(0.4, 2, |_| (&CLAIMING, tame)).by(by).steps(steps).without_action();
             if !(number > 0.0 && number < 1e-3) {
                 let ended = ends(&of(Steps::Size(number)), Until::Time(0.9));
                 report.check(good(&ended, 2), || format!("{by}, steps of {number}: {ended:?}"));
@@ -91,7 +92,7 @@ fn ensembles(report: &mut Report) {
             report.check(number.is_finite() || ended.is_err(), || format!("{by} until {number}: {ended:?}"));
         }
     }
-    let of = |count| Ensemble::new(&Claiming, 0.4, count, |_| tame).steps(Steps::Count(3));
+    let of = |count| Ensemble::new(&CLAIMING, 0.4, count, |_| tame).steps(Steps::Count(3));
     let until = Until::After(0.5);
     report.check(matches!(ends(&of(0), until), Err(EnsembleError::Empty)), || "no member".into());
     let by = BY.into_iter().flatten().next();
@@ -111,7 +112,7 @@ fn ensembles(report: &mut Report) {
     let mut seen = Vec::new();
     let tally = observed.run(until, |member, rows| seen.push((member.ending.is_ok(), rows.is_some())));
     report.check(tally.is_ok() && seen == [(false, false), (true, true)], || format!("observers: {seen:?}"));
-    if let (Ok(problem), Some(by)) = (Problem::new(&Claiming, 0.4, tame), by) {
+    if let (Ok(problem), Some(by)) = (Problem::new(&CLAIMING, 0.4, tame), by) {
         let ended = ends(&problem.ensemble(1, |_| tame).by(by).steps(Steps::Count(3)), until);
         report.check(ended.is_ok(), || format!("of a problem: {ended:?}"));
     }
@@ -125,7 +126,7 @@ fn ensembles(report: &mut Report) {
 fn shards(report: &mut Report) {
     let tame = VelocityPoint::from(triples()[0]);
     let by = BY.into_iter().flatten().next().unwrap();
-    let of = |t, count| Ensemble::new(&Claiming, t, count, |_| tame).by(by).steps(Steps::Count(3));
+    let of = |t, count| Ensemble::new(&CLAIMING, t, count, |_| tame).by(by).steps(Steps::Count(3));
     for number in EXTREME {
         let ensemble = of(number, 400);
         let sharded = ensemble.in_shards(Until::After(0.5));

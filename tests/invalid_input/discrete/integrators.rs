@@ -3,7 +3,8 @@
 use super::runs::{BY, seven, tame};
 use super::{STEPS, starts};
 use crate::InputTest;
-use crate::numbers::{Claiming, EXTREME, Report};
+use crate::numbers::{EXTREME, Report};
+use crate::one::{CLAIMING, One};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
@@ -54,9 +55,9 @@ pub const TESTS: &[InputTest] = &[
 
 /// A discrete Lagrangian is made for every valid step.
 fn discretisations(report: &mut Report) {
-    fn one(report: &mut Report, rule: &impl DiscretizationMethod<'static, Claiming, 1>) {
+    fn one(report: &mut Report, rule: &impl DiscretizationMethod<'static, One, 1>) {
         let info = rule.info();
-        report.check(rule.check(&Claiming).is_ok() && info.symmetric && info.order == 2, || format!("{info:?}"));
+        report.check(rule.check(&CLAIMING).is_ok() && info.symmetric && info.order == 2, || format!("{info:?}"));
         for h in EXTREME.into_iter().chain(STEPS) {
             let made = rule.discretise(&tame(), h).map(|ld| ld.step_size());
             let good = h != 0.0 && h.is_finite();
@@ -65,21 +66,21 @@ fn discretisations(report: &mut Report) {
     }
     one(report, &QuadratureMethod::<MidpointRule>::default());
     one(report, &Method::Trapezoidal);
-    one(report, &CustomMethod::new("mine", 2, |h| Midpoint::new(Claiming, h)).symmetric());
+    one(report, &CustomMethod::new("mine", 2, |h| Midpoint::new(CLAIMING, h)).symmetric());
 }
 
 /// A stepper starts at a finite state with a valid step, and its states are finite.
 fn integrators(report: &mut Report) {
-    fn one(report: &mut Report, by: &dyn Integrator<'static, Claiming, 1>, wants: StepperOptions) {
+    fn one(report: &mut Report, by: &dyn Integrator<'static, One, 1>, wants: StepperOptions) {
         let info = by.info();
         let said = !info.name.is_empty() && info.order > 0 && info.cost_per_evaluation > 0;
-        report.check(said && by.check(&Claiming).is_ok(), || format!("{info:?}"));
+        report.check(said && by.check(&CLAIMING).is_ok(), || format!("{info:?}"));
         let driven = |mut stepper: Box<dyn Stepper<1>>| {
             let _ = stepper.advance(3);
             (stepper.state(), stepper.time())
         };
         for (t, x) in starts() {
-            let made = Problem::new(&Claiming, t, x).and_then(|problem| by.stepper(&problem, 0.1, wants));
+            let made = Problem::new(&CLAIMING, t, x).and_then(|problem| by.stepper(&problem, 0.1, wants));
             report.entry_point(&(t, x), made.map(driven));
         }
         for h in EXTREME.into_iter().chain(STEPS) {
@@ -107,7 +108,7 @@ fn integrators(report: &mut Report) {
         }
     }
     let nystrom = CompositionMethod::new(rule, SplittingScheme::BLANES_MOAN_6);
-    let refused = Integrator::<'_, Claiming, 1>::check(&nystrom, &Claiming);
+    let refused = Integrator::<'_, One, 1>::check(&nystrom, &CLAIMING);
     report.check(matches!(refused, Err(InputError::Hypothesis { .. })), || format!("{refused:?}"));
     let items = [PlanEntry::computed("this", "said"), PlanEntry::skipped("that", "said")];
     report.check(items.map(|item| item.computed) == [true, false], || "items".into());
@@ -117,7 +118,7 @@ fn integrators(report: &mut Report) {
 fn orders(report: &mut Report) {
     let problem = tame();
     for order in [0, 1, 2, 1000, u32::MAX] {
-        let by = || CustomMethod::new("mine", order, |h| Midpoint::new(Claiming, h));
+        let by = || CustomMethod::new("mine", order, |h| Midpoint::new(CLAIMING, h));
         report.check(MethodInfo::of_discrete::<1>("mine", order).order == order, || "another order".into());
         let given = problem.by(by()).steps(Steps::Count(7)).run(Until::Time(0.5)).map(|o| (o.q, o.p));
         report.check(given.is_ok() == (order > 0), || format!("order {order}: {given:?}"));
@@ -208,7 +209,7 @@ fn resumed(report: &mut Report) {
             }
         }
         for value in EXTREME.into_iter().filter(|value| value.abs() < 10.0) {
-            let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
+            let other = Problem::new(&CLAIMING, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
             let run = seven(&other, by).resume(ResumeState::read(&path).unwrap()).run(until);
             report.check(run == Err(InputError::AnotherRun), || format!("from {value}: {run:?}"));
         }

@@ -2,7 +2,8 @@
 
 use super::{STEPS, starts};
 use crate::InputTest;
-use crate::numbers::{Claiming, EXTREME, Everything, Grade, Report, fine, grade, places, triples};
+use crate::numbers::{EXTREME, Grade, Report, fine, grade, places, triples};
+use crate::one::{CLAIMING, EVERYTHING, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Pendulum, QuadraticInZ};
@@ -103,7 +104,7 @@ fn transitions(report: &mut Report) {
 }
 
 fn jets(report: &mut Report) {
-    let ld = Trapezoidal::new(Everything, 0.1).unwrap();
+    let ld = Trapezoidal::new(EVERYTHING, 0.1).unwrap();
     let group = Symmetry::Translation(SVector::from([1.0]));
     for (t, x) in places() {
         let at = DiscretePoint::from(x);
@@ -116,7 +117,7 @@ fn jets(report: &mut Report) {
             report.formula(&input, jet.map(|j| ((j.d11, j.d12, j.d22), (j.d1z, j.d2z, j.dzz))));
         }
         report.formula(&input, sigma_d(&ld, t, &at));
-        let forced = Trapezoidal::new(Forced { lagrangian: Everything, force: AnyForce(0.3) }, 0.1).unwrap();
+        let forced = Trapezoidal::new(Forced { lagrangian: EVERYTHING, force: AnyForce(0.3) }, 0.1).unwrap();
         report.formula(&input, forced.forces(t, &at).map(|[minus, plus]| (minus, plus)));
         report.formula(&input, discrete_forces(&forced, t, &at).map(|f| (f.minus, f.plus)));
         report.formula(&input, legendre_minus(&ld, t, &at));
@@ -139,7 +140,7 @@ fn steps(report: &mut Report) {
                 report.entry_point(&input, ld.forward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
                 report.entry_point(&input, ld.backward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
             }
-            report.entry_point(&input, legendre_inverse(&Everything, t, &x, &guess));
+            report.entry_point(&input, legendre_inverse(&EVERYTHING, t, &x, &guess));
             report.entry_point(&input, legendre_minus_inverse(ld, t, &x, &guess));
             report.entry_point(&input, legendre_plus_inverse(ld, t, &x, &guess));
             for way in [HamiltonianFlow::Direct, HamiltonianFlow::ThroughPlus, HamiltonianFlow::ThroughMinus] {
@@ -166,39 +167,39 @@ fn steps(report: &mut Report) {
             report.check(good, || format!("the guess {guess} leads to {step:?}"));
         }
     }
-    one(report, &Midpoint::new(Everything, 0.1).unwrap());
-    one(report, &Rectangle::new(Everything, 0.1).unwrap());
-    one(report, &Gauss::new(Everything, 3, 0.1).unwrap());
-    one(report, &Strang::new(Claiming, 0.1, 0.4, &triples()[0].into()).unwrap());
+    one(report, &Midpoint::new(EVERYTHING, 0.1).unwrap());
+    one(report, &Rectangle::new(EVERYTHING, 0.1).unwrap());
+    one(report, &Gauss::new(EVERYTHING, 3, 0.1).unwrap());
+    one(report, &Strang::new(CLAIMING, 0.1, 0.4, &triples()[0].into()).unwrap());
 }
 
 fn constructors(report: &mut Report) {
     let tame: PhasePoint<1> = triples()[0].into();
     for h in EXTREME.into_iter().chain(STEPS) {
         let good = h != 0.0 && h.is_finite();
-        let rule = Midpoint::new(Everything, h);
+        let rule = Midpoint::new(EVERYTHING, h);
         report.check(rule.is_ok() == good && rule.as_ref().map_or(true, |r| r.step_size() == h), || format!("h = {h}"));
         report.check(rule.is_err() || rule.is_ok_and(|r| r.lagrangian().structure() == Structure::default()), || {
             "another".into()
         });
-        report.check(Gauss::new::<1>(Everything, 8, h).is_ok() == good, || format!("Gauss with h = {h}"));
-        let strang = Strang::new(Claiming, h, 0.4, &tame);
+        report.check(Gauss::new::<1>(EVERYTHING, 8, h).is_ok() == good, || format!("Gauss with h = {h}"));
+        let strang = Strang::new(CLAIMING, h, 0.4, &tame);
         report.check(good || strang.is_err(), || format!("Strang with h = {h}"));
-        let strang = ActionStrang::new(QuadraticInZ::default(), h, 0.4, &tame);
+        let strang = ActionStrang::new(one(QuadraticInZ::default()), h, 0.4, &tame);
         report.check(good || strang.is_err(), || format!("ActionStrang with h = {h}"));
-        let strang = ActionStrang::with_flow(Claiming, &Riccati { b: -0.1, c: 0.0 }, h, 0.4, &tame);
+        let strang = ActionStrang::with_flow(CLAIMING, &Riccati { b: -0.1, c: 0.0 }, h, 0.4, &tame);
         report.check(good || strang.is_err(), || format!("ActionStrang with a flow and h = {h}"));
         for method in Method::ALL {
-            let made = method.discretise(Claiming, h, 0.4, &tame);
+            let made = method.discretise(CLAIMING, h, 0.4, &tame);
             report.check(good || made.is_err(), || format!("{method} with h = {h}"));
         }
     }
     for (t, x) in starts() {
         let bad = grade(&(t, x)) == Grade::Bad;
-        report.check(!bad || Strang::new(Claiming, 0.1, t, &x).is_err(), || format!("Strang at t = {t}, {x:?}"));
+        report.check(!bad || Strang::new(CLAIMING, 0.1, t, &x).is_err(), || format!("Strang at t = {t}, {x:?}"));
     }
     for stages in [0, 1, 16, 17, usize::MAX] {
-        let made = Gauss::new::<1>(Everything, stages, 0.1);
+        let made = Gauss::new::<1>(EVERYTHING, stages, 0.1);
         let good = (1..=16).contains(&stages);
         report.check(made.is_ok() == good && made.is_ok_and(|g| g.stages() == stages) == good, || {
             format!("{stages} stages")
@@ -207,7 +208,7 @@ fn constructors(report: &mut Report) {
 }
 
 fn paths(report: &mut Report) {
-    let ld = Midpoint::new(Everything, 0.1).unwrap();
+    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
     for points in [vec![], vec![SVector::from([0.1])]] {
         report.check(DiscretePath::<1>::new(points).is_err(), || "a path without a step".into());
     }
@@ -247,7 +248,7 @@ fn momenta(report: &mut Report) {
         // An infinite prediction gives NaN; a prediction of zero an infinite defect.
         report.check(!(defect <= 0.1), || format!("predicted {value}: {defect}"));
         let mut decay = MomentumDecay::new(Symmetry::Translation(SVector::from([1.0])));
-        let problem = Problem::new(&Claiming, 0.4, PhasePoint::new([0.1], [value], 0.0));
+        let problem = Problem::new(&CLAIMING, 0.4, PhasePoint::new([0.1], [value], 0.0));
         let observed = problem.and_then(|problem| {
             let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Count(3)).observe(&mut decay);
             run.run(Until::Time(0.6)).map(|outcome| outcome.p)
@@ -292,7 +293,7 @@ fn solvers(report: &mut Report) {
 }
 
 fn residuals(report: &mut Report) {
-    let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
+    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
     for (t, x) in places() {
         for statement in Statement::ALL {
             let known = statements::STATEMENTS.contains(&statement);
@@ -303,7 +304,7 @@ fn residuals(report: &mut Report) {
                 Err(_) => known,
             };
             report.check(good, || format!("statement {statement} at t = {t}, {x:?}: {found:?}"));
-            let forced = Forced { lagrangian: Pendulum::default(), force: AnyForce(0.3) };
+            let forced = Forced { lagrangian: one(Pendulum::default()), force: AnyForce(0.3) };
             let known = statements::FORCED_STATEMENTS.contains(&statement);
             let found = statements::forced_residual(statement, &forced, &[], 0.1, t, &x.into());
             let good = match &found {
@@ -318,16 +319,16 @@ fn residuals(report: &mut Report) {
 
 /// A property is verified where L is defined; elsewhere it is not assumed to hold.
 fn claims(report: &mut Report) {
-    let forced = Forced { lagrangian: Claiming, force: AnyForce(0.3) };
+    let forced = Forced { lagrangian: CLAIMING, force: AnyForce(0.3) };
     let refused =
-        check_unforced::<_, 1>(&forced, "a method").is_err() && check_unforced::<_, 1>(&Claiming, "a method").is_ok();
+        check_unforced::<_, 1>(&forced, "a method").is_err() && check_unforced::<_, 1>(&CLAIMING, "a method").is_ok();
     report.check(refused, || "a force is taken".into());
     for (t, x) in places() {
-        let found = check_claims(&Claiming, t, &x.into());
+        let found = check_claims(&CLAIMING, t, &x.into());
         // The properties do not depend on the action.
         let bad = grade(&(t, (x.x, x.y))) == Grade::Bad;
         report.check(!bad || found.is_err(), || format!("at t = {t}, {x:?}: {found:?}"));
-        report.check(grade(&(t, x)) != Grade::Tame || found == Ok(Claiming.structure()), || {
+        report.check(grade(&(t, x)) != Grade::Tame || found == Ok(CLAIMING.structure()), || {
             format!("at t = {t}, {x:?}: {found:?}")
         });
     }

@@ -2,7 +2,8 @@
 
 use super::runs::{BY, seven, tame};
 use crate::InputTest;
-use crate::numbers::{EXTREME, Everything, Report, fine, triples};
+use crate::numbers::{EXTREME, Report, fine, triples};
+use crate::one::EVERYTHING;
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, CsvRows, Event, Events, InputError, Observer, Outcome, OutputRequest, Problem, Progress, Quotient,
@@ -135,9 +136,9 @@ fn progress_and_quotients(report: &mut Report) {
     report.check(Quotient::<1>::new(|_, _| 1.0, |_, _| 1.0).largest_change() == 0.0, || "of no run".into());
 }
 
-/// A run of [`Everything`] by Gauss steps of a tenth with events, from t = 0.
+/// A run of [`EVERYTHING`] by Gauss steps of a tenth with events, from t = 0.
 fn with_events(events: &mut Events<'_, 1>, until: Until) -> Result<Outcome<1>, InputError> {
-    let problem = Problem::new(&Everything, 0.0, VelocityPoint::from(triples()[0]))?;
+    let problem = Problem::new(&EVERYTHING, 0.0, VelocityPoint::from(triples()[0]))?;
     problem.by(AnyIntegrator::Gauss { stages: 4 }).steps(Steps::Size(0.1)).observe(events).run(until)
 }
 

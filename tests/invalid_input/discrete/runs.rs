@@ -1,7 +1,8 @@
 //! Invalid input to problems, runs and plans.
 
 use crate::InputTest;
-use crate::numbers::{Claiming, EXTREME, Grade, Report, grade, places, triples};
+use crate::numbers::{EXTREME, Grade, Report, grade, places, triples};
+use crate::one::{CLAIMING, One};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
@@ -50,7 +51,8 @@ pub const TESTS: &[InputTest] = &[
 ];
 
 /// A free particle that declares no structure.
-struct Silent;
+#[derive(Clone, Copy, Debug)]
+pub struct Silent;
 
 impl Lagrangian<1> for Silent {
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -70,16 +72,18 @@ impl Lagrangian<0> for Empty {
 fn integrators(report: &mut Report) {
     for stages in [0, 17, usize::MAX] {
         for integrator in [AnyIntegrator::Gauss { stages }, AnyIntegrator::TransformedGauss { stages }] {
-            let refused = integrator.check(&Claiming);
+            let refused = integrator.check(&CLAIMING);
             report.check(refused == Err(InputError::Stages { found: stages }), || format!("{integrator}: {refused:?}"));
         }
     }
-    report.check(AnyIntegrator::Splitting(SplittingScheme::STRANG).check(&Silent).is_err(), || "unclaimed".into());
-    let pair = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4).check(&Silent);
+    report.check(AnyIntegrator::Splitting(SplittingScheme::STRANG).check(&One::from(Silent)).is_err(), || {
+        "unclaimed".into()
+    });
+    let pair = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4).check(&One::from(Silent));
     report.check(matches!(pair, Err(InputError::Hypothesis { .. })), || format!("{pair:?}"));
 }
 
-/// Each kind of integrator for [`Claiming`], and none.
+/// Each kind of integrator for [`CLAIMING`], and none.
 pub const BY: [Option<AnyIntegrator>; 5] = [
     None,
     Some(AnyIntegrator::Gauss { stages: 6 }),
@@ -88,13 +92,13 @@ pub const BY: [Option<AnyIntegrator>; 5] = [
     Some(AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::YOSHIDA_4)),
 ];
 
-/// [`Claiming`] from an ordinary start at t = 0.
-pub fn tame() -> Problem<'static, Claiming, 1> {
-    Problem::new(&Claiming, 0.0, VelocityPoint::from(triples()[0])).unwrap()
+/// [`CLAIMING`] from an ordinary start at t = 0.
+pub fn tame() -> Problem<'static, One, 1> {
+    Problem::new(&CLAIMING, 0.0, VelocityPoint::from(triples()[0])).unwrap()
 }
 
 /// A run in seven steps.
-pub fn seven<'p, 'o>(problem: &'p Problem<'p, Claiming, 1>, by: Option<AnyIntegrator>) -> Run<'p, 'o, Claiming, 1> {
+pub fn seven<'p, 'o>(problem: &'p Problem<'p, One, 1>, by: Option<AnyIntegrator>) -> Run<'p, 'o, One, 1> {
     let run = problem.steps(Steps::Count(7));
     if let Some(by) = by { run.by(by) } else { run }
 }
@@ -108,21 +112,21 @@ fn numbers(o: Outcome<1>) -> Ends {
 
 fn problems(report: &mut Report) {
     let state: PhasePoint<1> = triples()[0].into();
-    let rules = [0.1, -0.1].map(|h| Midpoint::new(Claiming, h).unwrap());
+    let rules = [0.1, -0.1].map(|h| Midpoint::new(CLAIMING, h).unwrap());
     for (t, x) in places() {
-        let velocity = Problem::new(&Claiming, t, VelocityPoint::from(x));
+        let velocity = Problem::new(&CLAIMING, t, VelocityPoint::from(x));
         report.entry_point(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));
         let kept = velocity.is_ok_and(|p| p.t0() == t && *p.structure() == p.lagrangian().structure());
         report.check(kept || velocity.is_err(), || format!("{velocity:?}"));
-        let momentum = Problem::new(&Claiming, t, PhasePoint::from(x));
+        let momentum = Problem::new(&CLAIMING, t, PhasePoint::from(x));
         report.entry_point(&(t, x), momentum.map(|problem| (*problem.start(), *problem.state())));
         for ld in &rules {
-            let points = Problem::from_points(&Claiming, ld, t, DiscretePoint::from(x));
+            let points = Problem::from_points(&CLAIMING, ld, t, DiscretePoint::from(x));
             report.entry_point(&(t, x), points.map(|problem| (*problem.start(), *problem.state())));
         }
         // The outcome of a run is a valid start.
         let outcome = velocity.and_then(|problem| seven(&problem, None).without_action().run(Until::Time(t + 0.5)));
-        let again = outcome.as_ref().ok().map(|o| (o.state(), Problem::new(&Claiming, o.t, o)));
+        let again = outcome.as_ref().ok().map(|o| (o.state(), Problem::new(&CLAIMING, o.t, o)));
         let good = again.as_ref().is_none_or(|(state, _)| state.check().is_ok() && state.z == x.z);
         report.check(good, || format!("{outcome:?} leads to {again:?}"));
         let again = again.and_then(|(state, problem)| Some((state, *problem.ok()?.state())));
@@ -130,7 +134,7 @@ fn problems(report: &mut Report) {
     }
     for guess in EXTREME {
         // A poor guess costs iterations, or the start is refused; the velocity is finite.
-        let made = Problem::new(&Claiming, 0.4, Start::Momentum(state, SVector::from([guess])));
+        let made = Problem::new(&CLAIMING, 0.4, Start::Momentum(state, SVector::from([guess])));
         let good = made.is_ok_and(|problem| grade(&problem.start().v) != Grade::Bad && problem.state() == &state);
         report.check(good || made.is_err(), || format!("the guess {guess} leads to {made:?}"));
     }
@@ -141,7 +145,7 @@ fn problems(report: &mut Report) {
 fn runs(report: &mut Report) {
     for (t, x) in places() {
         for integrator in BY {
-            let problem = Problem::new(&Claiming, t, VelocityPoint::from(x));
+            let problem = Problem::new(&CLAIMING, t, VelocityPoint::from(x));
             let run = |problem: Problem<'_, _, 1>| seven(&problem, integrator).run(Until::Time(t + 0.5)).map(numbers);
             report.entry_point(&(t, x), problem.and_then(run));
         }

@@ -3,7 +3,8 @@
 use super::{STEPS, starts};
 use crate::InputTest;
 use crate::common::gauss::GaussSteppers;
-use crate::numbers::{Claiming, EXTREME, Everything, Grade, Numbers, Report, fine, grade, triples};
+use crate::numbers::{EXTREME, Grade, Numbers, Report, fine, grade, triples};
+use crate::one::{CLAIMING, EVERYTHING, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Kepler, QuadraticInZ};
@@ -141,7 +142,7 @@ fn constructor<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, Phase
 
 /// The contact defect of one step, from invalid starts and with invalid stages and steps.
 fn virtual_work(report: &mut Report) {
-    let forced = Forced { lagrangian: Everything, force: AnyForce(0.3) };
+    let forced = Forced { lagrangian: EVERYTHING, force: AnyForce(0.3) };
     let group = Symmetry::Translation(SVector::from([1.0]));
     let guess = SVector::from([0.5]);
     for (t, x) in starts() {
@@ -162,31 +163,31 @@ fn virtual_work(report: &mut Report) {
 
 fn compositions(report: &mut Report) {
     let scheme = SplittingScheme::YOSHIDA_4;
-    constructor(report, |h, t, x| Composition::new(|h| Midpoint::new(Everything, h), &scheme, h, t, x));
+    constructor(report, |h, t, x| Composition::new(|h| Midpoint::new(EVERYTHING, h), &scheme, h, t, x));
 }
 
 fn splittings(report: &mut Report) {
     let scheme = SplittingScheme::BLANES_MOAN_6;
-    constructor(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
+    constructor(report, |h, t, x| Splitting::new(&CLAIMING, &scheme, h, t, x));
     constructor(report, |h, t, x| {
-        Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.with_resolution_check().compensated().without_action())
+        Splitting::new(&CLAIMING, &scheme, h, t, x).map(|s| s.with_resolution_check().compensated().without_action())
     });
     let drag = VelocityDrag { linear: SVector::from([0.3]), quadratic: 0.0 };
-    let dragged = Forced { lagrangian: &Claiming, force: drag };
+    let dragged = Forced { lagrangian: &CLAIMING, force: drag };
     constructor(report, |h, t, x| {
         DragSplitting::new(&dragged, &scheme, h, t, x).map(|s| s.with_resolution_check().without_action())
     });
     let scheme = SplittingScheme::YOSHIDA_4;
-    let turbulent = Forced { lagrangian: &Claiming, force: VelocityDrag { quadratic: 0.4, ..drag } };
+    let turbulent = Forced { lagrangian: &CLAIMING, force: VelocityDrag { quadratic: 0.4, ..drag } };
     constructor(report, |h, t, x| DragSplitting::new(&turbulent, &scheme, h, t, x));
-    let system = QuadraticInZ::default();
+    let system = one(QuadraticInZ::default());
     constructor(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
     let flow = Riccati { b: -0.1, c: 0.0 };
-    constructor(report, |h, t, x| ActionSplitting::with_flow(&Claiming, &flow, &scheme, h, t, x));
+    constructor(report, |h, t, x| ActionSplitting::with_flow(&CLAIMING, &flow, &scheme, h, t, x));
     for value in EXTREME {
         // A flow that does not belong to the Lagrangian, or that is not a flow.
         let flow = Riccati { b: value, c: value };
-        let made = ActionSplitting::with_flow(&Claiming, &flow, &scheme, 0.1, 0.0, triples()[0].into());
+        let made = ActionSplitting::with_flow(&CLAIMING, &flow, &scheme, 0.1, 0.0, triples()[0].into());
         report.check(made.is_err(), || format!("the flow {flow:?} is taken"));
         report.formula(
             &value,
@@ -201,14 +202,14 @@ fn splittings(report: &mut Report) {
 
 fn steppers(report: &mut Report) {
     let start: PhasePoint<1> = triples()[0].into();
-    let gauss = Gauss::new(Everything, 4, 0.1).unwrap();
-    let ld = Midpoint::new(Everything, 0.1).unwrap();
+    let gauss = Gauss::new(EVERYTHING, 4, 0.1).unwrap();
+    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
     let steppers: [Box<dyn Stepper<1> + '_>; 4] = [
         Box::new(gauss.stepper(0.0, start, start.p).unwrap()),
         Box::new(Flow::new(&ld, 0.0, start).unwrap()),
-        Box::new(Splitting::new(&Claiming, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),
+        Box::new(Splitting::new(&CLAIMING, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),
         Box::new(
-            Composition::new(|h| Midpoint::new(Everything, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start).unwrap(),
+            Composition::new(|h| Midpoint::new(EVERYTHING, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start).unwrap(),
         ),
     ];
     let mut other = gauss.stepper(0.0, PhasePoint { p: -start.p, ..start }, -start.p).unwrap();
@@ -232,7 +233,7 @@ fn steppers(report: &mut Report) {
 }
 
 fn flows(report: &mut Report) {
-    let ld = Midpoint::new(Everything, 0.1).unwrap();
+    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
     for (t, x) in starts() {
         drive(report, &(t, x), Flow::new(&ld, t, x));
         drive(report, &(t, x), Flow::from_points(&ld, t, DiscretePoint::from(ChartVector::from(x))));
@@ -269,8 +270,8 @@ fn tame_start<L: Lagrangian<1>>(lagrangian: &L) -> Problem<'_, L, 1> {
 }
 
 fn gauss(report: &mut Report) {
-    let general = Gauss::new(Everything, 5, 0.1).unwrap();
-    let condensed = Gauss::new(Claiming, 5, 0.1).unwrap();
+    let general = Gauss::new(EVERYTHING, 5, 0.1).unwrap();
+    let condensed = Gauss::new(CLAIMING, 5, 0.1).unwrap();
     let one = SVector::from([1.0]);
     for (t, x) in starts() {
         drive(report, &(t, x), general.stepper(t, x, one));
@@ -279,9 +280,9 @@ fn gauss(report: &mut Report) {
         drive(report, &(t, x), general.stepper(t, x, one).map(|s| s.without_newton()));
     }
     for h in STEPS {
-        let gauss = Gauss::new(Everything, 5, h).unwrap();
+        let gauss = Gauss::new(EVERYTHING, 5, h).unwrap();
         drive(report, &h, gauss.stepper(0.0, triples()[0].into(), one));
-        let gauss = Gauss::new(Claiming, 5, h).unwrap();
+        let gauss = Gauss::new(CLAIMING, 5, h).unwrap();
         drive(report, &h, gauss.stepper(0.0, triples()[0].into(), one));
     }
     for guess in EXTREME {
@@ -298,13 +299,13 @@ fn gauss(report: &mut Report) {
         report.formula(&t, fine(curve.at(t)));
         report.formula(&t, fine(curve.velocity(t)));
     }
-    let problem = tame_start(&Everything);
+    let problem = tame_start(&EVERYTHING);
     for (stages, h) in [0, 1, 16, 17, usize::MAX].into_iter().flat_map(|s| EXTREME.map(|h| (s, h))) {
         let made = GaussStepper::new(&problem, stages, h, StepperOptions::default());
         let good = (1..=16).contains(&stages) && h != 0.0 && h.is_finite();
         report.check(good || made.is_err(), || format!("{stages} stages, h = {h}"));
     }
-    let back = Gauss::new(Everything, 5, -0.1).unwrap();
+    let back = Gauss::new(EVERYTHING, 5, -0.1).unwrap();
     let mut stepper = back.stepper(0.0, triples()[0].into(), one).unwrap();
     let span = stepper.advance(1).ok().and_then(|()| stepper.dense()).map(|curve| curve.span());
     report.check(span == Some((0.0, -0.1)), || format!("the span {span:?} of a step back"));

@@ -1,7 +1,8 @@
 //! Invalid input to contact forms, to the fields and brackets that belong to them, and to groups.
 
 use crate::InputTest;
-use crate::numbers::{EXTREME, Everything, Report, fine, places, triples};
+use crate::numbers::{EXTREME, Report, fine, places, triples};
+use crate::one::EVERYTHING;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::statements::AnyFunction;
 use contact_geom::{
@@ -116,7 +117,7 @@ fn groups(report: &mut Report) {
         report.formula(&x.x, fine(group.generator(&x.x)));
         report.formula(&(x.x, x.y), fine(group.velocity_generator(&at)));
         report.formula(&(x.x, x.y), fine(group.momentum(&x.x, &x.y)));
-        report.formula(&x, fine(group.symmetry_defect(&Everything, 0.4, &at)));
+        report.formula(&x, fine(group.symmetry_defect(&EVERYTHING, 0.4, &at)));
     }
 }
 
@@ -141,7 +142,7 @@ fn forms(report: &mut Report) {
         });
     }
     for (t, x) in places() {
-        let form = LagrangianForm { lagrangian: &Everything, t };
+        let form = LagrangianForm { lagrangian: &EVERYTHING, t };
         let input = (t, x);
         report.formula(&input, form.eta(&x));
         report.formula(&input, form.d_eta(&x));
@@ -201,8 +202,8 @@ fn fields(report: &mut Report) {
         report.formula(&x, dissipation_defect(&Darboux, &f, &g, 0.4, &x));
     }
     for (t, x) in places() {
-        let field = HerglotzField { lagrangian: &Everything, t };
-        let form = LagrangianForm { lagrangian: &Everything, t };
+        let field = HerglotzField { lagrangian: &EVERYTHING, t };
+        let form = LagrangianForm { lagrangian: &EVERYTHING, t };
         report.formula(&(t, x), lie_bracket(&field, &field, &x).and_then(|b| field.at(&x).map(|f| (b, f))));
         report.formula(&(t, x), lie_derivative(&form, &field, &x));
         let found = infinitesimal_conformality(&form, &field, &x);
@@ -221,8 +222,8 @@ fn fields(report: &mut Report) {
 fn pullbacks(report: &mut Report) {
     let numbers = |c: Conformality<1>| (c.sigma, c.defect);
     for (t, x) in places() {
-        let map = contact_geom::Legendre { lagrangian: &Everything, t };
-        let source = LagrangianForm { lagrangian: &Everything, t };
+        let map = contact_geom::Legendre { lagrangian: &EVERYTHING, t };
+        let source = LagrangianForm { lagrangian: &EVERYTHING, t };
         report.formula(&(t, x), conformality(&source, &Darboux, &map, &x).map(numbers));
     }
     for (rows, columns) in [(0, 0), (3, 2), (2, 3), (4, 4)] {
@@ -242,10 +243,10 @@ fn pullbacks(report: &mut Report) {
 
 fn smooth(report: &mut Report) {
     for (t, x) in places() {
-        let field = HerglotzField { lagrangian: &Everything, t };
+        let field = HerglotzField { lagrangian: &EVERYTHING, t };
         report.formula(&(t, x), field.at(&x));
         report.formula(&(t, x), field.with_jacobian(&x));
-        report.formula(&(t, x), fine(Energy(&Everything).value(t, &x)));
-        report.formula(&(t, x), fine(Energy(&Everything).differential(t, &x)));
+        report.formula(&(t, x), fine(Energy(&EVERYTHING).value(t, &x)));
+        report.formula(&(t, x), fine(Energy(&EVERYTHING).differential(t, &x)));
     }
 }

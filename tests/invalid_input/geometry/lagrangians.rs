@@ -1,7 +1,8 @@
 //! Invalid input to Lagrangians: their derivatives, fields, declared structure and closed motions.
 
 use crate::InputTest;
-use crate::numbers::{EXTREME, Everything, Report, fine, places, triples};
+use crate::numbers::{EXTREME, Report, fine, places, triples};
+use crate::one::EVERYTHING;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::{ActionSquared, AnyForce};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
@@ -76,12 +77,12 @@ pub const TESTS: &[InputTest] = &[
 fn herglotz(report: &mut Report) {
     for (t, x) in places() {
         let at = VelocityPoint::from(x);
-        report.formula(&(t, x), fine(legendre(&Everything, t, &at)));
-        report.formula(&(t, x), fine(legendre_jacobian(&Everything, t, &at)));
-        report.formula(&(t, x), herglotz_field(&Everything, t, &at));
-        report.formula(&(t, x), herglotz_rates(&Everything, t, &at));
-        report.formula(&(t, x), herglotz_field(&WithoutClosedDerivatives(Everything), t, &at));
-        let (of_value, of_gradient) = gradient_rounding(&Everything, t, &at);
+        report.formula(&(t, x), fine(legendre(&EVERYTHING, t, &at)));
+        report.formula(&(t, x), fine(legendre_jacobian(&EVERYTHING, t, &at)));
+        report.formula(&(t, x), herglotz_field(&EVERYTHING, t, &at));
+        report.formula(&(t, x), herglotz_rates(&EVERYTHING, t, &at));
+        report.formula(&(t, x), herglotz_field(&WithoutClosedDerivatives(EVERYTHING), t, &at));
+        let (of_value, of_gradient) = gradient_rounding(&EVERYTHING, t, &at);
         // Sizes are not negative, and may be NaN.
         let entries = (0..3).map(|i| of_gradient.component(i)).chain([of_value]);
         report.check(entries.into_iter().all(|e| !(e < 0.0)), || format!("{t}, {x:?}: {of_value}, {of_gradient:?}"));
@@ -90,7 +91,7 @@ fn herglotz(report: &mut Report) {
 
 fn regularities(report: &mut Report) {
     for (t, x) in places() {
-        let w = regularity(&Everything, t, &x.into());
+        let w = regularity(&EVERYTHING, t, &x.into());
         report.formula(&(t, x), fine((w.smallest, w.condition())));
     }
     for value in EXTREME {
@@ -105,7 +106,7 @@ fn regularities(report: &mut Report) {
 fn lagrangians(report: &mut Report) {
     for (t, x) in places() {
         let at = VelocityPoint::from(x);
-        let l = Everything;
+        let l = EVERYTHING;
         report.formula(&(t, x), fine(l.value(t, &at.q, &at.v, at.z)));
         report.formula(&(t, x), fine(l.with_gradient(t, &at)));
         report.formula(&(t, x), fine(l.with_gradient_and_force(t, &at)));
@@ -140,17 +141,17 @@ fn forces(report: &mut Report) {
     for (t, x) in places() {
         let at = VelocityPoint::from(x);
         for force in
-            [AnyForce(0.4).value(t, &at), Forced { lagrangian: Everything, force: AnyForce(0.4) }.applied_force(t, &at)]
+            [AnyForce(0.4).value(t, &at), Forced { lagrangian: EVERYTHING, force: AnyForce(0.4) }.applied_force(t, &at)]
         {
             report.formula(&(t, x), fine(force));
         }
-        report.formula(&(t, x), herglotz_field(&Forced { lagrangian: Everything, force: AnyForce(0.4) }, t, &at));
+        report.formula(&(t, x), herglotz_field(&Forced { lagrangian: EVERYTHING, force: AnyForce(0.4) }, t, &at));
     }
     for c in EXTREME {
         let drag = VelocityDrag { linear: SVector::<f64, 1>::new(c), quadratic: c };
         let moved = drag.value(0.0, &VelocityPoint::new([0.1], [0.5], 0.0));
         report.check(c.is_finite() || !moved[0].is_finite(), || format!("a drag of {c} is {moved}"));
-        let forced = Forced { lagrangian: Everything, force: drag };
+        let forced = Forced { lagrangian: EVERYTHING, force: drag };
         report.check(forced.has_force() && forced.force_structure() == drag.structure() || c.is_nan(), || {
             format!("the drag {c} is lost")
         });
@@ -174,7 +175,7 @@ fn structures(report: &mut Report) {
     };
     for (t, x) in places() {
         // Where L is not defined there are no defects; elsewhere every property has one.
-        let Some(defects) = all.defects(&Everything, t, &x.into()) else { continue };
+        let Some(defects) = all.defects(&EVERYTHING, t, &x.into()) else { continue };
         report.check(t.is_finite() && x.is_finite(), || format!("claims are judged at t = {t}, {x:?}"));
         let defects: Vec<_> = defects.collect();
         report.check(defects.len() == 7, || format!("{} defects", defects.len()));

@@ -1,7 +1,8 @@
 //! Invalid input to what interrupts a motion: impacts, named times, tables.
 
 use crate::InputTest;
-use crate::numbers::{EXTREME, Everything, Report};
+use crate::numbers::{EXTREME, Report};
+use crate::one::EVERYTHING;
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts, Surface};
 use contact_geom::table::{Interpolation, Table, TableError};
@@ -55,10 +56,10 @@ fn impacts(report: &mut Report) {
             report.check(law.factor().is_none_or(|c| c == 1.0 || c == u || u.is_nan()), || format!("{law:?}"));
             for v in EXTREME {
                 let x = VelocityPoint::new([0.3], [v], 0.1);
-                let after = law.after(&Everything, 0.2, &x, (&normal, rate));
+                let after = law.after(&EVERYTHING, 0.2, &x, (&normal, rate));
                 let leaves = after.is_none_or(|y| y.v[0].is_finite() && (normal.dot(&y.v) + rate) * (v - u) <= 0.0);
                 report.check(leaves, || format!("{law:?} of v = {v} at a wall of velocity {u}: {after:?}"));
-                let wall = Impacts::new(Everything, Plane(u), law);
+                let wall = Impacts::new(EVERYTHING, Plane(u), law);
                 let stays = matches!(wall.at_switch(0, 0.2, &x, true), Control::Continue);
                 report.check(stays, || "an impact of a motion that rises".into());
                 let refused = match wall.at_switch(0, 0.2, &x, false) {
@@ -74,7 +75,7 @@ fn impacts(report: &mut Report) {
 
 fn breaks(report: &mut Report) {
     for t in EXTREME {
-        let found = Breaks::new(Everything, vec![2.0, t, 1.0, t]);
+        let found = Breaks::new(EVERYTHING, vec![2.0, t, 1.0, t]);
         match found {
             Ok(found) => {
                 let times = Lagrangian::<1>::breaks(&found);

@@ -3,6 +3,7 @@
 use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
+use crate::one::{One, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
@@ -22,7 +23,8 @@ use discrete_herglotz::{
 use std::collections::BTreeSet;
 
 /// Switching functions that are not declared.
-struct Unstated;
+#[derive(Clone, Copy, Debug)]
+pub struct Unstated;
 
 impl Lagrangian<1> for Unstated {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -34,7 +36,8 @@ impl Lagrangian<1> for Unstated {
 }
 
 /// Declares to be quadratic, and is not.
-struct FalselyQuadratic;
+#[derive(Clone, Copy, Debug)]
+pub struct FalselyQuadratic;
 
 impl Lagrangian<1> for FalselyQuadratic {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -94,16 +97,16 @@ struct Minimal;
 
 struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
 
-impl<'a> Integrator<'a, Pendulum, 1> for Minimal {
+impl<'a> Integrator<'a, One, 1> for Minimal {
     fn info(&self) -> MethodInfo {
         MethodInfo::of_discrete::<1>("forgetful", 2)
     }
-    fn check(&self, _: &Pendulum) -> Result<(), InputError> {
+    fn check(&self, _: &One) -> Result<(), InputError> {
         Ok(())
     }
     fn stepper(
         &self,
-        problem: &Problem<'a, Pendulum, 1>,
+        problem: &Problem<'a, One, 1>,
         h: f64,
         wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
@@ -131,7 +134,7 @@ impl Stepper<1> for Bare<'_> {
 
 #[test]
 fn input_errors() {
-    let (pendulum, start) = (Pendulum::default(), VelocityPoint::new([0.3], [0.5], 0.1));
+    let (pendulum, start) = (one(Pendulum::default()), VelocityPoint::new([0.3], [0.5], 0.1));
     let problem = Problem::new(&pendulum, 0.5, start).unwrap();
     let in_steps = |steps| problem.steps(steps).plan(Until::Time(5.5)).err().unwrap();
     let kepler = Kepler::<2>::default();
@@ -169,7 +172,7 @@ fn input_errors() {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
         }, ["t = 7.25", "row 1", "outside of the span of the run", "in the direction of the run"];
-        InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
+        InputError::Undefined => Problem::new(&One::from(Odd::Kicked), 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
         InputError::NoMomentum => {
             let start = VelocityPoint::new([0.0], [1.0], 0.0);
             Problem::new(&OfHamiltonian(Shift), 0.0, start).err().unwrap()
@@ -194,11 +197,12 @@ fn input_errors() {
             Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err().unwrap()
         }, ["q0 = q1", "two different points"];
         InputError::Unclaimed { .. } => {
-            Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
+            Strang::new(one(CoupledInZ::default()), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
         }, ["separable", "claim it", "another method"];
-        InputError::FalseClaim { .. } => Problem::new(&FalselyQuadratic, 0.0, start).err().unwrap(), ["quadratic", "does not hold", "size"];
+        InputError::FalseClaim { .. } => Problem::new(&One::from(FalselyQuadratic), 0.0, start).err().unwrap(), ["quadratic", "does not hold", "size"];
         InputError::SwitchingUnstated => {
-            let problem = Problem::new(&Unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+            let unstated = One::from(Unstated);
+            let problem = Problem::new(&unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
             problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
         }, ["switching_functions", "Hints { switching_functions: true"];
         InputError::Hypothesis { .. } => {
@@ -216,7 +220,7 @@ fn input_errors() {
             PieceStepper::new(pieces, &SplittingScheme::STRANG, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
         }, ["piece 1", "differ by", "correct the flow"];
         InputError::NoTimeTransformation => {
-            AnyIntegrator::TransformedGauss { stages: 4 }.check(&Pendulum { gamma: -0.1 }).err().unwrap()
+            AnyIntegrator::TransformedGauss { stages: 4 }.check(&one(Pendulum { gamma: -0.1 })).err().unwrap()
         }, ["declares a time transformation", "another integrator"];
         InputError::Forced { .. } => {
             let drag = VelocityDrag { linear: SVector::from([0.1]), quadratic: 0.0 };
@@ -229,8 +233,9 @@ fn input_errors() {
     });
 }
 
-/// Systems for which an accuracy is not reached; one type, since each type is compiled with every integrator.
-enum Odd {
+/// Systems for which an accuracy is not reached.
+#[derive(Clone, Copy, Debug)]
+pub enum Odd {
     /// A force that jumps at q = 0.
     Jumping,
     /// A drive faster than all steps that are tried.
@@ -275,8 +280,9 @@ impl Lagrangian<1> for Odd {
 #[test]
 fn selection_failures() {
     let start = VelocityPoint::new([1.0], [0.0], 1.0);
-    let failure = |system: &Odd, by: &str, span: f64, wanted: f64| {
-        let problem = Problem::new(system, 0.0, start).unwrap();
+    let failure = |system: Odd, by: &str, span: f64, wanted: f64| {
+        let system = One::from(system);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
         let run = problem.by(by.parse::<AnyIntegrator>().unwrap()).accuracy(wanted);
         match run.plan(Until::Time(span)).err() {
             Some(InputError::Accuracy { cause, .. }) => cause,
@@ -284,13 +290,13 @@ fn selection_failures() {
         }
     };
     every!(SelectionFailure, "discrete-herglotz/src/error.rs" {
-        SelectionFailure::RoundOff => failure(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
-        SelectionFailure::Chaos { .. } => failure(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
-        SelectionFailure::Order { .. } => failure(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];
-        SelectionFailure::DefectBetweenNodes { .. } => failure(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        SelectionFailure::FeatureAtNodes { .. } => failure(&Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one more step", "with the ends of the steps", "end the span before it"];
-        SelectionFailure::StepFailed { .. } => failure(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
-        SelectionFailure::Unresolved { .. } => failure(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
-        SelectionFailure::Budget => failure(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
+        SelectionFailure::RoundOff => failure(Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
+        SelectionFailure::Chaos { .. } => failure(Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
+        SelectionFailure::Order { .. } => failure(Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];
+        SelectionFailure::DefectBetweenNodes { .. } => failure(Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
+        SelectionFailure::FeatureAtNodes { .. } => failure(Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one more step", "with the ends of the steps", "end the span before it"];
+        SelectionFailure::StepFailed { .. } => failure(Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
+        SelectionFailure::Unresolved { .. } => failure(Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
+        SelectionFailure::Budget => failure(Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
     });
 }

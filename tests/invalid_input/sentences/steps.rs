@@ -1,9 +1,11 @@
 //! Errors of steps, and the status of a run.
 
+use super::input::Odd;
 use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
-use crate::common::lagrangians::{Explosive, Massless};
+use crate::common::lagrangians::Massless;
+use crate::one::{One, Switched, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler, Pendulum, UniformField};
@@ -21,7 +23,7 @@ use std::ops::ControlFlow;
 
 /// A Lagrangian that jumps where its velocity passes 1/2, one with a reset there, and one whose switching function changes its sign at every
 /// evaluation.
-enum Switching {
+pub enum Switching {
     Fast,
     /// A reset beyond its surface.
     Reset,
@@ -54,7 +56,8 @@ impl Lagrangian<1> for Switching {
 /// A ball that falls from the height 1/2 on a floor.
 struct Impacting(Impact);
 
-struct Floor;
+/// The floor `q = 0`.
+pub struct Floor;
 
 impl Surface<1> for Floor {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
@@ -64,7 +67,7 @@ impl Surface<1> for Floor {
 
 impl Impacting {
     fn fails(self) -> StepError {
-        let ball = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, self.0);
+        let ball = Switched::from(Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, self.0));
         let problem = Problem::new(&ball, 0.0, VelocityPoint::new([0.5], [0.0], 0.0)).unwrap();
         match problem.steps(Steps::Size(0.3)).run(Until::Time(3.0)).unwrap().status {
             Status::Failed { cause, .. } => cause,
@@ -75,7 +78,8 @@ impl Impacting {
 
 impl Switching {
     fn fails(self) -> StepError {
-        let problem = Problem::new(&self, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
+        let system = Switched::from(self);
+        let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
         match problem.steps(Steps::Size(0.3)).run(Until::Steps(3)).unwrap().status {
             Status::Failed { cause, .. } => cause,
             other => panic!("{other:?}"),
@@ -84,7 +88,8 @@ impl Switching {
 }
 
 /// A spring whose stiffness depends on the sign of q - 0.3, by a comparison of numbers.
-struct Branching;
+#[derive(Clone, Copy, Debug)]
+pub struct Branching;
 
 impl Lagrangian<1> for Branching {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
@@ -94,7 +99,8 @@ impl Lagrangian<1> for Branching {
 }
 
 /// Declares to be quadratic, which holds to the last digit where the motion starts.
-struct QuadraticAtFirst;
+#[derive(Clone, Copy, Debug)]
+pub struct QuadraticAtFirst;
 
 impl Lagrangian<1> for QuadraticAtFirst {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -111,7 +117,7 @@ fn step_errors() {
     let guess = SVector::from([0.5]);
     every!(StepError, "discrete-herglotz/src/error.rs" {
         StepError::NotConverged { .. } => {
-            let gauss = Gauss::new(Pendulum { gamma: 0.0 }, 2, 50.0).unwrap();
+            let gauss = Gauss::new(one(Pendulum { gamma: 0.0 }), 2, 50.0).unwrap();
             let mut stepper = gauss.stepper(0.0, pendulum_at(0.5), guess).unwrap().without_newton();
             stepper.advance(1).unwrap_err().cause
         }, ["residual of", "iterations", "smaller step"];
@@ -123,28 +129,28 @@ fn step_errors() {
             forward(&|solver| strong().forward(0.0, &pendulum_at(0.5), &guess, solver).err())
         }, ["sigma_d = -1", "smaller step"];
         StepError::OutsideDomain { .. } => {
-            let ld = ExactLagrangian::<_, 1>::new(Explosive, 2.0).unwrap();
+            let ld = ExactLagrangian::<_, 1>::new(One::from(Odd::Explosive), 2.0).unwrap();
             let from = PhasePoint::new([0.0], [0.0], 1.0);
             forward(&|solver| ld.forward(0.0, &from, &guess, solver).err())
         }, ["only until t = ", "smaller step"];
         StepError::ConjugatePoint { .. } => {
-            let ld = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: 0.0 }, std::f64::consts::PI).unwrap();
+            let ld = ExactLagrangian::<_, 1>::new(one(HarmonicOscillator { gamma: 0.0 }), std::f64::consts::PI).unwrap();
             ld.jet(0.0, &DiscretePoint::new([0.3], [0.5], 0.0)).unwrap_err()
         }, ["conjugate", "singular value", "another size"];
         StepError::StageFactor { .. } => {
-            let gauss = Gauss::new(FreeParticle { gamma: -40.0 }, 3, 1.0).unwrap();
+            let gauss = Gauss::new(one(FreeParticle { gamma: -40.0 }), 3, 1.0).unwrap();
             match gauss.stepper(0.0, pendulum_at(0.5), guess).err() {
                 Some(InputError::FirstStep(cause)) => cause,
                 other => panic!("{other:?}"),
             }
         }, ["stage", "smaller step"];
         StepError::Branched => {
-            let gauss = Gauss::new(Branching, 4, 0.5).unwrap();
+            let gauss = Gauss::new(One::from(Branching), 4, 0.5).unwrap();
             let start = PhasePoint::new([0.0], [1.0], 0.0);
             gauss.stepper(0.0, start, [1.0].into()).unwrap().without_newton().advance(3).unwrap_err().cause
         }, ["differs between SIMD lanes", "if_less"];
         StepError::Event { .. } => {
-            let pendulum = Pendulum::default();
+            let pendulum = one(Pendulum::default());
             let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
             let mut undefined = Events::new([Event::new(|t, _| (0.15 - t).sqrt())]);
             let outcome = problem.steps(Steps::Size(0.1)).observe(&mut undefined).run(Until::Steps(3));
@@ -154,7 +160,7 @@ fn step_errors() {
             }
         }, ["the function of an event", "not finite at t = 0.15", "defined along the motion"];
         StepError::EventUnresolved { .. } => {
-            let free = FreeParticle { gamma: 0.0 };
+            let free = one(FreeParticle { gamma: 0.0 });
             let problem = Problem::new(&free, 0.0, pendulum_at(0.5)).unwrap();
             let mut fast = Events::new([Event::new(|t, _| (1e6 * t).sin() + 0.5)]);
             match problem.steps(Steps::Size(10.0)).observe(&mut fast).run(Until::Steps(1)).unwrap().status {
@@ -164,7 +170,7 @@ fn step_errors() {
         }, ["the function of an event varies so fast after t = ", "shorter steps", "smoother function"];
         StepError::Undivided { .. } => {
             let divided = DividedGauss { stages: 2, max_defect: f64::MIN_POSITIVE };
-            let pendulum = Pendulum { gamma: -0.1 };
+            let pendulum = one(Pendulum { gamma: -0.1 });
             let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
             match problem.by(divided).steps(Steps::Count(1)).run(Until::Time(1.0)).unwrap().status {
                 Status::Failed { cause, .. } => cause,
@@ -194,7 +200,7 @@ fn step_errors() {
 
 #[test]
 fn statuses() {
-    let (pendulum, explosive) = (Pendulum::default(), Explosive);
+    let (pendulum, explosive) = (one(Pendulum::default()), One::from(Odd::Explosive));
     let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
     let run = || problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let blows_up = Problem::new(&explosive, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
@@ -210,7 +216,8 @@ fn statuses() {
         Status::FalseClaim { .. } => {
             // A cubic force that vanishes for q < 2, which the motion reaches after the steps that are tried before a
             // run.
-            let problem = Problem::new(&QuadraticAtFirst, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
+            let system = One::from(QuadraticAtFirst);
+            let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
             problem.steps(Steps::Count(1000)).run(Until::Time(10.0)).unwrap().status
         }, ["unreliable: after step ", "`quadratic`", "correct its `structure`"];
         Status::Failed { .. } => {
