@@ -15,6 +15,8 @@ mod end_conditions;
 mod equations;
 #[path = "boundary_paths/forces.rs"]
 mod forces;
+#[path = "boundary_paths/lagrangians.rs"]
+mod lagrangians;
 #[path = "boundary_paths/several_paths.rs"]
 mod several_paths;
 

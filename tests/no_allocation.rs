@@ -16,7 +16,10 @@ mod gauss_steppers;
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
-use contact_geom::{ContactHamiltonian, Lagrangian, OfHamiltonian, PhasePoint, Scalar, VelocityPoint, legendre};
+use contact_geom::{
+    ContactHamiltonian, Lagrangian, OfHamiltonian, Parametric, PhasePoint, Scalar, VelocityPoint, lagrangian_enum,
+    legendre,
+};
 use counting_allocator::{allocations, peak};
 use discrete_herglotz::{
     DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, StepperOptions, Steps, Until,
@@ -28,6 +31,55 @@ use discrete_herglotz::{
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
 use gauss_steppers::GaussSteppers;
 
+lagrangian_enum! {
+    /// Lagrangians with one coordinate.
+    #[derive(Clone, Copy)]
+    enum One<1> {
+        HarmonicOscillator(HarmonicOscillator),
+        Pendulum(Pendulum),
+        QuadraticInZ(QuadraticInZ),
+        Unclaimed(Unclaimed),
+    }
+}
+lagrangian_enum!(parametric One<1> { HarmonicOscillator, Pendulum, QuadraticInZ, Unclaimed });
+
+lagrangian_enum! {
+    /// Lagrangians with two coordinates.
+    #[derive(Clone, Copy)]
+    enum Two<2> {
+        DoublePendulum(DoublePendulum),
+        Kepler(Kepler<2>),
+    }
+}
+
+/// A pendulum that declares no structure.
+#[derive(Clone, Copy)]
+struct Unclaimed;
+
+impl Lagrangian<1> for Unclaimed {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].cos() - z * 0.001
+    }
+}
+
+impl Parametric<1> for Unclaimed {}
+
+/// A system of the catalogue as a Lagrangian of these types, with its name and its initial data.
+struct Case<L, const N: usize> {
+    name: &'static str,
+    lagrangian: L,
+    initial: VelocityPoint<N>,
+}
+
+impl<L, const N: usize> Case<L, N> {
+    fn of<S: System<N>>(system: S) -> Self
+    where
+        L: From<S>,
+    {
+        Case { name: system.name(), initial: system.initial(), lagrangian: system.into() }
+    }
+}
+
 /// The counter counts.
 #[test]
 fn an_allocation_is_seen() {
@@ -37,11 +89,11 @@ fn an_allocation_is_seen() {
 /// A thousand steps without an allocation.
 #[test]
 fn steps() {
-    fn run<const N: usize, S: System<N>>(system: &S) {
-        let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
-        for method in Method::applicable(&system.structure()) {
-            let name = format!("{} with {method}", system.name());
-            let ld = method.discretise(system, 0.01, 0.0, &start);
+    fn run<const N: usize, L: Lagrangian<N> + Copy>(case: Case<L, N>) {
+        let start: PhasePoint<N> = legendre(&case.lagrangian, 0.0, &case.initial);
+        for method in Method::applicable(&case.lagrangian.structure()) {
+            let name = format!("{} with {method}", case.name);
+            let ld = method.discretise(case.lagrangian, 0.01, 0.0, &start);
             let ld = ld.unwrap();
             let flow = Flow::new(&ld, 0.0, start);
             let mut flow = flow.unwrap();
@@ -50,22 +102,15 @@ fn steps() {
             assert_eq!((outcome, count), (Ok(()), 0), "{name}");
         }
     }
-    run(&Pendulum::default());
-    run(&DoublePendulum::default());
-    run(&Kepler::<3>::default());
+    run(Case::<One, 1>::of(Pendulum::default()));
+    run(Case::<Two, 2>::of(DoublePendulum::default()));
+    run(Case::<Kepler<3>, 3>::of(Kepler::default()));
 }
 
 /// Steps so long that Newton's method is used: its workspace is allocated in the first one.
 #[test]
 fn collocation_by_newton() {
-    /// A pendulum that declares no structure.
-    struct Unclaimed;
-    impl Lagrangian<1> for Unclaimed {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 + q[0].cos() - z * 0.001
-        }
-    }
-    fn run(system: &impl Lagrangian<1>, expected: GaussRoute) {
+    fn run(system: One, expected: GaussRoute) {
         let gauss = Gauss::new(system, 4, 5.0);
         let stepper = gauss.as_ref().map(|gauss| gauss.stepper(0.0, PhasePoint::new([2.0], [1.0], 0.0), [1.0].into()));
         let Ok(Ok(mut stepper)) = stepper else { unreachable!("no stepper") };
@@ -75,28 +120,28 @@ fn collocation_by_newton() {
         assert_eq!((outcome, count), (Ok(()), 0), "{expected:?}");
         assert!(stepper.newton_steps() > 1, "{expected:?}");
     }
-    run(&Pendulum { gamma: -0.001 }, GaussRoute::Condensed);
-    run(&Unclaimed, GaussRoute::General);
+    run(Pendulum { gamma: -0.001 }.into(), GaussRoute::Condensed);
+    run(Unclaimed.into(), GaussRoute::General);
 }
 
 /// A thousand steps of contact Gauss collocation by each of its routes, with extrapolated starts and updated slopes.
 #[test]
 fn collocation() {
-    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: GaussRoute) {
-        let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
-        let gauss = Gauss::new(system, 8, h);
-        let stepper = gauss.as_ref().map(|gauss| gauss.stepper(0.0, start, system.initial().v));
+    fn run<const N: usize, L: Lagrangian<N>>(case: Case<L, N>, h: f64, expected: GaussRoute) {
+        let start: PhasePoint<N> = legendre(&case.lagrangian, 0.0, &case.initial);
+        let gauss = Gauss::new(case.lagrangian, 8, h);
+        let stepper = gauss.as_ref().map(|gauss| gauss.stepper(0.0, start, case.initial.v));
         let mut stepper = stepper.unwrap().unwrap();
         let mut outcome = Ok(());
         let count = allocations(|| outcome = stepper.advance(1000));
         let found = (outcome, count, stepper.route(), stepper.newton_steps());
-        assert_eq!(found, (Ok(()), 0, expected, 0), "{}", system.name());
+        assert_eq!(found, (Ok(()), 0, expected, 0), "{}", case.name);
     }
-    run(&HarmonicOscillator::default(), 0.1, GaussRoute::Linear);
-    run(&Pendulum::default(), 0.1, GaussRoute::Condensed);
-    run(&Kepler::<3>::default(), 0.05, GaussRoute::Condensed);
-    run(&QuadraticInZ::default(), 0.1, GaussRoute::ConstantMass);
-    run(&DoublePendulum::default(), 0.02, GaussRoute::General);
+    run(Case::<One, 1>::of(HarmonicOscillator::default()), 0.1, GaussRoute::Linear);
+    run(Case::<One, 1>::of(Pendulum::default()), 0.1, GaussRoute::Condensed);
+    run(Case::<Kepler<3>, 3>::of(Kepler::default()), 0.05, GaussRoute::Condensed);
+    run(Case::<One, 1>::of(QuadraticInZ::default()), 0.1, GaussRoute::ConstantMass);
+    run(Case::<Two, 2>::of(DoublePendulum::default()), 0.02, GaussRoute::General);
 }
 
 /// Steps for a contact Hamiltonian: by fixed-point iteration, and so long that Newton's method is used.
@@ -124,8 +169,8 @@ fn collocation_for_a_hamiltonian() {
 /// The exact discrete Lagrangian, its jets and steps, by each route to the motion between two points.
 #[test]
 fn exact() {
-    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: RetractionRoute) {
-        let x = system.initial();
+    fn run<const N: usize, L: Lagrangian<N> + Copy>(case: Case<L, N>, h: f64, expected: RetractionRoute) {
+        let (system, x) = (case.lagrangian, case.initial);
         let ld = ExactLagrangian::<_, N>::new(system, h);
         let point = ContactExponential::new(system, h).ok().and_then(|e| e.at(0.0, &x).ok());
         let (ld, point) = (ld.unwrap(), point.unwrap());
@@ -135,7 +180,7 @@ fn exact() {
         // The first round computes the tables of coefficients.
         for _ in 0..2 {
             count = allocations(|| {
-                let state = legendre(system, 0.0, &x);
+                let state = legendre(&system, 0.0, &x);
                 all = (
                     ld.retract(0.0, &point).ok(),
                     ld.jet(0.0, &point).ok(),
@@ -145,19 +190,19 @@ fn exact() {
             });
         }
         assert!(all.1.is_some() && all.2.is_some() && all.3.is_some());
-        assert_eq!((all.0.map(|r| r.route), count), (Some(expected), 0), "{}", system.name());
+        assert_eq!((all.0.map(|r| r.route), count), (Some(expected), 0), "{}", case.name);
     }
-    run(&Pendulum::default(), 0.5, RetractionRoute::Collocation);
-    run(&DoublePendulum::default(), 0.1, RetractionRoute::Collocation);
-    run(&Kepler::<3>::default(), 0.1, RetractionRoute::Collocation);
-    run(&Kepler::<2>::default(), 1.0, RetractionRoute::Collocation);
-    run(&HarmonicOscillator::default(), 3.0, RetractionRoute::Newton);
+    run(Case::<One, 1>::of(Pendulum::default()), 0.5, RetractionRoute::Collocation);
+    run(Case::<Two, 2>::of(DoublePendulum::default()), 0.1, RetractionRoute::Collocation);
+    run(Case::<Kepler<3>, 3>::of(Kepler::default()), 0.1, RetractionRoute::Collocation);
+    run(Case::<Two, 2>::of(Kepler::<2>::default()), 1.0, RetractionRoute::Collocation);
+    run(Case::<One, 1>::of(HarmonicOscillator::default()), 3.0, RetractionRoute::Newton);
 }
 
 /// A search with several corrections allocates as much as one that starts at its solution: its workspace.
 #[test]
 fn corrections_of_paths() {
-    let ld = LeftMidpoint::new(Pendulum { gamma: -0.1 }, 0.02).unwrap();
+    let ld = LeftMidpoint::new(One::from(Pendulum { gamma: -0.1 }), 0.02).unwrap();
     let problem = BoundaryPath::new(&ld, 100, [0.0, 1.0].map(|q| End::Position([q].into()))).unwrap();
     let (mut far, mut near) = (None, None);
     let many = allocations(|| far = Some(problem.search()));
@@ -177,9 +222,9 @@ fn corrections_of_paths() {
 /// In lanes an ensemble allocates as much for many steps as for few, by splittings and by collocation.
 #[test]
 fn steps_of_ensembles() {
-    let pendulum = Pendulum { gamma: -0.01 };
+    let pendulum = One::from(Pendulum { gamma: -0.01 });
     let start = |i: usize| VelocityPoint::new([0.01 * i as f64], [0.5], 0.0);
-    let of = |ensemble: Ensemble<'_, Pendulum, 1>, steps: usize| {
+    let of = |ensemble: Ensemble<'_, One, 1>, steps: usize| {
         let ensemble = ensemble.steps(Steps::Count(steps)).threads(1);
         let mut completed = 0;
         let count =
@@ -208,8 +253,8 @@ fn gradients_have_bounded_memory() {
             end.q[0] * end.v[0]
         }
     }
-    let pendulum = Pendulum::default();
-    let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
+    let pendulum = One::from(Pendulum::default());
+    let problem = Problem::new(&pendulum, 0.0, Pendulum::default().initial()).unwrap();
     let gradient = |steps: usize| {
         let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(1e-3));
         let found = run.gradient(&End, Until::Time(1e-3 * steps as f64)).unwrap();

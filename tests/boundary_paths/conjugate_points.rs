@@ -1,5 +1,6 @@
 //! Conjugate points along a path and at its ends, and paths that are flagged as unresolved.
 
+use super::lagrangians::{Two, one};
 use super::{EPS, at, size};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
@@ -14,7 +15,7 @@ use std::f64::consts::PI;
 #[test]
 fn the_index_counts_conjugate_points() {
     for (h, steps) in [(0.02, 50), (0.02, 150), (0.02, 170), (0.1, 40), (0.1, 70), (0.1, 200), (0.25, 4000)] {
-        let ld = Midpoint::new(HarmonicOscillator { gamma: 0.0 }, h).unwrap();
+        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let problem = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap();
         let found = problem.search();
         assert!(found.is_found());
@@ -31,7 +32,7 @@ fn conjugate_points_inside_do_no_harm() {
     for (m, steps) in [(2usize, 3usize), (2, 5), (2, 101), (3, 5), (3, 7), (3, 100), (10, 17), (100, 250)] {
         let h = 2.0 * (PI / m as f64 / 2.0).tan();
         let h = if m == 2 { 2.0 } else { h };
-        let ld = Midpoint::new(HarmonicOscillator { gamma: 0.0 }, h).unwrap();
+        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let problem = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap();
         let found = problem.search();
         assert!(found.is_found() && found.iterations <= 3, "{m}, {steps}: {} after {}", found.status, found.iterations);
@@ -39,7 +40,7 @@ fn conjugate_points_inside_do_no_harm() {
         assert_eq!(problem.index(&found).unwrap(), Some((steps - 1) / m), "m = {m}, {steps} steps");
     }
     // Two uncoupled oscillators in a plane, with conjugate points at different times.
-    let ld = Midpoint::new(Plane { stiffness: [1.0, 3.0] }, 2.0).unwrap();
+    let ld = Midpoint::new(Two::from(Uncoupled { stiffness: [1.0, 3.0] }), 2.0).unwrap();
     let problem = BoundaryPath::new(&ld, 7, [at([0.3, 0.1]), at([1.0, -0.4])]).unwrap();
     let found = problem.search();
     assert!(found.is_found(), "{}", found.status);
@@ -48,11 +49,12 @@ fn conjugate_points_inside_do_no_harm() {
 }
 
 /// Two uncoupled oscillators.
-struct Plane {
+#[derive(Clone, Copy)]
+pub struct Uncoupled {
     stiffness: [f64; 2],
 }
 
-impl Lagrangian<2> for Plane {
+impl Lagrangian<2> for Uncoupled {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
         let part = |i: usize| v[i] * v[i] - q[i] * q[i] * self.stiffness[i];
         (part(0) + part(1)) * 0.5
@@ -64,13 +66,13 @@ impl Lagrangian<2> for Plane {
 fn conjugate_ends_are_a_status() {
     for (m, steps) in [(2usize, 4usize), (3, 6), (10, 30)] {
         let h = if m == 2 { 2.0 } else { 2.0 * (PI / m as f64 / 2.0).tan() };
-        let ld = Midpoint::new(HarmonicOscillator { gamma: 0.0 }, h).unwrap();
+        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let found = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap().search();
         assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
         assert!(found.points.len() == steps + 1 && found.residual > 0.01 && found.residual.is_finite());
     }
     // The position of a free particle with two free ends is not determined.
-    let ld = Midpoint::new(FreeParticle::default(), 0.1).unwrap();
+    let ld = Midpoint::new(one(FreeParticle::default()), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [End::Free, End::Free]).unwrap().search();
     assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
 }
@@ -86,9 +88,9 @@ fn conjugate_ends_are_flagged() {
             for steps in [20, 50, 100, 1000, 5000] {
                 let path = |span: f64| {
                     let start = PhasePoint::new([0.0], [1.0], 0.0);
-                    let oscillator = HarmonicOscillator { gamma };
+                    let oscillator = one(HarmonicOscillator { gamma });
                     let ld = method.discretise(oscillator, span / steps as f64, 0.0, &start).unwrap();
-                    let path = BoundaryPath::new(ld, steps, [at([0.0]), at([1.0])]).unwrap().search();
+                    let path = BoundaryPath::new(&ld, steps, [at([0.0]), at([1.0])]).unwrap().search();
                     assert!(path.is_found() && path.regularity > 0.0 && path.regularity <= 1.0, "{}", path.status);
                     path
                 };

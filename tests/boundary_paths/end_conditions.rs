@@ -1,5 +1,6 @@
 //! Momenta and free ends, periodic paths, and invalid problems.
 
+use super::lagrangians::{One, Two, one};
 use super::{EPS, at, by, check, largest_of};
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Impact, Impacts, Surface};
@@ -16,7 +17,7 @@ use std::f64::consts::PI;
 #[test]
 fn momenta_and_free_ends() {
     let (h, steps, z0) = (0.01, 60, 0.4);
-    let ld = Midpoint::new(QuadraticInZ { c: 0.7 }, h).unwrap();
+    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), h).unwrap();
     let given = |p: f64| End::Momentum([p].into());
     let cases = [
         [given(0.3), at([1.0])],
@@ -54,7 +55,7 @@ fn momenta_and_free_ends() {
 fn periodic_paths_of_forced_systems() {
     let system = Duffing { alpha: 1.0, beta: 0.05, force: 0.3, omega: 1.2, gamma: -0.25 };
     let steps = 128;
-    let ld = Midpoint::new(system, 2.0 * PI / 1.2 / steps as f64).unwrap();
+    let ld = Midpoint::new(one(system), 2.0 * PI / 1.2 / steps as f64).unwrap();
     let problem = BoundaryPath::periodic(&ld, steps, [0.0].into()).unwrap();
     let found = problem.search();
     assert_eq!(found.points[0], found.points[steps]);
@@ -69,11 +70,11 @@ fn periodic_paths_of_forced_systems() {
     assert!((x.q0 - found.points[0]).amax() <= 1e-10, "{} {}", x.q0, found.points[0]);
 
     // Two coordinates, one of them never at rest.
-    let ld = Midpoint::new(Driven, 0.05).unwrap();
+    let ld = Midpoint::new(Two::from(Driven), 0.05).unwrap();
     let found = BoundaryPath::periodic(&ld, 60, [0.0, 0.0].into()).unwrap().starting_at(0.0, 0.2).unwrap().search();
     closes(&ld, 0.2, &found, [0.0, 0.0]);
     // Forces that depend on the action, and different positions at the ends.
-    let ld = Midpoint::new(QuadraticInZ::default(), 0.1).unwrap();
+    let ld = Midpoint::new(one(QuadraticInZ::default()), 0.1).unwrap();
     let found = BoundaryPath::periodic(&ld, 30, [1.0].into()).unwrap().starting_at(0.0, 0.3).unwrap().search();
     closes(&ld, 0.3, &found, [1.0]);
 }
@@ -91,7 +92,8 @@ pub fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: 
 }
 
 /// A pendulum with a torque and an oscillator, forced with the period 3, with a drag that depends on the action.
-struct Driven;
+#[derive(Clone, Copy)]
+pub struct Driven;
 
 impl Lagrangian<2> for Driven {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
@@ -105,7 +107,7 @@ impl Lagrangian<2> for Driven {
 #[test]
 fn undefined_paths_are_a_status() {
     // A velocity above the speed of light.
-    let ld = Midpoint::new(Relativistic::default(), 0.1).unwrap();
+    let ld = Midpoint::new(one(Relativistic::default()), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [at([0.0]), at([5.0])]).unwrap().search();
     let StepError::NonFinite = (match found.status {
         PathStatus::Undefined { step: 0, cause } => cause,
@@ -115,7 +117,7 @@ fn undefined_paths_are_a_status() {
     };
     assert!(found.points.len() == 11 && found.residual == f64::INFINITY);
     // 1 + h gamma < 0 for the rule that is explicit in z.
-    let ld = by(Method::LeftMidpoint, FreeParticle { gamma: -3.0 }, 0.5);
+    let ld = by(Method::LeftMidpoint, one(FreeParticle { gamma: -3.0 }), 0.5);
     let found = BoundaryPath::new(&ld, 4, [at([0.0]), at([1.0])]).unwrap().search();
     assert!(matches!(found.status, PathStatus::SigmaVanished { step: 0, sigma } if sigma == -0.5), "{}", found.status);
 }
@@ -133,13 +135,13 @@ fn paths_pass_through_surfaces() {
     let ball = Impacts::new(field, Ground, Impact::Elastic);
     let ends = [at([0.1]), at([0.1])];
     let found = BoundaryPath::new(Midpoint::new(ball, 0.1).unwrap(), 20, ends).unwrap().search();
-    let free = BoundaryPath::new(Midpoint::new(field, 0.1).unwrap(), 20, ends).unwrap().search();
+    let free = BoundaryPath::new(&Midpoint::new(One::from(field), 0.1).unwrap(), 20, ends).unwrap().search();
     assert!(found.is_found() && found.points == free.points && found.points[10][0] < 0.0, "{}", found.points[10]);
 }
 
 #[test]
 fn bad_input_is_refused() {
-    let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
+    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
     let ends = [at([0.0]), at([1.0])];
     for steps in [0, 1] {
         let refused = BoundaryPath::new(&ld, steps, ends);

@@ -1,12 +1,11 @@
 //! Paths satisfy the discrete Herglotz equations, with the order of their method.
 
+use super::lagrangians::{one, two};
 use super::{EPS, at, by, check, largest_of};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::systems::{
-    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, QuadraticInZ, System,
-};
+use contact_geom::systems::{CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, QuadraticInZ};
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Method, Midpoint};
@@ -15,30 +14,30 @@ use proptest::prelude::*;
 /// Every method, on systems that are nonlinear in q, in z, forced, and with a mass that depends on the position.
 #[test]
 fn every_method_finds_critical_paths() {
-    fn run<const N: usize, S: System<N>>(system: &S, ends: [[f64; N]; 2], (t0, z0): (f64, f64)) {
+    fn run<const N: usize, L: Lagrangian<N> + Clone>(system: L, ends: [[f64; N]; 2], (t0, z0): (f64, f64)) {
         let (steps, span) = (60, 1.5);
         for method in Method::applicable(&system.structure()) {
-            let ld = by(method, system, span / steps as f64);
+            let ld = by(method, system.clone(), span / steps as f64);
             let problem = BoundaryPath::new(&ld, steps, [at(ends[0]), at(ends[1])]).unwrap();
             let problem = problem.starting_at(t0, z0).unwrap();
             check(&ld, (t0, z0), &problem.search(), 1.0);
         }
     }
-    run(&Pendulum::default(), [[0.0], [1.0]], (0.0, 0.0));
-    run(&QuadraticInZ { c: 0.7 }, [[0.3], [-1.0]], (0.0, 0.8));
-    run(&Duffing::forced(), [[0.0], [0.5]], (0.4, 0.0));
-    run(&DoublePendulum::default(), [[0.1, 0.0], [0.9, 0.4]], (0.0, 0.2));
-    run(&CoupledPlane::default(), [[0.1, 0.0], [0.3, 0.4]], (0.0, 0.2));
+    run(one(Pendulum::default()), [[0.0], [1.0]], (0.0, 0.0));
+    run(one(QuadraticInZ { c: 0.7 }), [[0.3], [-1.0]], (0.0, 0.8));
+    run(one(Duffing::forced()), [[0.0], [0.5]], (0.4, 0.0));
+    run(two(DoublePendulum::default()), [[0.1, 0.0], [0.9, 0.4]], (0.0, 0.2));
+    run(two(CoupledPlane::default()), [[0.1, 0.0], [0.3, 0.4]], (0.0, 0.2));
 }
 
 /// Contact Gauss collocation is a discrete Lagrangian like any other.
 #[test]
 fn gauss_collocation_finds_critical_paths() {
-    let ld = Gauss::new(QuadraticInZ { c: 0.7 }, 3, 0.25).unwrap();
+    let ld = Gauss::new(one(QuadraticInZ { c: 0.7 }), 3, 0.25).unwrap();
     let found = BoundaryPath::new(&ld, 8, [at([0.3]), at([-1.0])]).unwrap().starting_at(0.0, 0.8).unwrap().search();
     // Its jets depend on stages that are found by iteration, with an error of some more units.
     check(&ld, (0.0, 0.8), &found, 16.0);
-    let ld = Gauss::new(DoublePendulum::default(), 2, 0.1).unwrap();
+    let ld = Gauss::new(two(DoublePendulum::default()), 2, 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [at([0.0, 0.1]), at([0.5, 0.2])]).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 16.0);
 }
@@ -56,7 +55,7 @@ fn the_damped_oscillator_in_closed_form() {
     let decay = |k: usize| sigma.powf(0.5 * k as f64);
     let n = steps as f64 * theta;
     let other = (last / decay(steps) - first * n.cos()) / n.sin();
-    let ld = Midpoint::new(HarmonicOscillator { gamma }, h).unwrap();
+    let ld = Midpoint::new(one(HarmonicOscillator { gamma }), h).unwrap();
     let found = BoundaryPath::new(&ld, steps, [at([first]), at([last])]).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 1.0);
     let exact = |k: usize| decay(k) * (first * (k as f64 * theta).cos() + other * (k as f64 * theta).sin());
@@ -71,13 +70,13 @@ fn the_damped_oscillator_in_closed_form() {
 /// Half of the step gives a quarter of the error, against the motion by collocation of order 12.
 #[test]
 fn the_order_of_convergence() {
-    let system = DoublePendulum::default();
+    let system = two(DoublePendulum::default());
     let ends = [at([0.1, 0.0]), at([0.9, 0.4])];
-    let ld = Gauss::new(&system, 6, 0.1).unwrap();
+    let ld = Gauss::new(system, 6, 0.1).unwrap();
     let truth = BoundaryPath::new(&ld, 10, ends).unwrap().search();
     assert!(truth.is_found());
     let error = |every: usize| {
-        let ld = Midpoint::new(&system, 0.1 / every as f64).unwrap();
+        let ld = Midpoint::new(system, 0.1 / every as f64).unwrap();
         let found = BoundaryPath::new(&ld, 10 * every, ends).unwrap().search();
         assert!(found.is_found());
         max_abs_or_nan((0..=10).map(|k| (found.points[k * every] - truth.points[k]).amax()))
@@ -104,10 +103,10 @@ proptest! {
             check(&ld, (0.3, z0), &found, 1.0);
             assert!(problem.index(&found).unwrap() == Some(0));
         }
-        run(Pendulum::default(), &u, steps, z0);
-        run(QuadraticInZ::default(), &u, steps, z0);
-        run(Duffing::forced(), &u, steps, z0);
-        run(CoupledPlane::default(), &u, steps, z0);
-        run(DoublePendulum::default(), &u.iter().map(|u| 0.5 * u).collect::<Vec<_>>(), steps, z0);
+        run(one(Pendulum::default()), &u, steps, z0);
+        run(one(QuadraticInZ::default()), &u, steps, z0);
+        run(one(Duffing::forced()), &u, steps, z0);
+        run(two(CoupledPlane::default()), &u, steps, z0);
+        run(two(DoublePendulum::default()), &u.iter().map(|u| 0.5 * u).collect::<Vec<_>>(), steps, z0);
     }
 }

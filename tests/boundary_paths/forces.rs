@@ -1,18 +1,17 @@
 //! Paths with forces: they are the runs of the same rule, Newton's method converges quadratically, and closed forms.
 
 use super::end_conditions::closes;
+use super::lagrangians::{forced_one, forced_two, one, two};
 use super::{EPS, at, by, check, largest_of};
 use crate::common::forces::{Drag, Fall, G, Swirl};
 use crate::common::slope;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::systems::{
-    CoupledPlane, HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ, TwoCoordinates, UniformField,
-};
-use contact_geom::{Force, Forced, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
+use contact_geom::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ, UniformField};
+use contact_geom::{Force, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, branch};
-use discrete_herglotz::rules::{Flow, Method, Midpoint, Node, Quadrature, Rule, Trapezoidal};
-use discrete_herglotz::splitting::{ActionStrang, Strang};
+use discrete_herglotz::rules::{Flow, Method, Midpoint, Node, Quadrature, Rule};
+use discrete_herglotz::splitting::ActionStrang;
 use discrete_herglotz::theory::DiscretePath;
 use discrete_herglotz::{DiscreteLagrangian, Stepper};
 use std::f64::consts::PI;
@@ -33,7 +32,7 @@ impl Rule for Simpson {
 
 /// The drag `-c |v| v`, coordinate by coordinate.
 #[derive(Clone, Copy)]
-struct Quadratic(f64);
+pub struct Quadratic(f64);
 
 impl<const N: usize> Force<N> for Quadratic {
     fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -43,7 +42,7 @@ impl<const N: usize> Force<N> for Quadratic {
 
 /// A force on a plane whose derivatives in q, v and z are full matrices and vectors, with a period of 3 in t.
 #[derive(Clone, Copy)]
-struct Mixing;
+pub struct Mixing;
 
 impl Force<2> for Mixing {
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<2, T>) -> SVector<T, 2> {
@@ -117,30 +116,30 @@ fn assert_is_the_run<D: DiscreteLagrangian<N>, const N: usize>(name: &str, ld: &
 /// on a plane with a full mass matrix and a force that depends on everything.
 #[test]
 fn paths_are_the_runs_of_their_rules() {
-    fn of<const N: usize, L: Lagrangian<N>>(name: &str, system: &L, t0: f64, x: VelocityPoint<N>) {
+    fn of<const N: usize, L: Lagrangian<N> + Clone>(name: &str, system: L, t0: f64, x: VelocityPoint<N>) {
         // The span of 1.2 is shorter than a quarter of a period, before which the path with a given momentum is the only one.
-        let (h, start) = (0.03, legendre(system, t0, &x));
+        let (h, start) = (0.03, legendre(&system, t0, &x));
         for method in Method::RULES {
-            assert_is_the_run(&format!("{name} {method}"), &by(*method, system, h), t0, start);
+            assert_is_the_run(&format!("{name} {method}"), &by(*method, system.clone(), h), t0, start);
         }
         assert_is_the_run(&format!("{name} simpson"), &Quadrature::<_, Simpson>::new(system, h).unwrap(), t0, start);
     }
-    let pendulum = Forced::new(Pendulum { gamma: -0.1 }, Quadratic(0.3));
-    of("pendulum", &pendulum, 0.0, VelocityPoint::new([0.3], [0.9], 0.0));
-    let nonlinear = Forced::new(QuadraticInZ { c: 0.7 }, Quadratic(0.3));
-    of("nonlinear in z", &nonlinear, 0.0, VelocityPoint::new([0.2], [0.5], 0.3));
-    let plane = Forced::new(CoupledPlane { c: 1.5, ..CoupledPlane::default() }, Mixing);
-    of("plane", &plane, 0.3, VelocityPoint::new([0.2, 0.1], [0.4, 0.3], 0.2));
+    let pendulum = forced_one(one(Pendulum { gamma: -0.1 }), Quadratic(0.3));
+    of("pendulum", pendulum, 0.0, VelocityPoint::new([0.3], [0.9], 0.0));
+    let nonlinear = forced_one(one(QuadraticInZ { c: 0.7 }), Quadratic(0.3));
+    of("nonlinear in z", nonlinear, 0.0, VelocityPoint::new([0.2], [0.5], 0.3));
+    let plane = forced_two(two(CoupledPlane { c: 1.5, ..CoupledPlane::default() }), Mixing);
+    of("plane", plane, 0.3, VelocityPoint::new([0.2, 0.1], [0.4, 0.3], 0.2));
 }
 
 /// Splittings with kicks.
 #[test]
 fn paths_of_splittings() {
     let (h, start) = (0.05, PhasePoint::new([0.3], [0.6], 0.2));
-    let pendulum = Forced::new(Pendulum { gamma: -0.1 }, Swirl);
-    assert_is_the_run("strang", &Strang::new(&pendulum, h, 0.3, &start).unwrap(), 0.3, start);
-    let nonlinear = Forced::new(OneCoordinate::from(QuadraticInZ { c: 0.7 }), Swirl);
-    assert_is_the_run("action_strang", &ActionStrang::new(&nonlinear, h, 0.3, &start).unwrap(), 0.3, start);
+    let pendulum = forced_one(one(Pendulum { gamma: -0.1 }), Swirl);
+    assert_is_the_run("strang", &Method::Strang.discretise(pendulum, h, 0.3, &start).unwrap(), 0.3, start);
+    let nonlinear = forced_one(one(QuadraticInZ { c: 0.7 }), Swirl);
+    assert_is_the_run("action_strang", &ActionStrang::new(nonlinear, h, 0.3, &start).unwrap(), 0.3, start);
 }
 
 /// Driven periodic motions with drag: they close, Newton's corrections are quadratic, and other motions converge to
@@ -159,20 +158,21 @@ fn periodic_paths_with_forces() {
         found
     }
     let steps = 60;
-    let ld = Midpoint::new(Forced::new(Rolling, Drag { c: 0.4, k: 0.1 }), 3.0 / steps as f64).unwrap();
+    let ld = by(Method::Midpoint, forced_two(Rolling, Drag { c: 0.4, k: 0.1 }), 3.0 / steps as f64);
     let found = of(&ld, steps, 0.0);
     // By friction of 0.4 over forty periods of 3 the distance of two motions is e^-24 of the initial one, 4e-11.
     let start = PhasePoint { q: found.points[0] + SVector::repeat(0.1), p: SVector::zeros(), z: 0.0 };
     let states = run(&ld, (0.0, start), 40 * steps);
     assert!(distance(&found, &states[39 * steps..]) <= 1e-9, "{:e}", distance(&found, &states[39 * steps..]));
     // Where forces and Lagrangian depend on the action.
-    let plane = Forced::new(TwoCoordinates::from(CoupledPlane { c: 1.5, ..CoupledPlane::default() }), Mixing);
-    of(&Trapezoidal::new(&plane, 3.0 / steps as f64).unwrap(), steps, 0.2);
-    of(&Quadrature::<_, Simpson>::new(&plane, 3.0 / steps as f64).unwrap(), steps, 0.2);
+    let plane = forced_two(two(CoupledPlane { c: 1.5, ..CoupledPlane::default() }), Mixing);
+    of(&by(Method::Trapezoidal, plane, 3.0 / steps as f64), steps, 0.2);
+    of(&Quadrature::<_, Simpson>::new(plane, 3.0 / steps as f64).unwrap(), steps, 0.2);
 }
 
 /// Two balls in wells with a spring, one driven with the period 3.
-struct Rolling;
+#[derive(Clone, Copy)]
+pub struct Rolling;
 
 impl Lagrangian<2> for Rolling {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
@@ -188,11 +188,11 @@ impl Lagrangian<2> for Rolling {
 fn a_fall_with_quadratic_drag() {
     let (k, span) = (0.2, 2.0);
     let exact = |t: f64| -((G * k).sqrt() * t).cosh().ln() / k;
-    let forced = Forced::new(Fall, Drag { c: 0.0, k });
+    let forced = forced_one(Fall, Drag { c: 0.0, k });
     for method in [Method::Rectangle, Method::Midpoint, Method::Trapezoidal] {
         let errors = [32usize, 64, 128, 256].map(|steps| {
             let h = span / steps as f64;
-            let ld = by(method, &forced, h);
+            let ld = by(method, forced.clone(), h);
             let found = BoundaryPath::new(&ld, steps, [at([0.0]), at([exact(span)])]).unwrap().search();
             check(&ld, (0.0, 0.0), &found, 1.0);
             let error = max_abs_or_nan(found.points.iter().enumerate().map(|(k, q)| q[0] - exact(k as f64 * h)));
@@ -228,7 +228,7 @@ fn conjugate_points_with_drag() {
             let angle = k as f64 * theta;
             r.powi(k as i32) * (cosine * angle.cos() + sine * angle.sin())
         };
-        let ld = Midpoint::new(Forced::new(HarmonicOscillator { gamma: 0.0 }, Drag { c, k: 0.0 }), low).unwrap();
+        let ld = by(Method::Midpoint, forced_one(one(HarmonicOscillator { gamma: 0.0 }), Drag { c, k: 0.0 }), low);
         let (q, before) = (exact(steps), exact(steps - 1));
         // `p1 = (q1 - q0)/h - h/4 (q0 + q1) - c/2 (q1 - q0)`.
         let p = (q - before) * (1.0 / low - 0.5 * c) - 0.25 * low * (q + before);
@@ -250,28 +250,33 @@ fn conjugate_points_with_drag() {
 #[test]
 fn a_branch_along_the_drag() {
     let ends = [at([0.0]), at([1.2])];
+    let pendulum = one(Pendulum { gamma: -0.1 });
     let problem =
-        |c: f64| BoundaryPath::new(Midpoint::new(Forced::new(Pendulum { gamma: -0.1 }, Quadratic(c)), 0.05)?, 40, ends);
+        |c: f64| BoundaryPath::new(Midpoint::new(forced_one(pendulum.clone(), Quadratic(c)), 0.05)?, 40, ends);
     let paths = branch(problem, [0.0, 1.0], 0.2, 50).unwrap();
     let (last, found) = (&paths[paths.len() - 1], problem(1.0).unwrap().search());
     assert!(last.0 == 1.0 && last.1.is_found() && found.is_found(), "{}", last.0);
     // Two searches for one path, each to the rounding of the positions in 40 steps.
     let off = largest_of(&found.points.iter().zip(&last.1.points).map(|(a, b)| a - b).collect::<Vec<_>>());
     assert!(off <= 16.0 * EPS * 40.0 * 1.2, "{off:e}");
-    let free = BoundaryPath::new(Midpoint::new(Pendulum { gamma: -0.1 }, 0.05).unwrap(), 40, ends).unwrap().search();
+    let free = BoundaryPath::new(&Midpoint::new(pendulum.clone(), 0.05).unwrap(), 40, ends).unwrap().search();
     assert!((0..=40).all(|k| (free.points[k] - paths[0].1.points[k]).amax() <= 16.0 * EPS * 40.0 * 1.2));
+}
+
+/// `ln(q - 1/2)`, which is not defined for q below 1/2.
+#[derive(Clone, Copy)]
+pub struct Wall;
+
+impl Force<1> for Wall {
+    fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> SVector<T, 1> {
+        [(x.q[0] - 0.5).ln()].into()
+    }
 }
 
 /// A drag that is not finite at a step is a status, and the search does not end in a path.
 #[test]
 fn forces_that_are_not_defined_are_a_status() {
-    struct Wall;
-    impl Force<1> for Wall {
-        fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> SVector<T, 1> {
-            [(x.q[0] - 0.5).ln()].into()
-        }
-    }
-    let ld = Midpoint::new(Forced::new(UniformField::<1> { field: [-1.0], gamma: 0.0 }, Wall), 0.1).unwrap();
+    let ld = by(Method::Midpoint, forced_one(UniformField::<1> { field: [-1.0], gamma: 0.0 }, Wall), 0.1);
     let found = BoundaryPath::new(&ld, 10, [at([0.0]), at([1.0])]).unwrap().search();
     assert!(!found.is_found(), "{}", found.status);
 }

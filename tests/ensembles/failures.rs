@@ -1,8 +1,8 @@
 //! Members that fail, a start that panics, and invalid input.
 
-use super::{Bowl, By, gauss, pendulum_start, splitting};
+use super::lagrangians::{Bowl, One, pendulum};
+use super::{By, gauss, pendulum_start, splitting};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
 use discrete_herglotz::rules::QuadratureMethod;
 use discrete_herglotz::{Ensemble, InputError, Integrator, SplittingScheme, Status, Steps, Until};
@@ -17,9 +17,10 @@ fn a_member_that_fails_has_its_error_and_the_others_continue() {
         _ => VelocityPoint::new([0.001 * i as f64], [0.1], 0.0),
     };
     let good = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.1], 0.0);
+    let bowl = One::from(Bowl);
     for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(QuadratureMethod::default())] {
         let all = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
-            let ensemble = Ensemble::new(&Bowl, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(1);
+            let ensemble = Ensemble::new(&bowl, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(1);
             let mut all = Vec::new();
             (ensemble.run(Until::Time(2.0), |member| all.push(member.clone())).unwrap(), all)
         };
@@ -38,7 +39,7 @@ fn a_member_that_fails_has_its_error_and_the_others_continue() {
 
 #[test]
 fn bad_input_is_refused_before_work_begins() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let by = SplittingScheme::STRANG;
     let of = |count: usize| Ensemble::new(&pendulum, 0.0, count, pendulum_start).by(by).steps(Steps::Count(4));
     let fold = |_: &Member<1>| unreachable!("nothing is computed");
@@ -59,12 +60,12 @@ fn bad_input_is_refused_before_work_begins() {
     // An invalid start in an ensemble in which all starts are invalid.
     let nowhere = Ensemble::new(&pendulum, 0.0, 9, |_| VelocityPoint::new([f64::NAN], [0.0], 0.0)).by(by);
     assert!(matches!(refused(nowhere.steps(Steps::Count(4)).run(until, fold)), InputError::Geometry(_)));
-    assert!(Integrator::<Pendulum, 1>::batch_kernel(&by).is_some());
+    assert!(Integrator::<One, 1>::batch_kernel(&by).is_some());
 }
 
 #[test]
 fn a_panic_of_the_start_is_one_of_the_run() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let start = |i: usize| if i == 777 { unreachable!("a start that panics") } else { pendulum_start(i) };
     let ensemble =
         Ensemble::new(&pendulum, 0.0, 100_000, start).by(SplittingScheme::STRANG).steps(Steps::Count(2)).threads(3);

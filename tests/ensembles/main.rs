@@ -4,33 +4,20 @@
 #![allow(clippy::unwrap_used)]
 
 mod failures;
+mod lagrangians;
 mod resolution;
 mod rows;
 mod single_runs;
 
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{BatchKernel, EnsembleError, Member};
 use discrete_herglotz::rules::{MidpointRule, QuadratureMethod};
 use discrete_herglotz::{
     CheckpointError, Ensemble, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Status,
     Stepper, StepperOptions, Steps, Until,
 };
+use lagrangians::{One, pendulum};
 use proptest::prelude::*;
-
-/// `v^2/2 + sqrt(1 - q^2) - z/10`: not defined beyond one.
-struct Bowl;
-
-impl Lagrangian<1> for Bowl {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + (-(q[0] * q[0]) + 1.0).sqrt() - z * 0.1
-    }
-    fn structure(&self) -> Structure {
-        Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }
-    }
-}
 
 fn unit(seed: usize) -> f64 {
     2.0 * ((seed as f64 + 0.5) * 0.618_033_988_749_894_9).fract() - 1.0
@@ -109,10 +96,11 @@ fn integrators() -> [By; 3] {
 
 #[test]
 fn threads_do_not_change_a_bit() {
+    let pendulum = pendulum(-0.1);
     for by in integrators() {
         let count = if let By::Rule(_) = by { 600 } else { 1500 };
         let run = |threads: usize| {
-            let ensemble = Ensemble::new(&Pendulum { gamma: -0.1 }, 0.0, count, pendulum_start);
+            let ensemble = Ensemble::new(&pendulum, 0.0, count, pendulum_start);
             members(&ensemble.by(by).steps(Steps::Count(7)).threads(threads), Until::Time(2.0))
         };
         let alone = run(1);
@@ -137,7 +125,7 @@ proptest! {
                 let (q, v) = starts[i % starts.len()];
                 VelocityPoint::new([q], [v], 0.0)
             };
-            let pendulum = Pendulum { gamma: -0.1 };
+            let pendulum = pendulum(-0.1);
             let count = starts.len();
             let plain = Ensemble::new(&pendulum, 0.0, count, start).by(by).steps(Steps::Count(5)).threads(1);
             let plain = members(&plain, Until::Time(2.0));
@@ -164,7 +152,7 @@ proptest! {
 /// the same as among members with its own start.
 #[test]
 fn a_lane_that_has_converged_does_not_change_while_others_iterate() {
-    let pendulum = Pendulum { gamma: -1e-3 };
+    let pendulum = pendulum(-1e-3);
     let start = |i: usize| VelocityPoint::new([[0.01, 2.9, 1.5, 0.3][i % 4]], [0.0], 0.0);
     for stages in [5, 8] {
         let run = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
@@ -180,7 +168,7 @@ fn a_lane_that_has_converged_does_not_change_while_others_iterate() {
 
 #[test]
 fn parameters_of_each_member() {
-    let pendula: Vec<Pendulum> = (0..30).map(|i| Pendulum { gamma: -0.01 * i as f64 }).collect();
+    let pendula: Vec<_> = (0..30).map(|i| pendulum(-0.01 * i as f64)).collect();
     for by in integrators() {
         // Ten starts for each parameter.
         let ensemble = Ensemble::of(0.0, 300, |i| (&pendula[i / 10], pendulum_start(i % 10)));
@@ -196,7 +184,7 @@ fn parameters_of_each_member() {
 
 #[test]
 fn orders_are_those_of_the_schemes() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let ends = |by: By, steps: usize| {
         let ensemble = Ensemble::new(&pendulum, 0.0, 32, pendulum_start).by(by).steps(Steps::Count(steps));
         members(&ensemble, Until::Time(4.0))
@@ -214,14 +202,14 @@ fn orders_are_those_of_the_schemes() {
         // Three halvings; the order is the mean slope, with an error from the next term of the error, which is below a
         // tenth of the first.
         let slope = (error(steps) - error(8 * steps)) / 3.0;
-        assert!((slope - f64::from(Integrator::<Pendulum, 1>::info(&by).order)).abs() < 0.15, "{by:?}: {slope}");
+        assert!((slope - f64::from(Integrator::<One, 1>::info(&by).order)).abs() < 0.15, "{by:?}: {slope}");
     }
 }
 
 #[test]
 fn without_the_action_nothing_else_changes() {
     for by in integrators() {
-        let pendulum = Pendulum { gamma: -0.1 };
+        let pendulum = pendulum(-0.1);
         let ensemble = || Ensemble::new(&pendulum, 0.0, 50, pendulum_start).by(by).steps(Steps::Count(10));
         let with = members(&ensemble(), Until::Time(1.0));
         let without = members(&ensemble().without_action(), Until::Time(1.0));
@@ -238,7 +226,7 @@ fn without_the_action_nothing_else_changes() {
 /// In an ensemble to its start all members are their starts, in lanes and one by one.
 #[test]
 fn an_ensemble_to_its_start_is_the_starts() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     for by in integrators() {
         for steps in [Steps::Count(4), Steps::Size(0.1)] {
             let ensemble = Ensemble::new(&pendulum, 0.5, 9, pendulum_start).by(by).steps(steps);
@@ -258,7 +246,7 @@ fn a_resumed_ensemble_is_the_same_to_the_last_bit() {
     let folder = std::env::temp_dir().join(format!("ensembles-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("shards");
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     // One member fails.
     let start = |i: usize| if i == 500 { VelocityPoint::new([f64::NAN], [0.0], 0.0) } else { pendulum_start(i) };
     let of = |steps: usize| {
@@ -268,7 +256,7 @@ fn a_resumed_ensemble_is_the_same_to_the_last_bit() {
             .threads(2)
     };
     let until = Until::Time(1.0);
-    let bits = |ensemble: Ensemble<'_, Pendulum, 1>| {
+    let bits = |ensemble: Ensemble<'_, One, 1>| {
         let mut all = Vec::new();
         let tally = ensemble.run(until, |member| all.push(format!("{member:?}"))).unwrap();
         (tally, all)
@@ -314,7 +302,7 @@ fn a_resumed_ensemble_is_the_same_to_the_last_bit() {
 #[test]
 fn progress_ends_at_one() {
     let reported = std::cell::RefCell::new(Vec::new());
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let ensemble =
         Ensemble::new(&pendulum, 0.0, 1000, pendulum_start).by(SplittingScheme::STRANG).steps(Steps::Count(2));
     ensemble.progress(|part| reported.borrow_mut().push(part)).run(Until::Time(1.0), |_| {}).unwrap();

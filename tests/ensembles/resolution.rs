@@ -1,34 +1,17 @@
 //! Steps that do not resolve the motion of a member, and steps for an accuracy.
 
+use super::lagrangians::{One, Spring, pendulum};
 use super::{By, gauss, members, pendulum_start, splitting};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::VelocityPoint;
 use discrete_herglotz::UnresolvedStep;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
 use discrete_herglotz::rules::QuadratureMethod;
 use discrete_herglotz::{Ensemble, InputError, Integrator, Problem, SplittingScheme, Status, Steps, Until};
 
-/// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator whose stiffness is its parameter.
-struct Spring {
-    k: f64,
-}
-
-impl Lagrangian<1> for Spring {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        let square = q[0] * q[0];
-        v[0] * v[0] * 0.5 - (square * 0.5 + square * square * 0.0625) * self.k - z * 0.02
-    }
-    fn structure(&self) -> Structure {
-        Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }
-    }
-}
-
 #[test]
 fn members_that_the_steps_do_not_resolve_are_flagged_as_by_a_single_run() {
     // Frequencies from 0.1 to 11, with steps of 1: from a sixtieth of a period to nearly two of them.
-    let springs: Vec<Spring> = (0..120).map(|i| Spring { k: (0.1 * 1.04f64.powi(i)).powi(2) }).collect();
+    let springs: Vec<_> = (0..120).map(|i| One::from(Spring { k: (0.1 * 1.04f64.powi(i)).powi(2) })).collect();
     let start = |i: usize| VelocityPoint::new([0.5], [0.02 * i as f64], 0.0);
     let until = Until::Time(30.0);
     let mut missed = Vec::new();
@@ -43,7 +26,7 @@ fn members_that_the_steps_do_not_resolve_are_flagged_as_by_a_single_run() {
             let ending = member.ending.unwrap();
             let bits = |s: Option<UnresolvedStep>| s.map(|s| (s.step, s.defect.to_bits()));
             if bits(ending.unresolved) != bits(own.unresolved) {
-                missed.push((Integrator::<'_, Spring, 1>::info(&by).name, i, own.unresolved));
+                missed.push((Integrator::<'_, One, 1>::info(&by).name, i, own.unresolved));
             }
             flagged += usize::from(ending.unresolved.is_some());
             unflagged += usize::from(ending.unresolved.is_none());
@@ -66,7 +49,7 @@ fn members_that_the_steps_do_not_resolve_are_flagged_as_by_a_single_run() {
 #[test]
 fn an_accuracy_holds_for_every_member() {
     // One member is stiffer than all members of the trial runs.
-    let (soft, stiff) = (Spring { k: 1.0 }, Spring { k: 30.0 });
+    let (soft, stiff) = (One::from(Spring { k: 1.0 }), One::from(Spring { k: 30.0 }));
     let spring = |i: usize| if i == 50 { &stiff } else { &soft };
     let start = |i: usize| VelocityPoint::new([0.5], [0.02 * i as f64], 0.0);
     let (count, until) = (100, Until::Time(10.0));
@@ -115,7 +98,7 @@ fn an_accuracy_holds_for_every_member() {
 
 #[test]
 fn an_accuracy_without_lanes_is_that_of_each_member() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let by = By::Rule(QuadratureMethod::default());
     let ensemble = Ensemble::new(&pendulum, 0.0, 20, pendulum_start).by(by).accuracy(1e-3);
     for member in members(&ensemble, Until::Time(2.0)).iter().step_by(5) {

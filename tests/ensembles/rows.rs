@@ -1,8 +1,9 @@
 //! Rows of members, and observers of members.
 
-use super::{Bowl, By, integrators, members, pendulum_start};
+use super::lagrangians::{Bowl, One, pendulum};
+use super::{By, integrators, members, pendulum_start};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{HarmonicOscillator, Pendulum};
+use contact_geom::systems::HarmonicOscillator;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
 use discrete_herglotz::{
     Ensemble, Event, Events, InputError, Problem, Row, Rows, SplittingScheme, Status, Steps, Until,
@@ -14,7 +15,7 @@ fn rows_are_those_of_single_runs() {
         for (steps, stride) in [(10, 3), (12, 4), (5, 9), (3, 1)] {
             // To the last bit where no sine is evaluated; up to rounding by collocation, and on the pendulum.
             let exact = matches!(by, By::Splitting(_) | By::Rule(_));
-            let oscillator = HarmonicOscillator { gamma: -0.1 };
+            let oscillator = One::from(HarmonicOscillator { gamma: -0.1 });
             for without in [false, true] {
                 let problem = Problem::new(&oscillator, 0.5, pendulum_start(0)).unwrap();
                 let ensemble = problem.ensemble(60, pendulum_start).by(by).steps(Steps::Count(steps));
@@ -49,7 +50,7 @@ fn rows_are_those_of_single_runs() {
 
 #[test]
 fn rows_change_no_bit_and_none_depends_on_the_neighbours() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     for by in integrators() {
         let of = |count: usize, shift: usize| {
             let start = move |i: usize| pendulum_start(i + shift);
@@ -72,7 +73,8 @@ fn rows_change_no_bit_and_none_depends_on_the_neighbours() {
 fn rows_of_a_member_that_fails_end_before_it_does() {
     // One member crosses the edge at about t = 0.1; the others continue.
     let start = |i: usize| VelocityPoint::new([if i == 5 { 0.5 } else { 0.01 }], [if i == 5 { 5.0 } else { 0.1 }], 0.0);
-    let ensemble = Ensemble::new(&Bowl, 0.0, 20, start).by(SplittingScheme::STRANG).steps(Steps::Count(80));
+    let bowl = One::from(Bowl);
+    let ensemble = Ensemble::new(&bowl, 0.0, 20, start).by(SplittingScheme::STRANG).steps(Steps::Count(80));
     let all = members(&ensemble.rows_every(1), Until::Time(2.0));
     let failed = all[5].ending.unwrap();
     assert!(matches!(failed.status, Status::Failed { .. }), "{failed:?}");
@@ -84,7 +86,7 @@ fn rows_of_a_member_that_fails_end_before_it_does() {
 #[test]
 fn rows_are_in_the_checkpoint() {
     let path = std::env::temp_dir().join(format!("rows-of-ensembles-{}", std::process::id()));
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let start = |i: usize| if i == 3 { VelocityPoint::new([f64::NAN], [0.0], 0.0) } else { pendulum_start(i) };
     let run = |stride: usize, path: Option<&std::path::Path>| {
         let ensemble = Ensemble::new(&pendulum, 0.0, 900, start).by(SplittingScheme::STRANG).steps(Steps::Count(6));
@@ -109,7 +111,7 @@ fn rows_are_in_the_checkpoint() {
 
 #[test]
 fn rows_that_cannot_be_are_refused() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     let refused = |stride: usize, steps: usize| {
         let ensemble = Ensemble::new(&pendulum, 0.0, 1000, pendulum_start).by(SplittingScheme::STRANG);
         let ensemble = ensemble.steps(Steps::Count(steps)).rows_every(stride);
@@ -124,7 +126,7 @@ fn rows_that_cannot_be_are_refused() {
 
 #[test]
 fn observers_of_members_see_what_those_of_single_runs_do() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = pendulum(-0.1);
     for by in integrators() {
         let observer = |index: usize| {
             if index == 8 {

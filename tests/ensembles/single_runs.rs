@@ -1,42 +1,13 @@
 //! Members of an ensemble are the same as single runs.
 
+use super::lagrangians::{Branching, HenonHeiles, One, Two, pendulum};
 use super::{numbers, pendulum_start, unit};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler, Pendulum};
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler};
+use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{Ending, Member};
 use discrete_herglotz::{
     Ensemble, GaussCollocation, Integrator, Problem, SplittingScheme, Status, StepError, StepperOptions, Steps, Until,
 };
-
-/// The Hénon-Heiles potential with a mass matrix that is not diagonal, and linear drag.
-struct HenonHeiles;
-
-impl Lagrangian<2> for HenonHeiles {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        let kinetic = (v[0] * v[0] + v[1] * v[1]) * 0.5 + v[0] * v[1] * 0.25;
-        let cubic = q[0] * q[0] * q[1] - q[1] * q[1] * q[1] / 3.0;
-        kinetic - (q[0] * q[0] + q[1] * q[1]) * 0.5 - cubic - z * 0.02
-    }
-    fn structure(&self) -> Structure {
-        Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }
-    }
-}
-
-/// An oscillator whose formula branches on the value of its position.
-struct Branching;
-
-impl Lagrangian<1> for Branching {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        let stiffness = if q[0].re() < 0.0 { 1.0 } else { 1.5 };
-        (v[0] * v[0] - q[0] * q[0] * stiffness) * 0.5
-    }
-    fn structure(&self) -> Structure {
-        Structure { autonomous: true, z_free: true, separable: true, constant_mass: true, ..Structure::default() }
-    }
-}
 
 fn plane_start(i: usize) -> VelocityPoint<2> {
     VelocityPoint::new([0.2 * unit(i), 0.2 * unit(i + 99)], [0.2 * unit(i + 7), 0.2], -0.3)
@@ -83,17 +54,19 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
 
 #[test]
 fn by_splittings_members_are_single_runs_to_the_last_bit() {
+    let [oscillator, pendulum] = [HarmonicOscillator { gamma: -0.1 }.into(), pendulum(-0.01)];
+    let [kepler, henon_heiles] = [Two::from(Kepler::default()), HenonHeiles.into()];
     for scheme in SplittingScheme::ALL {
         let (by, name) = (scheme, scheme.name());
         // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not
         // diagonal.
-        assert_eq!(distance(&Kepler::<2>::default(), orbit_start, by, 50), 0.0, "{name}");
-        assert_eq!(distance(&HenonHeiles, plane_start, by, 50), 0.0, "{name}");
-        assert_eq!(distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 50), 0.0, "{name}");
+        assert_eq!(distance(&kepler, orbit_start, by, 50), 0.0, "{name}");
+        assert_eq!(distance(&henon_heiles, plane_start, by, 50), 0.0, "{name}");
+        assert_eq!(distance(&oscillator, pendulum_start, by, 50), 0.0, "{name}");
         // The sine has an error of 2 units in the last place, at most 35 of which enter a step, each times a part of
         // the step; in five units of time a difference grows at most by e^5, near the upper equilibrium, and the
         // motions here stay below it.
-        let apart = distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 50);
+        let apart = distance(&pendulum, pendulum_start, by, 50);
         assert!(apart <= 64.0 * f64::EPSILON, "{name}: {apart:e}");
     }
 }
@@ -102,19 +75,21 @@ fn by_splittings_members_are_single_runs_to_the_last_bit() {
 fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
     let by = SplittingScheme::BLANES_MOAN_4;
     // The sine of the forcing is the one of the lanes.
-    let apart = distance(&Duffing::forced(), pendulum_start, by, 50);
+    let apart = distance(&One::from(Duffing::forced()), pendulum_start, by, 50);
     assert!(apart <= 64.0 * f64::EPSILON, "{apart:e}");
 }
 
 #[test]
 fn by_collocation_members_are_single_runs_but_for_rounding() {
+    let [oscillator, pendulum] = [HarmonicOscillator { gamma: -0.1 }.into(), pendulum(-0.01)];
+    let [kepler, henon_heiles] = [Two::from(Kepler::default()), HenonHeiles.into()];
     for stages in 1..=16 {
         let by = GaussCollocation { stages };
         let systems = [
-            distance(&Kepler::<2>::default(), orbit_start, by, 40),
-            distance(&HenonHeiles, plane_start, by, 40),
-            distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 40),
-            distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 40),
+            distance(&kepler, orbit_start, by, 40),
+            distance(&henon_heiles, plane_start, by, 40),
+            distance(&oscillator, pendulum_start, by, 40),
+            distance(&pendulum, pendulum_start, by, 40),
         ];
         // Both solve the stages to round-off, of which a few units remain after 40 steps, and an orbit multiplies them
         // by 3/2 of its phase.
@@ -125,8 +100,9 @@ fn by_collocation_members_are_single_runs_but_for_rounding() {
 #[test]
 fn a_formula_that_branches_is_run_one_by_one() {
     let start = |i: usize| VelocityPoint::new([if i.is_multiple_of(2) { 1.0 } else { -1.0 }], [0.0], 0.0);
+    let branching = One::from(Branching);
     let run = |by: SplittingScheme| {
-        let ensemble = Ensemble::new(&Branching, 0.0, 20, start).by(by).steps(Steps::Count(10));
+        let ensemble = Ensemble::new(&branching, 0.0, 20, start).by(by).steps(Steps::Count(10));
         let mut ends = Vec::new();
         let tally = ensemble.run(Until::Time(1.0), |member| ends.push(numbers(member)[0])).unwrap();
         (tally.batch_kernel, ends)
@@ -144,7 +120,7 @@ fn a_formula_that_branches_is_run_one_by_one() {
 fn steps_that_do_not_converge_are_those_of_a_single_run() {
     // A step for which the fixed-point iteration fails: a single run solves it by Newton's method, or reports why it
     // cannot.
-    let stiff = HarmonicOscillator { gamma: -0.1 };
+    let stiff = One::from(HarmonicOscillator { gamma: -0.1 });
     let by = GaussCollocation { stages: 4 };
     let ensemble = Ensemble::new(&stiff, 0.0, 10, pendulum_start).by(by).steps(Steps::Size(30.0)).threads(1);
     let mut all = Vec::new();

@@ -1,10 +1,9 @@
 //! Runs on a contact Hamiltonian: a requested accuracy, rows, events, dense output, checkpoints, ensembles, forces.
 
-use super::systems::{One, Two};
+use super::systems::{Line, One, Push, Two};
 use crate::common::relative_distance;
-use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use contact_geom::{Force, Forced, OfHamiltonian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Forced, OfHamiltonian, PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     Checkpoint, Ensemble, Event, Events, GaussCollocation, InputError, Problem, ResumeState, Rows, Status, StepView,
     Stepper, StepperOptions, Steps, Stop, Until, gauss::GaussStepper,
@@ -107,15 +106,9 @@ fn an_ensemble_of_hamiltonian_motions() {
 /// A force on a Hamiltonian motion is that on the Lagrangian motion: `f = -0.3 v + sin t`.
 #[test]
 fn a_force_acts_on_a_hamiltonian_motion() {
-    struct Push;
-    impl Force<1> for Push {
-        fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> SVector<T, 1> {
-            [x.v[0] * -0.3 + t.sin()].into()
-        }
-    }
     let pendulum = Pendulum { gamma: -0.1 };
     let x = VelocityPoint::new([1.0], [0.5], 0.2);
-    let by_lagrangian = Forced::new(pendulum, Push);
+    let by_lagrangian = Line::from(Forced::new(pendulum, Push));
     let by_hamiltonian = Forced::new(OfHamiltonian(One::Of(pendulum.into())), Push);
     let options = StepperOptions { action: true, check_resolution: false };
     let a = Problem::new(&by_lagrangian, 0.0, x).unwrap();

@@ -2,8 +2,28 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{Coefficient, ScalarOver};
-use contact_geom::systems::{OneCoordinate, System, TwoCoordinates};
-use contact_geom::{ContactHamiltonian, HamiltonianStructure, ParametricHamiltonian, PhasePoint, Scalar};
+use contact_geom::systems::{OneCoordinate, Pendulum, System, TwoCoordinates};
+use contact_geom::{
+    ContactHamiltonian, Force, Forced, HamiltonianStructure, ParametricHamiltonian, PhasePoint, Scalar, VelocityPoint,
+    lagrangian_enum,
+};
+
+lagrangian_enum! {
+    /// Lagrangians with one coordinate, whose motions are those of contact Hamiltonians.
+    pub enum Line<1> {
+        Catalogue(OneCoordinate),
+        Pushed(Forced<Pendulum, Push>),
+    }
+}
+
+/// The force `-0.3 v + sin t`.
+pub struct Push;
+
+impl Force<1> for Push {
+    fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> SVector<T, 1> {
+        [x.v[0] * -0.3 + t.sin()].into()
+    }
+}
 
 /// Contact Hamiltonians with one coordinate.
 #[derive(Clone, Copy, Debug)]

@@ -57,7 +57,7 @@ pub fn motion<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) 
 pub fn between_points<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {
     let Problem { system, t0, start, pace, .. } = problem;
     let h = random.scale(1e-3, 1.0) / pace;
-    let ld = match ExactLagrangian::<_, N>::new(system, h) {
+    let ld = match ExactLagrangian::<_, N>::new(system.clone(), h) {
         Ok(ld) => ld,
         Err(error) => return Ok(super::verdict::refused(&error)),
     };

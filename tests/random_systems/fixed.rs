@@ -196,7 +196,7 @@ fn worst_step<const N: usize>(
 ) -> Result<(usize, f64), Wrong> {
     let none = (0, 0.0);
     let (Ok(mut stepper), Ok(exact)) =
-        (plan.stepper(), ExactLagrangian::<_, N>::new(&problem.system, plan.step_size()))
+        (plan.stepper(), ExactLagrangian::<_, N>::new(problem.system.clone(), plan.step_size()))
     else {
         return Ok(none);
     };

@@ -17,7 +17,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
     let Problem { system, t0, start, .. } = problem;
     let (stages, h, steps) = (1 + random.below(16), random.scale(1e-3, 1.0), 1 + random.below(20));
     let state = legendre(system, *t0, start);
-    let gauss = match Gauss::new(system, stages, h) {
+    let gauss = match Gauss::new(system.clone(), stages, h) {
         Ok(gauss) => gauss,
         Err(error) => return Ok(refused(&error)),
     };
@@ -95,7 +95,8 @@ fn with_events<const N: usize>(
     let Ok(plan) = by_steps.plan(Until::Steps(steps)) else { return Ok(()) };
     // The step size may differ from h in the last digit.
     let of_run = plan.step_size();
-    let (Ok(outcome), Ok(gauss)) = (by_steps.run(Until::Steps(steps)), Gauss::new(system, stages, of_run)) else {
+    let (Ok(outcome), Ok(gauss)) = (by_steps.run(Until::Steps(steps)), Gauss::new(system.clone(), stages, of_run))
+    else {
         return ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: a plan and no run"));
     };
     let at = posed.state();
@@ -143,7 +144,7 @@ fn with_events<const N: usize>(
 
 /// The dense output of the last step: at its ends it is the states, and between them finite.
 fn check_dense_output<const N: usize>(
-    stepper: &discrete_herglotz::gauss::GaussStepper<'_, &super::system::RandomSystem<N>, N>,
+    stepper: &discrete_herglotz::gauss::GaussStepper<'_, super::system::RandomSystem<N>, N>,
     stages: usize,
     random: &mut RandomNumbers,
 ) -> Result<(), Wrong> {
