@@ -48,7 +48,11 @@ impl Kind {
     fn formula(&self, text: &str, names: FormulaNames<'_>) -> Result<Formula, FormulaError> {
         let momenta = texts(&self.momenta);
         let names = FormulaNames { momenta: &momenta, action: &self.action, ..names };
-        if self.hamiltonian { Formula::parse_hamiltonian(text, &names) } else { Formula::parse_lagrangian(text, &names) }
+        if self.hamiltonian {
+            Formula::parse_hamiltonian(text, &names)
+        } else {
+            Formula::parse_lagrangian(text, &names)
+        }
     }
 }
 
@@ -58,13 +62,7 @@ impl Additions {
     }
 
     /// The formula of a text with them.
-    fn formula(
-        &self,
-        kind: &Kind,
-        text: &str,
-        coordinates: &[&str],
-        parameters: &[(&str, f64)],
-    ) -> PyResult<Formula> {
+    fn formula(&self, kind: &Kind, text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> PyResult<Formula> {
         let tables: Vec<(&str, Samples)> =
             self.tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
         let names = FormulaNames { tables: &tables, ..FormulaNames::new(coordinates, parameters) };

@@ -48,7 +48,8 @@ impl Hints {
         let mut any = Hints { proved: !several.is_empty(), ..Hints::NONE };
         let mut i = 0;
         while i < several.len() {
-            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian } = several[i];
+            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian } =
+                several[i];
             assert!(!hamiltonian, "a Lagrangian that is given by a contact Hamiltonian needs a type of its own");
             any.time_transformation |= time_transformation;
             any.switching_functions |= switching_functions;

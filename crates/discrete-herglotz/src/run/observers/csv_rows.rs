@@ -76,7 +76,10 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
 mod tests {
     use super::*;
     use crate::{GaussCollocation, Problem, Status, Steps, Until};
-    use contact_geom::{VelocityPoint, systems::{OneCoordinate, Pendulum}};
+    use contact_geom::{
+        VelocityPoint,
+        systems::{OneCoordinate, Pendulum},
+    };
 
     fn run(observer: &mut impl Observer<1>) -> Status {
         let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
