@@ -375,7 +375,7 @@ fn scenes_run() {
     for (t, factor) in column(&rows, "t").iter().zip(column(&rows, "log_factor")) {
         assert!((factor + 3.0 * (t / 0.5).ln()).abs() < 1e-9, "{factor} at {t}");
     }
-    assert!(*column(&rows, "log f").last().unwrap() < -3.0 * 20.0_f64.ln());
+    assert!(*column(&rows, "log_f").last().unwrap() < -3.0 * 20.0_f64.ln());
     assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
 }
 

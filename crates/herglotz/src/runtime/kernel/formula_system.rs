@@ -5,7 +5,7 @@ use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
-    AnyIntegrator, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
+    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
     StepperOptions, theory::legendre_inverse,
 };
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
@@ -107,6 +107,9 @@ impl<const N: usize> Observed<N> for OfHamiltonian<FormulaHamiltonian<N>> {
 pub(super) enum OfHamiltonians {
     /// Contact Gauss collocation on rho H.
     Gauss(GaussCollocation),
+    /// Contact Gauss collocation with steps that are divided where they do not resolve the motion, as
+    /// [`Run::accuracy`](discrete_herglotz::Run::accuracy) selects it.
+    Divided(DividedGauss),
     /// The splitting of a separable H.
     Splitting(SeparableSplitting),
 }
@@ -116,6 +119,7 @@ macro_rules! each {
     ($any:expr, $integrator:ident => $result:expr) => {
         match $any {
             OfHamiltonians::Gauss($integrator) => $result,
+            OfHamiltonians::Divided($integrator) => $result,
             OfHamiltonians::Splitting($integrator) => $result,
         }
     };
@@ -146,6 +150,7 @@ impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {
     fn by(integrator: AnyIntegrator) -> Result<OfHamiltonians, InputError> {
         match integrator {
             AnyIntegrator::Gauss { stages } => Ok(OfHamiltonians::Gauss(GaussCollocation { stages })),
+            AnyIntegrator::Divided(divided) => Ok(OfHamiltonians::Divided(divided)),
             AnyIntegrator::Splitting(scheme) => Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme })),
             AnyIntegrator::Discrete(Method::Strang) => {
                 Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme: SplittingScheme::STRANG }))
