@@ -5,8 +5,8 @@ use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
-    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
-    StepperOptions, theory::legendre_inverse,
+    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme,
+    Stepper, StepperOptions, theory::legendre_inverse,
 };
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
 
