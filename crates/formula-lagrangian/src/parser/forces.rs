@@ -19,8 +19,7 @@ impl<'a> Parser<'a> {
     pub(super) fn force(&mut self) -> Parsed<()> {
         let word = self.next()?;
         if self.forces.is_none() {
-            let message = "a force is a line of the text of a Lagrangian, not of a Hamiltonian or another expression";
-            return Err(self.error(word, message));
+            return Err(self.error(word, "a force is a line of the text of a Lagrangian, not of another expression"));
         }
         self.next()?;
         let place = self.word(0);

@@ -8,7 +8,6 @@ mod fit;
 mod lattice;
 mod list;
 mod lyapunov;
-mod modified;
 mod new;
 mod plan;
 mod run;

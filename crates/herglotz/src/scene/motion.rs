@@ -136,8 +136,7 @@ impl Scene {
         let (formula, resets) = with_resets(text, formula, &file.want.events)?;
         let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
-        let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
-        let lagrangian = source.map_or(system.span(), Location::span);
+        let lagrangian = system.lagrangian.as_ref().map_or(system.span(), Location::span);
         let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
         let step_control = step_control(text, run)?;
         let by = match step_control {
@@ -171,9 +170,9 @@ impl Scene {
             system: runs,
             expressions: expressions(&file).cloned().collect(),
             additions: additions(&file, &tables),
-            lagrangian: match (entry, source) {
+            lagrangian: match (entry, &system.lagrangian) {
                 (Some(entry), _) => entry.lagrangian.to_owned(),
-                (None, own) => own.map(|text| (**text).clone()).unwrap_or_default(),
+                (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
             },
             start,
             end,
@@ -232,7 +231,7 @@ impl Scene {
         if self.has_resets() {
             let names = self.system.formula().coordinates();
             let velocities = names.iter().map(|name| velocity_name(name));
-            let state = names.iter().cloned().chain(velocities).chain([self.system.formula().action().to_owned()]);
+            let state = names.iter().cloned().chain(velocities).chain(["z".to_owned()]);
             columns.extend(state.map(|name| format!("{name} after")));
         }
         columns
@@ -292,9 +291,7 @@ impl Scene {
             self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
-        let (momenta, action) = (formula.momenta(), formula.action());
-        let kind = if formula.is_hamiltonian() { "H" } else { "L" };
-        let of_system = format!("{kind} {} {names:?} {momenta:?} {action} {values:?}", self.lagrangian);
+        let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
         format!(
             "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} \
              {event_columns:?} {additions}"
@@ -306,11 +303,7 @@ impl Scene {
         use InputError as E;
         let spans = &self.spans;
         let span = match error {
-            RuntimeError::NotRegular { .. }
-            | RuntimeError::Formula(_)
-            | RuntimeError::HamiltonianDimension { .. }
-            | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
-            RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
+            RuntimeError::NotRegular { .. } | RuntimeError::Formula(_) => spans.lagrangian,
             RuntimeError::Input(error) => match error {
                 E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => spans.step,
                 E::Span { .. } => spans.time,
