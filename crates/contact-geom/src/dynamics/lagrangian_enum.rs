@@ -4,9 +4,9 @@
 /// a program that uses many of them compiles each integrator once instead of once for each of them.
 ///
 /// Structure, forces, switching functions, time transformation, and closed gradients and Hessians are those of the
-/// variant; other closed forms follow from these two. Each evaluation selects the variant, so that a type of its own is faster. A
-/// second form implements [`Parametric`](crate::Parametric) where each variant does. Variants that are given by a contact
-/// Hamiltonian are not accepted.
+/// variant; other closed forms follow from these two. Each evaluation selects the variant, so that a type of its own is
+/// faster. The second form of the macro implements [`Parametric`](crate::Parametric) where each variant does. Variants that
+/// are given by a contact Hamiltonian are not accepted.
 ///
 /// ```
 /// use contact_geom::systems::{Duffing, Pendulum};
@@ -23,7 +23,10 @@
 /// contact_geom::lagrangian_enum!(parametric Oscillator<1> { Pendulum, Duffing });
 ///
 /// let system = Oscillator::from(Pendulum { gamma: -0.1 });
-/// assert_eq!(system.value(0.0, &[0.0].into(), &[2.0].into(), 0.0), Pendulum { gamma: -0.1 }.value(0.0, &[0.0].into(), &[2.0].into(), 0.0));
+/// assert_eq!(
+///     system.value(0.0, &[0.0].into(), &[2.0].into(), 0.0),
+///     Pendulum { gamma: -0.1 }.value(0.0, &[0.0].into(), &[2.0].into(), 0.0)
+/// );
 /// assert_eq!(system.parameters(), [-0.1]);
 /// ```
 #[macro_export]
