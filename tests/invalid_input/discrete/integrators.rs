@@ -71,7 +71,7 @@ fn discretisations(report: &mut Report) {
 
 /// A stepper starts at a finite state with a valid step, and its states are finite.
 fn integrators(report: &mut Report) {
-    fn one(report: &mut Report, by: &dyn Integrator<'static, One, 1>, wants: StepperOptions) {
+    fn one(report: &mut Report, by: &dyn Integrator<'static, One, 1>, options: StepperOptions) {
         let info = by.info();
         let said = !info.name.is_empty() && info.order > 0 && info.cost_per_evaluation > 0;
         report.check(said && by.check(&CLAIMING).is_ok(), || format!("{info:?}"));
@@ -80,16 +80,16 @@ fn integrators(report: &mut Report) {
             (stepper.state(), stepper.time())
         };
         for (t, x) in starts() {
-            let made = Problem::new(&CLAIMING, t, x).and_then(|problem| by.stepper(&problem, 0.1, wants));
+            let made = Problem::new(&CLAIMING, t, x).and_then(|problem| by.stepper(&problem, 0.1, options));
             report.entry_point(&(t, x), made.map(driven));
         }
         for h in EXTREME.into_iter().chain(STEPS) {
-            let made = by.stepper(&tame(), h, wants);
+            let made = by.stepper(&tame(), h, options);
             let refused = h == 0.0 || !h.is_finite();
             report.check(!refused || made.is_err(), || format!("{}: the step {h} is taken", info.name));
             report.entry_point(&h, made.map(driven));
         }
-        let mut stepper = by.stepper(&tame(), 0.1, wants).unwrap();
+        let mut stepper = by.stepper(&tame(), 0.1, options).unwrap();
         let work_summary = stepper.work_summary();
         report.check(!work_summary.is_empty() && work_summary.iter().all(|i| !i.why.is_empty()), || {
             format!("{work_summary:?}")
@@ -100,11 +100,11 @@ fn integrators(report: &mut Report) {
         report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
     }
     let rule = QuadratureMethod::<MidpointRule>::default();
-    for wants in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
-        one(report, &rule, wants);
-        one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), wants);
+    for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
+        one(report, &rule, options);
+        one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), options);
         for by in BY.into_iter().flatten() {
-            one(report, &by, wants);
+            one(report, &by, options);
         }
     }
     let nystrom = CompositionMethod::new(rule, SplittingScheme::BLANES_MOAN_6);

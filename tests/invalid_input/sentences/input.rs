@@ -108,9 +108,9 @@ impl<'a> Integrator<'a, One, 1> for Minimal {
         &self,
         problem: &Problem<'a, One, 1>,
         h: f64,
-        wants: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
-        Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, wants)?)))
+        Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, options)?)))
     }
 }
 

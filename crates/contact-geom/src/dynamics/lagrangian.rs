@@ -42,6 +42,13 @@ impl Hints {
 
     /// What may be relied on for a Lagrangian that is one of several, as in [`lagrangian_enum`](crate::lagrangian_enum).
     ///
+    /// ```
+    /// use contact_geom::Hints;
+    /// let switching = Hints { switching_functions: true, proved: true, ..Hints::NONE };
+    /// assert_eq!(Hints::of_any(&[switching, Hints::NONE]), Hints { proved: false, ..switching });
+    /// assert_eq!(Hints::of_any(&[switching, switching]), switching);
+    /// ```
+    ///
     /// # Panics
     /// Where one of them is given by a contact Hamiltonian; at compile time in constants.
     pub const fn of_any(several: &[Hints]) -> Hints {

@@ -18,7 +18,6 @@ impl Spring {
     }
 
     /// The position at a time, from 1 at rest, for weak damping.
-    #[allow(dead_code)] // Some test files do not use it.
     pub fn position(&self, t: f64) -> f64 {
         let (half, w) = (0.5 * self.c, (self.k - 0.25 * self.c * self.c).sqrt());
         (-half * t).exp() * ((w * t).cos() + half / w * (w * t).sin())
@@ -54,7 +53,6 @@ impl Parametric<1> for Spring {
 
 /// `L = m v^2/2 - k x^2/2`.
 #[derive(Clone, Copy, Debug)]
-#[allow(dead_code)] // Some test files do not use it.
 pub struct Heavy {
     pub m: f64,
     pub k: f64,
