@@ -3,15 +3,17 @@
 
 use crate::breaks::Kinks;
 use crate::drag::ProvedForce;
+use crate::evaluation::At;
 use crate::formula::index;
 use crate::node::Inputs;
 use crate::parametric_nodes::ParametricNodes;
 use crate::parser::MOST_NODES;
 use crate::resets::DerivedReset;
-use crate::structure::{Partials, kinks, proved};
+use crate::structure::{Partials, is_split, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
-use contact_geom::Structure;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{HamiltonianStructure, Hessian, Scalar, Structure};
 
 /// The maximum number of nodes of a formula with its gradient. Reverse accumulation adds a few nodes for each node of
 /// the formula, so that only formulas close to their own bound exceed it.
@@ -60,6 +62,8 @@ pub(crate) struct Derived {
     pub proved_force: ProvedForce,
     /// The proved structure of the Lagrangian without the forces.
     pub unforced: Structure,
+    /// That of a Hamiltonian; no claims for a Lagrangian.
+    pub of_hamiltonian: HamiltonianStructure,
 }
 
 impl Derived {
@@ -104,9 +108,16 @@ impl Derived {
         let (q, v) = partials.split_at(n);
         let (v, z) = v.split_at(n);
         let z = z.first().copied().unwrap_or(root);
-        let structure = {
-            let partials = Partials { value: root, q, v, z, second: &of_motion, mass: &mass };
-            proved(&mut graph, &partials, &constants)
+        let partials_of_value = Partials { value: root, q, v, z, second: &of_motion, mass: &mass };
+        let structure = proved(&mut graph, &partials_of_value, &constants);
+        let of_hamiltonian = match formula.is_hamiltonian() {
+            true => HamiltonianStructure {
+                separable: is_split(&graph, &partials_of_value),
+                degree: graph.degree_in_momenta(root),
+                homogeneous: graph.is_homogeneous_in_momenta(root),
+                ..HamiltonianStructure::default()
+            },
+            false => HamiltonianStructure::default(),
         };
         let (mass, second) = (Tape::new(&graph, &mass, n), Tape::new(&graph, &all, n));
         let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large.clone()) };
@@ -153,6 +164,7 @@ impl Derived {
             applied_nodes,
             proved_force,
             unforced: structure,
+            of_hamiltonian,
         };
         derived.set_constants();
         Ok(derived)
@@ -174,6 +186,25 @@ impl Derived {
         self.set_constants();
     }
 
+    /// The derivative in z, if it is proved to be constant.
+    pub fn constant_rate(&self) -> Option<f64> {
+        let Derived { formula, structure, partials, .. } = self;
+        let rate = partials.last().filter(|_| structure.constant_rate || structure.z_free)?;
+        formula.graph.constants(&formula.values).get(rate.index()).copied()
+    }
+
+    /// All second derivatives at a point of N coordinates.
+    #[inline(always)]
+    pub fn hessian<T: Scalar, const N: usize>(&self, at: At<'_, T>) -> Hessian<N, T> {
+        let matrix = SMatrix::<T, N, N>::from_element(at.z);
+        let vector = SVector::<T, N>::from_element(at.z);
+        let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: vector, vz: vector, zz: at.z };
+        let [qq, qv, vv] = [&mut h.qq, &mut h.qv, &mut h.vv].map(|m| m.as_mut_slice());
+        let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
+        self.second.evaluate::<T, N>(at, results);
+        h
+    }
+
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
         let Derived { value, force, with_force, gradient, rate, with_gradient, mass, second, switching, .. } =
@@ -191,6 +222,9 @@ impl Derived {
         let rate = rate.and_then(|z| constants.get(z.index()));
         let unforced = Structure { z_free: rate == Some(&0.0), ..self.unforced };
         self.structure = self.proved_force.structure(unforced);
+        let Structure { autonomous, z_free, z_affine, constant_rate, .. } = self.structure;
+        self.of_hamiltonian =
+            HamiltonianStructure { autonomous, z_free, z_affine, constant_rate, ..self.of_hamiltonian };
     }
 }
 

@@ -70,6 +70,28 @@ pub enum FormulaError {
         /// The reason.
         why: &'static str,
     },
+    /// The number of names of momenta is not that of the coordinates.
+    #[error(
+        "there are names of {found} momenta for {expected} coordinates; give one for each coordinate, or none, so that \
+         they are `p_x` for `x`"
+    )]
+    Momenta {
+        /// The number of momenta.
+        found: usize,
+        /// The number of coordinates.
+        expected: usize,
+    },
+    /// A Lagrangian, or something that only a Lagrangian has, was requested of a Hamiltonian.
+    #[error("the formula is a Hamiltonian, which has no {what}; {remedy}")]
+    IsHamiltonian {
+        /// What was requested.
+        what: &'static str,
+        /// The remedy.
+        remedy: &'static str,
+    },
+    /// A Hamiltonian was requested of a Lagrangian.
+    #[error("the formula is a Lagrangian; parse a Hamiltonian with `Formula::parse_hamiltonian`")]
+    IsLagrangian,
     /// The number of coordinates is outside the range that is compiled.
     #[error(
         "the formula has {found} coordinates; it can have from 1 to {MOST_COORDINATES}. Use a lattice or bodies for \

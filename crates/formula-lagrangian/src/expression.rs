@@ -15,7 +15,8 @@ use contact_geom::Scalar;
 /// which is `v L_v - L` and contains all terms of `L`, also those in z (`-gamma*z` for a drag `gamma*z`); `p_x`, the
 /// momentum `L_v` of a coordinate `x` (`p_q[0]` in an array); `log_factor`, the integral of `L_z` along the motion
 /// since its start; and `sigma`, its exponential, the conformal factor. The last two are not functions of the state,
-/// see [`at_factor`](Self::at_factor).
+/// see [`at_factor`](Self::at_factor). An expression that belongs to a Hamiltonian is evaluated at (t, q, p, z), in it
+/// `x'` is `H_p`, and `energy` is H.
 ///
 /// ```
 /// use formula_lagrangian::Formula;
@@ -94,7 +95,12 @@ impl Expression {
         self.log_factor
     }
 
-    /// Whether the expression depends on velocities.
+    /// Whether it belongs to a Hamiltonian: it is then evaluated at momenta in the place of velocities.
+    pub fn is_of_hamiltonian(&self) -> bool {
+        self.names.are_of_hamiltonian()
+    }
+
+    /// Whether the expression depends on velocities, or on momenta if it belongs to a Hamiltonian.
     pub fn has_velocity(&self) -> bool {
         self.inputs.meets(Inputs::VELOCITY)
     }

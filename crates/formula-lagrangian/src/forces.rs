@@ -7,6 +7,9 @@ use crate::{Formula, FormulaError, Graph, Id};
 /// The name of Rayleigh's function in a text.
 pub(crate) const RAYLEIGH: &str = "rayleigh";
 
+/// What a Hamiltonian does not have, and what to do.
+const NO_FORCES: (&str, &str) = ("forces", "write drag as a term in the action, or give a Lagrangian with forces");
+
 /// The forces on the coordinates, and Rayleigh's function R, whose force is `-dR/dv`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Forces {
@@ -136,8 +139,9 @@ impl Formula {
     /// The same formula with forces on several coordinates; see [`with_force`](Self::with_force).
     ///
     /// # Errors
-    /// Those of [`with_force`](Self::with_force).
+    /// Those of [`with_force`](Self::with_force); [`FormulaError::IsHamiltonian`].
     pub fn with_forces(&self, forces: &[(&str, &str)]) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_FORCES.0, NO_FORCES.1)?;
         let mut formula = self.clone();
         for (coordinate, text) in forces {
             let mut graph = Graph::new();
@@ -166,6 +170,7 @@ impl Formula {
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
     pub fn with_rayleigh(&self, text: &str) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_FORCES.0, NO_FORCES.1)?;
         let mut formula = self.clone();
         let Formula { names, graph, .. } = &mut formula;
         let rayleigh = Parser::new(text, names, graph, ValueName::Any)?.program()?;
@@ -190,6 +195,7 @@ impl Formula {
     /// [`FormulaError::ForceTwice`]; [`FormulaError::Unknown`] if there are more forces than coordinates;
     /// [`FormulaError::ForeignNode`].
     pub fn with_force_nodes(mut self, forces: &[Option<Id>]) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_FORCES.0, NO_FORCES.1)?;
         let dimension = self.names.dimension;
         if forces.len() > dimension {
             return Err(FormulaError::Unknown { what: "force", index: dimension, count: dimension });
@@ -210,6 +216,7 @@ impl Formula {
     /// # Errors
     /// [`FormulaError::ForeignNode`].
     pub fn with_rayleigh_node(mut self, rayleigh: Id) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_FORCES.0, NO_FORCES.1)?;
         self.check_node(rayleigh)?;
         self.add_rayleigh(rayleigh);
         Ok(self)

@@ -1,16 +1,17 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
 use crate::forces::Forces;
-use crate::names::Names;
+use crate::names::{FormulaNames, Names};
+use crate::node::Inputs;
 use crate::parser::{MOST_NODES, Parser, ValueName};
 use crate::resets::FormulaReset;
-use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
+use crate::{Expression, FormulaError, FormulaHamiltonian, FormulaLagrangian, Graph, Id, Node};
 
-/// A Lagrangian `L(t, q, v, z)` that is given at run time: an expression of coordinates, velocities, z, t and
-/// parameters, with names chosen by the user.
+/// A Lagrangian `L(t, q, v, z)` or a contact Hamiltonian `H(t, q, p, z)` that is given at run time: an expression of
+/// coordinates, velocities or momenta, z, t and parameters, with names chosen by the user.
 ///
 /// The language is described in the [crate's documentation](crate). [`lagrangian`](Self::lagrangian) returns the
-/// Lagrangian for integrators.
+/// Lagrangian for integrators, [`hamiltonian`](Self::hamiltonian) the Hamiltonian.
 ///
 /// ```
 /// use formula_lagrangian::Formula;
@@ -40,20 +41,45 @@ impl Formula {
     /// [`FormulaError::Parse`] with the position in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
     /// [`FormulaError::ParameterValue`] if a name, the number of coordinates or a value is invalid.
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        Self::unparsed(coordinates, parameters)?.parsed(text)
+        Self::parse_lagrangian(text, &FormulaNames::new(coordinates, parameters))
     }
 
-    /// A formula over some names, the Lagrangian of which is 0.
-    pub(crate) fn unparsed(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let values = parameters.iter().map(|(_, value)| *value).collect();
-        Ok(Self::new(Graph::new(), Id(0), Names::new(coordinates, parameters)?, values))
+    /// Parses a text over all kinds of names: also with tables, and with an action that is not named z.
+    ///
+    /// # Errors
+    /// Those of [`parse`](Self::parse).
+    pub fn parse_lagrangian(text: &str, names: &FormulaNames<'_>) -> Result<Self, FormulaError> {
+        Self::of_text(text, names, false)
     }
 
-    /// The formula with the Lagrangian and the forces of a text.
-    pub(crate) fn parsed(mut self, text: &str) -> Result<Self, FormulaError> {
-        let Formula { names, graph, root, forces, .. } = &mut self;
+    /// Parses the text of a contact Hamiltonian `H(t, q, p, z)`, in which the momentum of `x` is `p_x`, or has the name
+    /// that is given. `p[0]` is the momentum with the index 0, whatever its name. There are no velocities and no forces.
+    ///
+    /// ```
+    /// use contact_geom::{HamiltonianDerivatives, PhasePoint};
+    /// use formula_lagrangian::{Formula, FormulaNames};
+    /// let names = FormulaNames::new(&["x"], &[("gamma", -0.1)]);
+    /// let oscillator = Formula::parse_hamiltonian("p_x^2/2 + x^2/2 - gamma*z", &names)?;
+    /// let field = oscillator.hamiltonian::<1>()?.contact_field(0.0, &PhasePoint::new([1.0], [2.0], 0.0));
+    /// assert_eq!((field.x[0], field.y[0]), (2.0, -1.2)); // x' = p, p' = -x + gamma p
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`parse`](Self::parse), and [`FormulaError::Momenta`].
+    pub fn parse_hamiltonian(text: &str, names: &FormulaNames<'_>) -> Result<Self, FormulaError> {
+        Self::of_text(text, names, true)
+    }
+
+    fn of_text(text: &str, names: &FormulaNames<'_>, hamiltonian: bool) -> Result<Self, FormulaError> {
+        let values = names.parameters.iter().map(|(_, value)| *value).collect();
+        let mut formula = Self::new(Graph::new(), Id(0), Names::of(names, hamiltonian)?, values);
+        for (name, table) in names.tables {
+            formula.add_table(name, table)?;
+        }
+        let Formula { names, graph, root, forces, .. } = &mut formula;
         (*root, *forces) = Parser::parse_formula(text, names, graph)?;
-        Ok(self)
+        Ok(formula)
     }
 
     fn new(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Self {
@@ -94,11 +120,21 @@ impl Formula {
         Ok(Self::new(graph, root, names, values))
     }
 
+    /// A contact Hamiltonian that is built by a program; [`Graph::velocity`] is the momentum.
+    ///
+    /// # Errors
+    /// Those of [`from_graph`](Self::from_graph), and [`FormulaError::Momenta`].
+    pub fn hamiltonian_from_graph(graph: Graph, root: Id, names: &FormulaNames<'_>) -> Result<Self, FormulaError> {
+        let values = names.parameters.iter().map(|(_, value)| *value).collect();
+        Self::named(graph, root, Names::of(names, true)?, values)
+    }
+
     /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for
     /// each dimension, for all formulas.
     ///
     /// # Errors
-    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`].
+    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`],
+    /// [`FormulaError::IsHamiltonian`].
     pub fn lagrangian<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
         FormulaLagrangian::new(self)
     }
@@ -120,12 +156,30 @@ impl Formula {
         FormulaLagrangian::within(self)
     }
 
+    /// The contact Hamiltonian for integrators, with its derivatives and its proved structure.
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`],
+    /// [`FormulaError::IsLagrangian`].
+    pub fn hamiltonian<const N: usize>(&self) -> Result<FormulaHamiltonian<N>, FormulaError> {
+        FormulaHamiltonian::new(self)
+    }
+
+    /// The same with at least as many coordinates. `p^2/2` is added for each one beyond those of the formula, which
+    /// stays at rest if it starts at rest.
+    ///
+    /// # Errors
+    /// Those of [`hamiltonian`](Self::hamiltonian); the formula may have less than `N` coordinates.
+    pub fn hamiltonian_within<const N: usize>(&self) -> Result<FormulaHamiltonian<N>, FormulaError> {
+        FormulaHamiltonian::within(self)
+    }
+
     /// Another expression over the same names, such as the function of an event.
     ///
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
     pub fn expression(&self, text: &str) -> Result<Expression, FormulaError> {
-        Expression::parse(self, text, ValueName::Lagrangian)
+        Expression::parse(self, text, ValueName::Function)
     }
 
     /// The same, where the value may have a name that is not in use, as in `E = x'^2/2 + x^2/2`.
@@ -146,6 +200,26 @@ impl Formula {
         self.names.coordinates().collect()
     }
 
+    /// The names of the momenta in their order, such as `p_x` or `p_q[0]`.
+    pub fn momenta(&self) -> Vec<String> {
+        self.names.momenta()
+    }
+
+    /// The name of the action: `z` unless another one was given.
+    pub fn action(&self) -> &str {
+        &self.names.action
+    }
+
+    /// Whether it is a Hamiltonian, and not a Lagrangian.
+    pub fn is_hamiltonian(&self) -> bool {
+        self.names.are_of_hamiltonian()
+    }
+
+    /// Whether L or H depends on the action.
+    pub fn has_action(&self) -> bool {
+        self.graph.inputs(self.root).meets(Inputs::ACTION)
+    }
+
     /// The parameters with their values, in their order.
     pub fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
@@ -159,6 +233,11 @@ impl Formula {
             nodes.any(|id| self.graph.node(id) == Node::Parameter(i as u32))
         };
         self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
+    }
+
+    /// Refuses what only a Lagrangian has.
+    pub(crate) fn check_is_lagrangian(&self, what: &'static str, remedy: &'static str) -> Result<(), FormulaError> {
+        if self.is_hamiltonian() { Err(FormulaError::IsHamiltonian { what, remedy }) } else { Ok(()) }
     }
 
     /// The nodes of all that the formula consists of.

@@ -2,7 +2,7 @@
 
 use crate::evaluation::At;
 use crate::node::Inputs;
-use crate::resets::{Change, Direction, FormulaReset};
+use crate::resets::{Change, Direction, FormulaReset, NO_RESETS};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, FormulaLagrangian, Graph, Id};
 use contact_geom::VelocityPoint;
@@ -68,6 +68,7 @@ impl Formula {
     /// Those of [`with_reset`](Self::with_reset); [`FormulaError::Impact`] if the function depends on velocities or z,
     /// or if the number of the law is outside its range.
     pub fn with_impact(&self, when: &str, law: Impact, rest: Option<&[(&str, &str)]>) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_RESETS.0, NO_RESETS.1)?;
         match law {
             Impact::Restitution(e) if !(0.0..=1.0).contains(&e) => {
                 return Err(FormulaError::Impact { why: "has a restitution outside of 0 to 1; give one within" });

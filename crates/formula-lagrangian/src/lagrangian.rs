@@ -48,6 +48,7 @@ impl<const N: usize> FormulaLagrangian<N> {
 
     /// See [`Formula::lagrangian_within`].
     pub(crate) fn within(formula: &Formula) -> Result<Self, FormulaError> {
+        formula.check_is_lagrangian("Lagrangian of its own", "use `Formula::hamiltonian`")?;
         if formula.dimension() > N {
             return Err(FormulaError::OtherDimension { found: formula.dimension(), asked: N });
         }
@@ -91,9 +92,7 @@ impl<const N: usize> FormulaLagrangian<N> {
 
     /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
     pub fn constant_rate(&self) -> Option<f64> {
-        let Derived { formula, structure, partials, .. } = &self.derived;
-        let rate = partials.last().filter(|_| structure.constant_rate || structure.z_free)?;
-        formula.graph.constants(&formula.values).get(rate.index()).copied()
+        self.derived.constant_rate()
     }
 
     /// The detected symmetries, whose momenta are multiplied by the conformal factor: translations along a coordinate
@@ -134,14 +133,14 @@ impl<const N: usize> FormulaLagrangian<N> {
 
 /// Zeros, into which results are written.
 #[inline(always)]
-fn blank<T: Scalar, const N: usize>() -> ChartVector<N, T> {
+pub(crate) fn blank<T: Scalar, const N: usize>() -> ChartVector<N, T> {
     let zero = SVector::from_fn(|_, _| T::zero());
     ChartVector { x: zero, y: zero, z: T::zero() }
 }
 
 /// See [`whole`].
 #[inline(always)]
-fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> ChartVector<N, T> {
+pub(crate) fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> ChartVector<N, T> {
     ChartVector { x: whole_vector(&g.x), y: whole_vector(&g.y), z: whole(g.z) }
 }
 
@@ -204,12 +203,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
-        let matrix = SMatrix::from_element(x.z);
-        let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x.q, vz: x.v, zz: x.z };
-        let [qq, qv, vv] = [&mut h.qq, &mut h.qv, &mut h.vv].map(|m| m.as_mut_slice());
-        let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
-        self.derived.second.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
-        Some(h)
+        Some(self.derived.hessian(At::new(t, &x.q, &x.v, x.z)))
     }
 
     fn structure(&self) -> Structure {

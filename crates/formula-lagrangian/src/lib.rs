@@ -1,4 +1,4 @@
-//! Lagrangians that are given as text, for all integrators.
+//! Lagrangians and contact Hamiltonians that are given as text, for all integrators.
 //!
 //! A formula is parsed into an expression graph, on which its first and second derivatives are computed symbolically.
 //! Both are compiled to straight-line register code, which is evaluated on floating-point numbers, dual numbers and the
@@ -27,7 +27,8 @@
 //! | `x`, `x'` | a coordinate by its name, and its velocity |
 //! | `q[0]`, `v[0]` | the coordinate with the index 0 and its velocity, whatever its name; indices start from 0 |
 //! | `u[i]`, `u'[i]` | entries of an array, given as the coordinate `"u[3]"` |
-//! | `z`, `t`, `pi`, `n` | the action, the time, 3.14159..., the number of coordinates |
+//! | `p_x`, `p[0]` | in a [Hamiltonian](#hamiltonians), the momentum of a coordinate, in place of its velocity |
+//! | `z`, `t`, `pi`, `n` | the action, or its [name](FormulaNames::action), the time, 3.14159..., the number of coordinates |
 //! | `r = sqrt(x^2 + y^2)` | a definition, on its own line or followed by `;`. The last line is the value L, with or without `L =`; the value of an output column may have any name |
 //! | `force[x] = -c*x'` | a line before L: the force on a coordinate, by its name or its index: `force[u[2]]`, `force[q[0]]`, `force[0]` |
 //! | `force[u[i]] = -c*u'[i]` | the forces on all entries of an array, if `i` has no other meaning; also `force[q[i]]` for all coordinates |
@@ -51,6 +52,26 @@
 //! `x^a` is a product for an integer a, a power of the square root for half of an odd integer, and `e^(a ln x)` if a
 //! depends on the state. `0*x` is 0, even if x is infinite. This and the collection of powers of two are the only
 //! rearrangements; [`Graph`] gives the exact rules.
+//!
+//! # Hamiltonians
+//!
+//! [`Formula::parse_hamiltonian`] parses a contact Hamiltonian `H(t, q, p, z)`, with `q' = H_p`, `p' = -H_q - p H_z`,
+//! `z' = p . H_p - H`. The momentum of `x` is `p_x`, or has a [name of its own](FormulaNames::momenta). The last line is
+//! the value H, with or without `H =`. There are no velocities, forces, breaks and resets, and kinks and jumps are not
+//! located. In the expressions that belong to it `x'` is `H_p`, and `energy` is H. [`FormulaHamiltonian`] is evaluated by
+//! the same code as [`FormulaLagrangian`].
+//!
+//! ```
+//! use contact_geom::{OfHamiltonian, PhasePoint};
+//! use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
+//! use formula_lagrangian::{Formula, FormulaNames};
+//! let h = Formula::parse_hamiltonian("-p_x*x^3 + k*z", &FormulaNames::new(&["x"], &[("k", 0.5)]))?;
+//! let h = OfHamiltonian(h.hamiltonian::<1>()?);
+//! let problem = Problem::of_hamiltonian(&h, 0.0, PhasePoint::new([1.0], [2.0], 0.0))?;
+//! let outcome = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(1.0))?;
+//! assert!((outcome.q[0] - 1.0 / 3.0_f64.sqrt()).abs() < 1e-14); // x' = -x^3
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Forces
 //!
@@ -92,6 +113,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod degrees;
 mod derivatives;
 mod derived;
 mod drag;
@@ -103,6 +125,7 @@ mod forces;
 mod formula;
 mod functions;
 mod graph;
+mod hamiltonian;
 mod hints;
 mod impacts;
 mod lagrangian;
@@ -128,7 +151,9 @@ pub use expression::Expression;
 pub use expression_gradient::ExpressionGradient;
 pub use formula::Formula;
 pub use graph::Graph;
+pub use hamiltonian::FormulaHamiltonian;
 pub use lagrangian::FormulaLagrangian;
+pub use names::FormulaNames;
 pub use node::{Function, Id, Node, Operation};
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
 pub use resets::{Direction, Reset, ResetNodes, Variable};

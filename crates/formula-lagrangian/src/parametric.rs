@@ -1,9 +1,9 @@
-//! Formulas as Lagrangians with named parameters.
+//! Formulas as Lagrangians and as contact Hamiltonians with named parameters.
 
-use crate::FormulaLagrangian;
 use crate::evaluation::At;
+use crate::{FormulaHamiltonian, FormulaLagrangian};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Parametric, Scalar, VelocityPoint};
+use contact_geom::{Parametric, ParametricHamiltonian, Scalar, VelocityPoint};
 
 /// The parameters of the formula in their order, also those that it does not use.
 ///
@@ -58,5 +58,34 @@ impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
             self.derived.parametric_force.evaluate(theta, at, force.as_mut_slice());
         }
         force
+    }
+}
+
+/// As for a [`FormulaLagrangian`].
+impl<const N: usize> ParametricHamiltonian<N> for FormulaHamiltonian<N> {
+    fn parameter_names(&self) -> Vec<String> {
+        self.derived.formula.names.parameters.clone()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        self.derived.formula.values.clone()
+    }
+
+    /// `None` also where a value is not finite.
+    fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        if theta.len() != self.derived.formula.values.len() || !theta.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let mut other = self.clone();
+        other.derived.set_all(theta);
+        Some(other)
+    }
+
+    #[inline(always)]
+    fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
+        let mut value = T::zero();
+        let at = At { q: q.as_slice(), v: p.as_slice(), z, t };
+        self.derived.parametric_value.evaluate(theta, at, std::slice::from_mut(&mut value));
+        value
     }
 }

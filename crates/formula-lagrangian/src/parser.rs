@@ -9,8 +9,8 @@ mod values;
 
 pub(crate) use targets::{Kind, Target};
 
-use crate::forces::Forces;
-use crate::names::{Names, is_reserved};
+use crate::forces::{Forces, RAYLEIGH};
+use crate::names::Names;
 use crate::token::{Token, Word, words};
 use crate::{Formula, Graph, Id, ParseError};
 
@@ -27,8 +27,8 @@ const MOST_WORDS: usize = 1_000_000;
 /// The name that the value at the end of a text may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ValueName {
-    /// `L` only.
-    Lagrangian,
+    /// `L` only, or `H` for a Hamiltonian.
+    Function,
     /// Any name that is not used otherwise.
     Any,
 }
@@ -79,10 +79,10 @@ impl<'a> Parser<'a> {
         })
     }
 
-    /// Parses the text of a Lagrangian, which may also have lines with forces.
+    /// Parses the text of a Lagrangian, which may also have lines with forces, or of a Hamiltonian.
     pub fn parse_formula(text: &'a str, names: &'a Names, graph: &'a mut Graph) -> Parsed<(Id, Forces)> {
-        let mut parser = Self::new(text, names, graph, ValueName::Lagrangian)?;
-        parser.forces = Some(Forces::default());
+        let mut parser = Self::new(text, names, graph, ValueName::Function)?;
+        parser.forces = (!names.are_of_hamiltonian()).then(Forces::default);
         let root = parser.program()?;
         Ok((root, parser.forces.take().unwrap_or_default()))
     }
@@ -120,7 +120,7 @@ impl<'a> Parser<'a> {
                 if !more {
                     if self.value_name == ValueName::Any {
                         self.define(name, first, value)?;
-                    } else if name != "L" {
+                    } else if name != self.names.letter() {
                         let message = format!("expected a value after the definition of `{name}`");
                         return Err(self.error(self.word(0), message));
                     }
@@ -154,8 +154,9 @@ impl<'a> Parser<'a> {
     }
 
     fn define(&mut self, name: &'a str, word: Word<'a>, value: Id) -> Parsed<()> {
-        let taken = is_reserved(name)
+        let taken = self.names.is_reserved(name)
             || self.names.blocks.iter().any(|b| b.name == name)
+            || self.names.momentum(name).is_some()
             || self.names.parameters.iter().any(|p| p == name)
             || self.names.table(name).is_some()
             || self.locals.iter().any(|(local, _)| *local == name);
@@ -163,6 +164,9 @@ impl<'a> Parser<'a> {
             return Err(
                 self.error(word, format!("the name `{name}` is in use; choose another name for this definition"))
             );
+        }
+        if name == RAYLEIGH && self.names.are_of_hamiltonian() {
+            return Err(self.error(word, "a Hamiltonian has no dissipation function: write the drag as a term in z"));
         }
         self.locals.push((name, value));
         Ok(())

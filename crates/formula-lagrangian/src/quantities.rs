@@ -14,7 +14,7 @@ const MOST_NODES_WITH_DERIVATIVES: usize = 10 * MOST_NODES;
 /// take precedence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Quantity {
-    /// `energy`: `v . L_v - L`.
+    /// `energy`: `v . L_v - L`, or H.
     Energy,
     /// `log_factor`: the logarithm of the conformal factor, the integral of `L_z` along the motion since its start.
     LogFactor,
@@ -22,6 +22,8 @@ pub(crate) enum Quantity {
     Sigma,
     /// `p_x`: the momentum `L_v` of the coordinate with this index.
     Momentum(u32),
+    /// `x'` beside a Hamiltonian: the velocity `H_p` of the coordinate with this index.
+    Velocity(u32),
 }
 
 /// The names except those of momenta.
@@ -36,7 +38,8 @@ impl Quantity {
 
     /// All names, those of the momenta of arrays without an index.
     pub fn names(names: &Names) -> impl Iterator<Item = String> {
-        let momenta = names.blocks.iter().map(|block| format!("p_{}", block.name));
+        let of_lagrangian = |_: &_| !names.are_of_hamiltonian();
+        let momenta = names.blocks.iter().filter(of_lagrangian).map(|block| format!("p_{}", block.name));
         NAMES.iter().map(|(name, _)| (*name).to_owned()).chain(momenta)
     }
 
@@ -44,15 +47,16 @@ impl Quantity {
     pub fn node(self, formula: &Formula, graph: &mut Graph) -> Option<Id> {
         let log_factor = log_factor(graph, formula.names.dimension);
         let (first, count) = match self {
+            Quantity::Energy if formula.is_hamiltonian() => return Some(graph.copied(&formula.graph, formula.root)),
             Quantity::LogFactor => return Some(log_factor),
             Quantity::Sigma => return Some(graph.unary(Function::Exp, log_factor)),
             Quantity::Energy => (0, formula.names.dimension),
-            Quantity::Momentum(i) => (i as usize, 1),
+            Quantity::Momentum(i) | Quantity::Velocity(i) => (i as usize, 1),
         };
         let value = graph.copied(&formula.graph, formula.root);
         let velocities: Vec<Id> = (first..first + count).map(|i| graph.velocity(i as u32)).collect();
         let momenta = graph.gradient(value, &velocities, MOST_NODES_WITH_DERIVATIVES)?;
-        if let Quantity::Momentum(_) = self {
+        if let Quantity::Momentum(_) | Quantity::Velocity(_) = self {
             return momenta.first().copied();
         }
         let mut sum = graph.number(0.0);

@@ -68,6 +68,10 @@ pub struct ResetNodes {
     pub rest: Option<Vec<(Variable, Id)>>,
 }
 
+/// What a Hamiltonian does not have, and what to do.
+pub(crate) const NO_RESETS: (&str, &str) =
+    ("resets", "end the run there by a terminal event and start from the new state, or give a Lagrangian");
+
 /// The change of the state at a reset.
 #[derive(Clone, Debug)]
 pub(crate) enum Change {
@@ -214,6 +218,7 @@ impl Formula {
     ///
     /// [`FormulaLagrangian::reset_of`]: crate::FormulaLagrangian::reset_of
     pub fn with_reset(&self, reset: Reset<'_>) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_RESETS.0, NO_RESETS.1)?;
         let mut formula = self.clone();
         let when = self.parse_beside(&mut formula.graph, reset.when, None)?;
         let then = self.assignments(&mut formula.graph, reset.then)?;
@@ -269,6 +274,7 @@ impl Formula {
     /// [`FormulaError::ForeignNode`]; [`FormulaError::Unknown`] if there is no such coordinate; [`FormulaError::Reset`]
     /// if nothing is assigned, if a variable is assigned twice, or if the function is constant.
     pub fn with_reset_nodes(mut self, reset: ResetNodes) -> Result<Self, FormulaError> {
+        self.check_is_lagrangian(NO_RESETS.0, NO_RESETS.1)?;
         let ResetNodes { when, direction, then, rest } = reset;
         let reset = FormulaReset { when, direction, change: Change::Assignment(then), rest };
         reset.roots().try_for_each(|id| self.check_node(id))?;

@@ -36,11 +36,7 @@ pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> 
     let constant_rate = no_action || z_affine && rate_inputs == In::NONE;
     let constant_mass = smooth_in(In::VELOCITY) && on(l.mass) == In::NONE;
     let quadratic = z_affine && smooth_in(state) && on(l.second).within(time);
-    let split = on(l.q).within(time.and(In::POSITION))
-        && on(l.v).within(In::VELOCITY)
-        && rate_inputs.within(time.and(In::ACTION))
-        && kinks.within(time.and(In::POSITION));
-    let separable = constant_mass && split && {
+    let separable = constant_mass && is_split(graph, l) && {
         let at_rest = l.v.iter().map(|p| graph.at_rest(*p)).collect::<Vec<_>>();
         at_rest.into_iter().all(|p| graph.as_number(p) == Some(0.0))
     };
@@ -53,6 +49,16 @@ pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> 
         quadratic,
         constant_mass,
     }
+}
+
+/// Whether the function is `T(y) + V(t, q) + f(t, z)`.
+pub(crate) fn is_split(graph: &Graph, l: &Partials<'_>) -> bool {
+    use Inputs as In;
+    let on = |ids: &[Id]| ids.iter().fold(In::NONE, |all, id| all.and(graph.inputs(*id)));
+    on(l.q).within(In::TIME.and(In::POSITION))
+        && on(l.v).within(In::VELOCITY)
+        && graph.inputs(l.z).within(In::TIME.and(In::ACTION))
+        && kinks(graph, l.value).within(In::TIME.and(In::POSITION))
 }
 
 /// The value of a constant node.

@@ -1,7 +1,7 @@
 //! Formulas that are built by a program with the operators of numbers.
 
 use crate::names::Names;
-use crate::{Formula, FormulaError, Function, Graph, Id, Operation};
+use crate::{Formula, FormulaError, FormulaNames, Function, Graph, Id, Operation};
 use contact_geom::table::Table;
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -46,8 +46,36 @@ impl Symbols {
     /// # Errors
     /// [`FormulaError::Name`], [`FormulaError::Dimension`], [`FormulaError::ParameterValue`].
     pub fn new(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
-        let values = parameters.iter().map(|(_, value)| *value).collect();
-        Ok(Symbols { shared: Rc::default(), names: Names::new(coordinates, parameters)?, values })
+        Self::of_names(&FormulaNames::new(coordinates, parameters), false)
+    }
+
+    /// The symbols of a formula over all kinds of names. Tables are not used: see [`Symbol::interpolate`].
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn of_lagrangian(names: &FormulaNames<'_>) -> Result<Self, FormulaError> {
+        Self::of_names(names, false)
+    }
+
+    /// The symbols of a contact Hamiltonian: the [velocity](Self::velocity) is the momentum.
+    ///
+    /// ```
+    /// use formula_lagrangian::{FormulaNames, Symbols};
+    /// let symbols = Symbols::of_hamiltonian(&FormulaNames::new(&["x"], &[]))?;
+    /// let (x, p) = (symbols.position(0), symbols.momentum(0));
+    /// assert!(symbols.formula(&(&p * &x))?.is_hamiltonian());
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new), and [`FormulaError::Momenta`].
+    pub fn of_hamiltonian(names: &FormulaNames<'_>) -> Result<Self, FormulaError> {
+        Self::of_names(names, true)
+    }
+
+    fn of_names(given: &FormulaNames<'_>, hamiltonian: bool) -> Result<Self, FormulaError> {
+        let values = given.parameters.iter().map(|(_, value)| *value).collect();
+        Ok(Symbols { shared: Rc::default(), names: Names::of(given, hamiltonian)?, values })
     }
 
     fn symbol(&self, node: impl FnOnce(&mut Graph) -> Id) -> Symbol {
@@ -63,6 +91,11 @@ impl Symbols {
     /// The velocity of a coordinate.
     pub fn velocity(&self, index: u32) -> Symbol {
         self.symbol(|graph| graph.velocity(index))
+    }
+
+    /// The momentum of a coordinate, for [a Hamiltonian](Self::of_hamiltonian).
+    pub fn momentum(&self, index: u32) -> Symbol {
+        self.velocity(index)
     }
 
     /// The action z.
@@ -89,7 +122,7 @@ impl Symbols {
         Ok(self.symbol(|graph| graph.parameter(index as u32)))
     }
 
-    /// The formula whose Lagrangian is the given symbol.
+    /// The formula whose Lagrangian, or Hamiltonian, is the given symbol.
     ///
     /// # Errors
     /// [`FormulaError::Mixed`] if the symbol, or an operand of it, belongs to other [`Symbols`];

@@ -1,6 +1,6 @@
 //! Tables in expressions.
 
-use crate::{Formula, FormulaError, Graph, Id, Node};
+use crate::{Formula, FormulaError, FormulaNames, Graph, Id, Node};
 use contact_geom::table::Table;
 
 /// A table with its name in texts.
@@ -79,11 +79,7 @@ impl Formula {
         parameters: &[(&str, f64)],
         tables: &[(&str, Table)],
     ) -> Result<Self, FormulaError> {
-        let mut formula = Self::unparsed(coordinates, parameters)?;
-        for (name, table) in tables {
-            formula.add_table(name, table)?;
-        }
-        formula.parsed(text)
+        Self::parse_lagrangian(text, &FormulaNames { tables, ..FormulaNames::new(coordinates, parameters) })
     }
 
     /// The same formula with one more table for the texts that are parsed with it later: forces, resets, and other
@@ -97,7 +93,7 @@ impl Formula {
         Ok(formula)
     }
 
-    fn add_table(&mut self, name: &str, table: &Table) -> Result<(), FormulaError> {
+    pub(crate) fn add_table(&mut self, name: &str, table: &Table) -> Result<(), FormulaError> {
         self.names.check(name)?;
         let index = self.graph.add_table(table);
         self.names.tables.push(NamedTable { name: name.to_owned(), index });

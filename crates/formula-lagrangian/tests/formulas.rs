@@ -7,6 +7,7 @@ mod accuracy;
 mod derivatives;
 mod forces;
 mod friction;
+mod hamiltonians;
 mod impacts;
 mod invalid_input;
 mod language;

@@ -77,7 +77,9 @@ fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[V
     }
     let portraits = (0..dimension).filter_map(|k| {
         let q = position(&|column| matches!(column, Column::Position(i) if *i == k))?;
-        let v = position(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
+        let v = position(&|column| matches!(column, Column::Velocity(i) if *i == k));
+        // The portrait of a Hamiltonian is that of positions and momenta.
+        let v = v.or_else(|| position(&|column| matches!(column, Column::Momentum(i) if *i == k)))?;
         of_pair(q, v)
     });
     let panels: Vec<Panel> = portraits.collect();

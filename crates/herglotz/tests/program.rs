@@ -266,6 +266,37 @@ fn checks_have_lyapunov_exponents() {
     assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{said}");
 }
 
+/// The defects of the modified Hamiltonians of order k fall as `h^(k+1)`, for a Hamiltonian and for a Lagrangian; a system
+/// that depends on time is refused.
+#[test]
+fn checks_have_modified_hamiltonians() {
+    let at = Directory::new("modified");
+    for (name, system) in [
+        ("hamiltonian", "hamiltonian = \"p_x^2/2 + cos(x) + z/5 + z^2/10\""),
+        ("lagrangian", "lagrangian = \"x'^2/2 - cos(x) - z/5 - z^2/10\""),
+    ] {
+        let text = format!(
+            "version = 1\n[system]\ncoordinates = [\"x\"]\n{system}\n[start]\nx = 0.4\n\"x'\" = 0.7\n\
+             [run]\ntime = 4.0\nintegrator = \"gauss_1\"\nstep = 0.05\n"
+        );
+        let file = at.write(&format!("{name}.toml"), &text);
+        let found: serde_json::Value =
+            serde_json::from_str(&succeed(&["check", &file, "--places", "1", "--modified", "--json"])).unwrap();
+        let defect = |k: u64, h: f64| {
+            let mut all = found["modified"].as_array().unwrap().iter();
+            let one = all.find(|of| of["k"].as_u64() == Some(k) && of["h"].as_f64() == Some(h)).unwrap();
+            one["defect"].as_f64().unwrap()
+        };
+        for k in 1..=6 {
+            let slope = (defect(k, 0.025) / defect(k, 0.0125)).log2();
+            assert!((slope - (k + 1) as f64).abs() < 0.15, "{name}, {k}: {slope}");
+        }
+        assert!(succeed(&["check", &file, "--places", "1", "--modified"]).contains("h = 0.0125"), "{name}");
+    }
+    let (_, said) = fail(&["check", &scene("duffing"), "--places", "1", "--modified"]);
+    assert!(said.contains("autonomous"), "{said}");
+}
+
 #[test]
 fn lists_templates_and_completions_are_complete() {
     let systems: serde_json::Value = serde_json::from_str(&succeed(&["list", "systems", "--json"])).unwrap();
@@ -305,7 +336,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 18, "{names:?}");
+    assert_eq!(names.len(), 26, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
@@ -314,6 +345,38 @@ fn scenes_run() {
     for (t, log_factor) in column(&field, "t").iter().zip(column(&field, "log_factor")) {
         assert!((log_factor + 2.0 * t.ln()).abs() < 1e-9, "{t}");
     }
+    // A path of light in closed form, a bracket that is dissipated, and a fall with an action that is not named z.
+    let off = column(&at.read("ray/rows.csv"), "off");
+    assert!(off.iter().all(|x| x.abs() < 1e-12), "{off:?}");
+    let kept = column(&at.read("van_der_pol/rows.csv"), "exp(k*t)*(energy - k*z)");
+    // The error 1e-10 of (q, p) is multiplied by e^8.
+    assert!(kept.iter().all(|x| (x + 1.0).abs() < 1e-5), "{kept:?}");
+    // Two containers: the published state at t = 30.
+    let rows = at.read("containers/rows.csv");
+    for (name, published) in [
+        ("q", 1.16581228326),
+        ("p", -0.53388914243),
+        ("E1", 2.63142893086),
+        ("E2", 3.22605226094),
+        ("S", 1.10085901608),
+    ] {
+        let last = *column(&rows, name).last().unwrap();
+        assert!((last - published).abs() < 1e-10, "{name}: {last}");
+    }
+    // Density times volume, the radius of a polytrope, a factor in closed form and the capture, the rate of an optimizer.
+    let kept = column(&at.read("thermostat/rows.csv"), "invariant");
+    assert!(kept.iter().all(|x| (x - kept[0]).abs() < 1e-9), "{kept:?}");
+    let surface = *column(&at.read("lane_emden/events.csv"), "t").last().unwrap();
+    assert!((surface - 3.65375374).abs() < 1e-8, "{surface}");
+    let rows = at.read("spin_orbit/rows.csv");
+    assert!(column(&rows, "off").iter().all(|x| x.abs() < 1e-9));
+    assert!(column(&rows, "p_q").iter().rev().take(100).all(|p| (p - 1.0).abs() < 0.16));
+    let rows = at.read("optimizer/rows.csv");
+    for (t, factor) in column(&rows, "t").iter().zip(column(&rows, "log_factor")) {
+        assert!((factor + 3.0 * (t / 0.5).ln()).abs() < 1e-9, "{factor} at {t}");
+    }
+    assert!(*column(&rows, "log_f").last().unwrap() < -3.0 * 20.0_f64.ln());
+    assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
 }
 
 /// A comparison names the best integrator for each error, and shorter steps have smaller errors.

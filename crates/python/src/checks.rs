@@ -4,7 +4,7 @@ use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz::runtime::{Interrupt, Start};
+use herglotz::runtime::{InitialVelocity, Interrupt, Start};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::atomic::Ordering;
@@ -29,6 +29,30 @@ pub fn geometry<'py>(
     all.set_item("reeb", found.reeb)?;
     all.set_item("volume", found.volume)?;
     all.set_item("herglotz_field", found.herglotz_field)?;
+    Ok(all)
+}
+
+/// The contact geometry of a Hamiltonian at a time and a point, by name.
+#[pyfunction]
+pub fn hamiltonian_geometry<'py>(
+    py: Python<'py>,
+    system: &System,
+    at: (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+) -> PyResult<Bound<'py, PyDict>> {
+    let velocity = InitialVelocity::Momentum(numbers("p", &at.2)?);
+    let start = Start { t: number("t", &at.0)?, q: numbers("q", &at.1)?, velocity, z: number("z", &at.3)? };
+    let found = system.inner.hamiltonian_geometry(&start).map_err(value_error)?;
+    let all = PyDict::new(py);
+    all.set_item("hamiltonian", found.hamiltonian)?;
+    all.set_item("velocity", found.velocity)?;
+    all.set_item("rate", found.rate)?;
+    all.set_item("hessian", found.hessian)?;
+    all.set_item("condition", found.condition)?;
+    all.set_item("eta", found.eta)?;
+    all.set_item("reeb", found.reeb)?;
+    all.set_item("field", found.field)?;
+    all.set_item("lie_derivative", found.lie_derivative)?;
+    all.set_item("brackets", found.brackets)?;
     Ok(all)
 }
 

@@ -30,7 +30,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use crate::checks::{check, compare, geometry};
+    use crate::checks::{check, compare, geometry, hamiltonian_geometry};
     #[pymodule_export]
     use crate::condition::Condition;
     #[pymodule_export]
@@ -60,7 +60,7 @@ mod _core {
     #[pymodule_export]
     use crate::symbol::Symbol;
     #[pymodule_export]
-    use crate::system::{System, velocity_names};
+    use crate::system::{System, momentum_names, velocity_names};
     #[pymodule_export]
     use crate::table::Table;
     #[pymodule_export]

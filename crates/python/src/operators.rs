@@ -187,10 +187,17 @@ impl Symbol {
     }
 
     /// The value as an expression in the names of coordinates, velocities and parameters.
-    fn text(&self, coordinates: Vec<String>, velocities: Vec<String>, parameters: Vec<String>) -> PyResult<String> {
+    #[pyo3(signature = (coordinates, velocities, parameters, action = "z".to_owned()))]
+    fn text(
+        &self,
+        coordinates: Vec<String>,
+        velocities: Vec<String>,
+        parameters: Vec<String>,
+        action: String,
+    ) -> PyResult<String> {
         let graph = self.shared.graph();
         let tables = graph.tables().iter().map(name_of).collect();
-        let names = text::Names { coordinates, velocities, parameters, tables };
+        let names = text::Names { coordinates, velocities, parameters, tables, action };
         Ok(text::text(&graph, self.id, &names))
     }
 

@@ -3,17 +3,18 @@
 use crate::arrays::value_error;
 use crate::table::Table;
 use contact_geom::table::Table as Samples;
-use herglotz::runtime::{Formula, FormulaSymmetry};
+use herglotz::runtime::{Formula, FormulaError, FormulaNames, FormulaSymmetry};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
-/// A Lagrangian with all that integrators need.
+/// A Lagrangian, or a contact Hamiltonian, with all that integrators need.
 #[pyclass(frozen, module = "herglotz")]
 pub struct System {
     pub inner: herglotz::runtime::System,
     /// The formula before it is differentiated, to which resets are added.
     pub formula: Formula,
     additions: Additions,
+    kind: Kind,
     /// The text of the formula.
     #[pyo3(get)]
     lagrangian: String,
@@ -35,17 +36,37 @@ struct Additions {
     breaks: Vec<f64>,
 }
 
+/// Whether the formula is a Hamiltonian, the names of its momenta as they were given, and the name of the action.
+#[derive(Clone)]
+struct Kind {
+    hamiltonian: bool,
+    momenta: Vec<String>,
+    action: String,
+}
+
+impl Kind {
+    fn formula(&self, text: &str, names: FormulaNames<'_>) -> Result<Formula, FormulaError> {
+        let momenta = texts(&self.momenta);
+        let names = FormulaNames { momenta: &momenta, action: &self.action, ..names };
+        if self.hamiltonian {
+            Formula::parse_hamiltonian(text, &names)
+        } else {
+            Formula::parse_lagrangian(text, &names)
+        }
+    }
+}
+
 impl Additions {
     fn named_tables(&self) -> Vec<(String, Table)> {
         self.tables.iter().map(|(name, table)| (name.clone(), Table::from(table.clone()))).collect()
     }
 
-    /// The formula of a Lagrangian with them.
-    fn formula(&self, lagrangian: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> PyResult<Formula> {
+    /// The formula of a text with them.
+    fn formula(&self, kind: &Kind, text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> PyResult<Formula> {
         let tables: Vec<(&str, Samples)> =
             self.tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
-        let mut formula =
-            Formula::parse_with_tables(lagrangian, coordinates, parameters, &tables).map_err(value_error)?;
+        let names = FormulaNames { tables: &tables, ..FormulaNames::new(coordinates, parameters) };
+        let mut formula = kind.formula(text, names).map_err(value_error)?;
         for (coordinate, text) in &self.forces {
             let with = formula.with_force(coordinate, text);
             formula = with.map_err(|error| value_error(format!("the force on {coordinate:?}: {error}")))?;
@@ -61,8 +82,19 @@ impl Additions {
 type Reduced<'py> = (Bound<'py, PyType>, Arguments<'py>);
 
 /// The arguments of a system.
-type Arguments<'py> =
-    (String, Vec<String>, Bound<'py, PyDict>, Vec<(String, Table)>, Vec<(String, String)>, Vec<String>, Vec<f64>);
+type Arguments<'py> = (
+    String,
+    Vec<String>,
+    Bound<'py, PyDict>,
+    Vec<(String, Table)>,
+    Vec<(String, String)>,
+    Vec<String>,
+    Vec<f64>,
+    GivenKind,
+);
+
+/// Whether the text is a Hamiltonian, the names of the momenta, and that of the action.
+type GivenKind = (bool, Vec<String>, String);
 
 /// String slices of strings.
 fn texts(of: &[String]) -> Vec<&str> {
@@ -85,7 +117,8 @@ pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
 impl System {
     #[new]
     #[pyo3(signature = (lagrangian, coordinates, parameters = None, tables = Vec::new(), forces = Vec::new(),
-                        rayleigh = Vec::new(), breaks = Vec::new()))]
+                        rayleigh = Vec::new(), breaks = Vec::new(), kind = None))]
+    #[expect(clippy::too_many_arguments, reason = "they are those of `system`, which names them")]
     fn new(
         lagrangian: String,
         coordinates: Vec<String>,
@@ -94,14 +127,17 @@ impl System {
         forces: Vec<(String, String)>,
         rayleigh: Vec<String>,
         breaks: Vec<f64>,
+        kind: Option<GivenKind>,
     ) -> PyResult<Self> {
+        let (hamiltonian, momenta, action) = kind.unwrap_or_else(|| (false, Vec::new(), "z".to_owned()));
+        let kind = Kind { hamiltonian, momenta, action };
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let tables = tables.into_iter().map(|(name, table)| (name, table.get().inner.clone())).collect();
         let additions = Additions { tables, forces, rayleigh, breaks };
-        let formula = additions.formula(&lagrangian, &texts(&coordinates), &values)?;
+        let formula = additions.formula(&kind, &lagrangian, &texts(&coordinates), &values)?;
         let inner = herglotz::runtime::System::new(&formula).map_err(value_error)?;
-        Ok(System { inner, formula, additions, lagrangian, given_coordinates: coordinates })
+        Ok(System { inner, formula, additions, kind, lagrangian, given_coordinates: coordinates })
     }
 
     /// The tables with their names in texts.
@@ -134,6 +170,19 @@ impl System {
         self.inner.losses().iter().map(|(what, why)| format!("{what}: {why}")).collect()
     }
 
+    /// Whether it is a Hamiltonian, the names of the momenta as they were given, and that of the action.
+    #[getter]
+    fn kind(&self) -> GivenKind {
+        let Kind { hamiltonian, momenta, action } = self.kind.clone();
+        (hamiltonian, momenta, action)
+    }
+
+    /// The names of the momenta.
+    #[getter]
+    fn momenta(&self) -> Vec<String> {
+        self.inner.formula().momenta()
+    }
+
     /// The names of the coordinates.
     #[getter]
     fn coordinates(&self) -> Vec<String> {
@@ -159,7 +208,8 @@ impl System {
         let Additions { forces, rayleigh, breaks, .. } = this.additions.clone();
         let (text, coordinates) = (this.lagrangian.clone(), this.given_coordinates.clone());
         let tables = this.tables();
-        Ok((slf.get_type(), (text, coordinates, this.parameters(py)?, tables, forces, rayleigh, breaks)))
+        let parameters = this.parameters(py)?;
+        Ok((slf.get_type(), (text, coordinates, parameters, tables, forces, rayleigh, breaks, this.kind())))
     }
 
     fn __repr__(&self) -> String {
@@ -180,6 +230,9 @@ impl System {
         if !breaks.is_empty() {
             text += &format!(", breaks={breaks:?}");
         }
+        if self.kind.hamiltonian || self.kind.action != "z" {
+            text += &format!(", kind={:?}", self.kind());
+        }
         text + ")"
     }
 
@@ -191,7 +244,8 @@ impl System {
         let mut formula = self.formula.clone();
         values.iter().try_for_each(|(name, value)| formula.set(name, *value)).map_err(value_error)?;
         let (lagrangian, given_coordinates) = (self.lagrangian.clone(), self.given_coordinates.clone());
-        Ok(System { inner, formula, additions: self.additions.clone(), lagrangian, given_coordinates })
+        let (additions, kind) = (self.additions.clone(), self.kind.clone());
+        Ok(System { inner, formula, additions, kind, lagrangian, given_coordinates })
     }
 
     /// The number of coordinates.
@@ -203,6 +257,19 @@ impl System {
     /// The properties that are proved from the formula, by name.
     #[getter]
     fn structure(&self) -> Vec<&'static str> {
+        if let Some(s) = self.inner.hamiltonian_structure() {
+            let all = [
+                ("autonomous", s.autonomous),
+                ("z_free", s.z_free),
+                ("z_affine", s.z_affine),
+                ("constant_rate", s.constant_rate),
+                ("separable", s.separable),
+                ("polynomial", s.degree.is_some()),
+                ("homogeneous", s.homogeneous),
+                ("smooth", self.inner.is_smooth()),
+            ];
+            return all.into_iter().filter(|(_, holds)| *holds).map(|(name, _)| name).collect();
+        }
         let s = self.inner.structure();
         let all = [
             ("autonomous", s.autonomous),
@@ -239,8 +306,20 @@ impl System {
 #[pyfunction]
 pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<String>)> {
     // The names are expanded by parsing a formula.
-    let formula = Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
+    let coordinates = texts(&coordinates);
+    // The action has a name that no user gives: its clash with a coordinate is found with the system.
+    let names = FormulaNames { action: "_action", ..FormulaNames::new(&coordinates, &[]) };
+    let formula = Formula::parse_lagrangian("0", &names).map_err(value_error)?;
     let names = formula.coordinates();
     let velocities = names.iter().map(|name| herglotz::runtime::velocity_name(name)).collect();
     Ok((names, velocities))
+}
+
+/// The names of all momenta of a Hamiltonian; arrays are expanded.
+#[pyfunction]
+pub fn momentum_names(coordinates: Vec<String>, momenta: Vec<String>) -> PyResult<Vec<String>> {
+    let (coordinates, momenta) = (texts(&coordinates), texts(&momenta));
+    // The action has a name that no user gives, so that it does not clash here.
+    let names = FormulaNames { momenta: &momenta, action: "_action", ..FormulaNames::new(&coordinates, &[]) };
+    Ok(Formula::parse_hamiltonian("0", &names).map_err(value_error)?.momenta())
 }

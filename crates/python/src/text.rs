@@ -7,9 +7,12 @@ use std::fmt::Write;
 /// The names of the variables that a graph refers to by index.
 pub struct Names {
     pub coordinates: Vec<String>,
+    /// The velocities, or the momenta of a Hamiltonian.
     pub velocities: Vec<String>,
     pub parameters: Vec<String>,
     pub tables: Vec<String>,
+    /// The name of the action.
+    pub action: String,
 }
 
 /// The nesting depth of brackets above which a subexpression gets a name: a quarter of what the parser accepts.
@@ -67,7 +70,7 @@ fn expression(node: &Node, of: &mut dyn FnMut(Id) -> String, names: &Names) -> S
         Node::Parameter(i) => name(&names.parameters, i),
         Node::Position(i) => name(&names.coordinates, i),
         Node::Velocity(i) => name(&names.velocities, i),
-        Node::Action => "z".to_owned(),
+        Node::Action => names.action.clone(),
         Node::Time => "t".to_owned(),
         Node::Unary(Function::Neg, a) => format!("(-{})", of(a)),
         Node::Unary(function, a) => format!("{}({})", function_name(function), of(a)),

@@ -2,7 +2,6 @@
 
 use super::{Parsed, Parser};
 use crate::functions::{FUNCTIONS, OPERATIONS};
-use crate::names::is_reserved;
 use crate::token::{Token, Word};
 use crate::{Function, Id, Operation};
 
@@ -92,7 +91,7 @@ impl<'a> Parser<'a> {
                 format!("expected `,`, found {}: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
             return Err(self.error(self.word(0), message));
         }
-        if is_reserved(index) || self.is_value(index) || self.names.table(index).is_some() {
+        if self.names.is_reserved(index) || self.is_value(index) || self.names.table(index).is_some() {
             return Err(self.error(word, format!("the name `{index}` is in use; choose another name for the index")));
         }
         self.expect(',')?;

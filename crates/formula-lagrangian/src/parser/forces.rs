@@ -19,7 +19,8 @@ impl<'a> Parser<'a> {
     pub(super) fn force(&mut self) -> Parsed<()> {
         let word = self.next()?;
         if self.forces.is_none() {
-            return Err(self.error(word, "a force is a line of the text of a Lagrangian, not of another expression"));
+            let message = "a force is a line of the text of a Lagrangian, not of a Hamiltonian or another expression";
+            return Err(self.error(word, message));
         }
         self.next()?;
         let place = self.word(0);

@@ -3,6 +3,7 @@
 use super::Parser;
 use crate::ParseError;
 use crate::hints::{instead_of_function, instead_of_name, velocity_of};
+use crate::names::ACTION;
 use crate::token::{Token, Word};
 
 impl<'a> Parser<'a> {
@@ -36,12 +37,14 @@ impl<'a> Parser<'a> {
         let instead = match name {
             "q" | "v" if !is_function => Some(self.all_of(name)),
             _ if is_function => instead_of_function(name).map(str::to_owned),
+            ACTION if self.names.action != ACTION => Some(format!("the action is `{}` here", self.names.action)),
             _ => instead_of_name(name).map(str::to_owned),
         };
         match instead {
             Some(instead) => error.message = format!("{}; {instead}", error.message),
             None => {
-                let velocity = velocity_of(name, &self.names.blocks).filter(|_| !is_function);
+                let has_velocities = !is_function && !self.names.are_of_hamiltonian();
+                let velocity = velocity_of(name, &self.names.blocks).filter(|_| has_velocities);
                 error.nearest = velocity.or_else(|| self.names.nearest(name, &locals));
             }
         }
@@ -65,9 +68,10 @@ impl<'a> Parser<'a> {
             return None;
         }
         match name {
-            "z" => Some("the rate of `z` is the Lagrangian itself, which cannot depend on it".to_owned()),
             "t" => Some("the rate of `t` is 1".to_owned()),
-            _ => None,
+            _ if name != self.names.action => None,
+            _ if self.names.are_of_hamiltonian() => Some(format!("the rate of `{name}` is `p . H_p - H`")),
+            _ => Some(format!("the rate of `{name}` is the Lagrangian itself, which cannot depend on it")),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Parsed, Parser};
 use crate::ParseError;
-use crate::names::{Block, is_reserved};
+use crate::names::Block;
 use crate::nearest_name;
 use crate::token::{Token, Word};
 
@@ -56,7 +56,7 @@ impl<'a> Parser<'a> {
             (Some(block), _) => self.entry(block, Kind::Position, word),
             (None, "q") if opens => self.entry(&all(name), Kind::Position, word),
             (None, "v") if opens => self.entry(&all(name), Kind::Velocity, word),
-            (None, "z") => {
+            (None, name) if name == names.action => {
                 self.next()?;
                 Ok(Target { kind: Kind::Action, first: 0, entries: None })
             }
@@ -98,7 +98,8 @@ impl<'a> Parser<'a> {
 
     /// Whether a name has no meaning, so that it may be that of an index.
     fn is_free(&self, name: &str) -> bool {
-        !(is_reserved(name) || self.is_value(name) || matches!(name, "q" | "v")) && self.names.table(name).is_none()
+        !(self.names.is_reserved(name) || self.is_value(name) || matches!(name, "q" | "v"))
+            && self.names.table(name).is_none()
     }
 
     fn no_coordinate(&self, name: &str, word: Word<'a>) -> ParseError {

@@ -1,12 +1,12 @@
 //! Values that begin with a name: coordinates, velocities, parameters, definitions, quantities of the motion.
 
 use super::{Parsed, Parser};
-use crate::Id;
 use crate::hints::CHOICE;
-use crate::names::{Block, is_reserved};
+use crate::names::Block;
 use crate::nearest_name;
 use crate::quantities::Quantity;
 use crate::token::{Token, Word};
+use crate::{Formula, Id};
 
 /// The largest absolute value of an integer in a text: far beyond the number of entries or terms that are possible, and
 /// exact as a floating-point number.
@@ -30,6 +30,13 @@ impl<'a> Parser<'a> {
         if let Some(block) = self.names.blocks.iter().find(|b| b.name == name) {
             return self.coordinate(block, word);
         }
+        if let Some(block) = self.names.momentum(name) {
+            if has_prime {
+                return Err(self.error(prime, format!("`{name}` is a momentum: only coordinates have a velocity")));
+            }
+            let index = if block.count.is_some() { self.index(block)? } else { block.first as u32 };
+            return Ok(self.graph.velocity(index));
+        }
         if let Some(i) = self.names.parameters.iter().position(|p| p == name) {
             if has_prime {
                 let message = format!("`{name}` is a parameter, which is constant: only coordinates have a velocity");
@@ -38,25 +45,32 @@ impl<'a> Parser<'a> {
             return Ok(self.graph.parameter(i as u32));
         }
         let all = Block { name: name.to_owned(), first: 0, count: Some(self.names.dimension) };
+        let of_hamiltonian = self.names.are_of_hamiltonian();
         if let Some(message) = self.has_no_velocity(name) {
             return Err(self.error(self.word(0), message));
         }
         match name {
             "t" => Ok(self.graph.time()),
-            "z" => Ok(self.graph.action()),
+            _ if name == self.names.action => Ok(self.graph.action()),
             "pi" => Ok(self.graph.number(std::f64::consts::PI)),
             "n" => Ok(self.graph.number(self.names.dimension as f64)),
             "q" if self.word(0).token == Token::Sign('[') => self.coordinate(&all, word),
-            "v" if self.word(0).token == Token::Sign('[') => {
+            "p" if of_hamiltonian && self.word(0).token == Token::Sign('[') => {
                 let i = self.index(&all)?;
                 Ok(self.graph.velocity(i))
+            }
+            "v" if self.word(0).token == Token::Sign('[') => {
+                let i = self.index(&all)?;
+                self.velocity(i, word)
             }
             "if" => Err(self.error(word, format!("`if` is a function: {CHOICE}"))),
             "sum" => Err(self.error(word, "`sum` is a function: write `sum(i, 0, n-1, q[i]^2)`")),
             _ if self.names.table(name).is_some() => {
                 Err(self.error(word, format!("`{name}` is a table, a function: write `{name}(t)`")))
             }
-            _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
+            _ if self.names.is_reserved(name) => {
+                Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`")))
+            }
             _ => self.quantity(name, word),
         }
     }
@@ -66,7 +80,8 @@ impl<'a> Parser<'a> {
         let mut error = self.unknown(name, word, "name");
         let Some(formula) = self.beside else { return Err(error) };
         let names = self.names;
-        let block = name.strip_prefix("p_").and_then(|of| names.blocks.iter().find(|block| block.name == of));
+        let of_lagrangian = name.strip_prefix("p_").filter(|_| !names.are_of_hamiltonian());
+        let block = of_lagrangian.and_then(|of| names.blocks.iter().find(|block| block.name == of));
         let quantity = match (Quantity::of(name), block) {
             (Some(quantity), _) => quantity,
             (None, Some(block)) if block.count.is_some() => Quantity::Momentum(self.index(block)?),
@@ -78,14 +93,36 @@ impl<'a> Parser<'a> {
                 return Err(error);
             }
         };
+        self.derived(quantity, formula, name, word)
+    }
+
+    fn derived(&mut self, quantity: Quantity, formula: &Formula, name: &str, word: Word<'a>) -> Parsed<Id> {
         let found = quantity.node(formula, self.graph);
         found.ok_or_else(|| self.error(word, format!("`{name}` has more operations than an expression can have")))
     }
 
+    /// The velocity of a coordinate, which is `H_p` in an expression that belongs to a Hamiltonian.
+    fn velocity(&mut self, index: u32, word: Word<'a>) -> Parsed<Id> {
+        if !self.names.are_of_hamiltonian() {
+            return Ok(self.graph.velocity(index));
+        }
+        let name = self.text.get(word.span.0..word.span.1).unwrap_or("x");
+        match self.beside {
+            Some(formula) => self.derived(Quantity::Velocity(index), formula, name, word),
+            None => {
+                let momentum = self.names.momenta().into_iter().nth(index as usize).unwrap_or_default();
+                let message = format!("a Hamiltonian depends on momenta, not on velocities; write `{momentum}`");
+                Err(self.error(word, message))
+            }
+        }
+    }
+
     /// Whether a name has a value, so that a bracket after it is a product with a missing `*`.
     pub(super) fn is_value(&self, name: &str) -> bool {
-        let known = self.names.blocks.iter().map(|b| b.name.as_str());
-        let known = known.chain(self.names.parameters.iter().map(String::as_str)).chain(["t", "z", "pi", "n"]);
+        let momenta = self.names.momenta.iter().flatten();
+        let known = self.names.blocks.iter().chain(momenta).map(|b| b.name.as_str());
+        let known = known.chain(self.names.parameters.iter().map(String::as_str));
+        let known = known.chain(["t", "pi", "n", self.names.action.as_str()]);
         known.chain(self.locals.iter().map(|(local, _)| *local)).any(|k| k == name)
     }
 
@@ -100,7 +137,7 @@ impl<'a> Parser<'a> {
             None => block.first as u32,
         };
         prime |= self.takes_prime(word)?;
-        Ok(if prime { self.graph.velocity(index) } else { self.graph.position(index) })
+        if prime { self.velocity(index, word) } else { Ok(self.graph.position(index)) }
     }
 
     /// Consumes a prime, if there is one.

@@ -5,7 +5,8 @@ use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
-use herglotz::runtime::{MAX_CONTACT_DEFECT, NotContact, Status};
+use herglotz::Scene;
+use herglotz::runtime::{HamiltonianGeometry, MAX_CONTACT_DEFECT, NotContact, Status};
 
 #[derive(Args)]
 pub(crate) struct Check {
@@ -19,6 +20,10 @@ pub(crate) struct Check {
     /// conformal factor.
     #[arg(long)]
     lyapunov: bool,
+    /// Also compute the defects of modified Hamiltonians of the first steps, for the step size of the motion, a half and a
+    /// quarter of it.
+    #[arg(long)]
+    modified: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -32,6 +37,14 @@ impl Check {
         let lyapunov =
             self.lyapunov.then(|| scene.system.lyapunov_exponents(&scene.bare_motion(), &mut ())).transpose();
         let lyapunov = lyapunov.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let modified =
+            self.modified.then(|| scene.system.modified_defects(&scene.bare_motion(), super::modified::MOST));
+        let modified = modified.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let field = match scene.system.hamiltonian_structure() {
+            Some(_) => Some(scene.system.hamiltonian_geometry(&scene.bare_motion().start)),
+            None => None,
+        };
+        let field = field.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let momenta: Vec<String> =
             scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
         if self.json {
@@ -39,10 +52,19 @@ impl Check {
             if let Some(found) = &lyapunov {
                 value["lyapunov"] = super::lyapunov::of_json(found);
             }
+            if let Some(found) = &modified {
+                value["modified"] = super::modified::of_json(found);
+            }
+            if let Some(field) = &field {
+                value["hamiltonian"] = of_field_json(field);
+            }
             print_json(&value)?;
         } else {
-            let exponents = lyapunov.as_ref().map(|found| format!("\n\n{}", super::lyapunov::in_words(found)));
-            print(&(in_words(&check, &momenta) + exponents.as_deref().unwrap_or_default()))?;
+            let mut parts = vec![in_words(&check, &momenta)];
+            parts.extend(field.as_ref().map(|field| field_in_words(&scene, field)));
+            parts.extend(modified.as_deref().map(super::modified::in_words));
+            parts.extend(lyapunov.as_ref().map(super::lyapunov::in_words));
+            print(&parts.join("\n\n"))?;
         }
         if let Some(found) = lyapunov.filter(|found| found.status != Status::Completed) {
             return Err(Failure::Run(format!("the motion was not completed: {}", found.status)));
@@ -53,6 +75,45 @@ impl Check {
             None => Err(Failure::Run("the steps are not contact".into())),
         }
     }
+}
+
+/// The largest component of `L_X eta + H_z eta` for `X = X_H`.
+fn conformality_defect(at: &HamiltonianGeometry) -> f64 {
+    let differences = at.lie_derivative.iter().zip(&at.eta).map(|(change, eta)| change - at.rate * eta);
+    // A NaN is kept.
+    differences.fold(0.0, |most, x| if x.abs() <= most { most } else { x.abs() })
+}
+
+fn of_field_json(at: &HamiltonianGeometry) -> serde_json::Value {
+    let all = |x: &[f64]| x.iter().map(|x| json(*x)).collect::<Vec<_>>();
+    serde_json::json!({
+        "H": json(at.hamiltonian),
+        "X_H": all(&at.field),
+        "L_X eta": all(&at.lie_derivative),
+        "rate": json(at.rate),
+        "conformality_defect": json(conformality_defect(at)),
+        "brackets": all(&at.brackets),
+        "condition of H_pp": json(at.condition),
+    })
+}
+
+/// The contact Hamiltonian vector field at the start.
+fn field_in_words(scene: &Scene, at: &HamiltonianGeometry) -> String {
+    let formula = scene.system.formula();
+    let names = formula.coordinates().into_iter().chain(formula.momenta()).chain([formula.action().to_owned()]);
+    let mut rows = vec![["", "X_H", "L_X eta", "{H, .}"].map(str::to_owned).to_vec()];
+    let numbers = at.field.iter().zip(&at.lie_derivative).zip(&at.brackets);
+    for (name, ((field, change), bracket)) in names.zip(numbers) {
+        rows.push(vec![name, short(*field), short(*change), short(*bracket)]);
+    }
+    format!(
+        "H = {} at the start; L_X eta = {} eta for X = X_H, to {:.1e}; a Jacobi bracket {{H, f}} that vanishes at all \
+         points belongs to a dissipated quantity f\n{}",
+        short(at.hamiltonian),
+        short(at.rate),
+        conformality_defect(at),
+        table(&rows)
+    )
 }
 
 fn of_json(check: &herglotz::runtime::Check, momenta: &[String]) -> serde_json::Value {

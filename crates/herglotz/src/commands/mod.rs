@@ -8,6 +8,7 @@ mod fit;
 mod lattice;
 mod list;
 mod lyapunov;
+mod modified;
 mod new;
 mod plan;
 mod run;

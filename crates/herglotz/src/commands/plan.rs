@@ -21,7 +21,10 @@ pub(crate) fn momentum(scene: &Scene, symmetry: &FormulaSymmetry) -> String {
     let names = scene.system.formula().coordinates();
     let name = |i: usize| names.get(i).map(String::as_str).unwrap_or_default();
     let all: Vec<_> = match symmetry {
-        FormulaSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
+        FormulaSymmetry::Translation(moved) => {
+            let momenta = scene.system.formula().momenta();
+            moved.iter().filter_map(|i| momenta.get(*i).cloned()).collect()
+        }
         FormulaSymmetry::Rotation(pairs) => {
             pairs.iter().map(|(i, j)| format!("{x}*p_{y} - {y}*p_{x}", x = name(*i), y = name(*j))).collect()
         }
@@ -31,6 +34,18 @@ pub(crate) fn momentum(scene: &Scene, symmetry: &FormulaSymmetry) -> String {
 
 /// The properties of a system that can be proved, whether they are, and their meaning.
 fn proved(scene: &Scene) -> Vec<(&'static str, bool, &'static str)> {
+    if let Some(structure) = scene.system.hamiltonian_structure() {
+        return vec![
+            ("smooth", scene.system.is_smooth(), "H has neither kinks nor jumps"),
+            ("autonomous", structure.autonomous, "H does not depend on t"),
+            ("z_free", structure.z_free, "H does not depend on z: no dissipation"),
+            ("z_affine", structure.z_affine, "H = H0(t, q, p) - gamma(t) z"),
+            ("constant_rate", structure.constant_rate, "H_z is constant"),
+            ("separable", structure.separable, "H = T(p) + V(t, q) + f(t, z)"),
+            ("polynomial", structure.degree.is_some(), "H is a polynomial in the momenta"),
+            ("homogeneous", structure.homogeneous, "p . H_p = H: H is homogeneous of degree one in the momenta"),
+        ];
+    }
     let structure = scene.system.structure();
     vec![
         ("smooth", scene.system.is_smooth(), "L has neither kinks nor jumps"),

@@ -359,8 +359,8 @@ pub(crate) fn end_of(scene: &Scene, outcome: &Outcome) -> Vec<(String, f64)> {
     if let Some(v) = &outcome.v {
         end.extend(names.iter().map(|name| velocity_name(name)).zip(v.iter().copied()));
     }
-    end.extend(names.iter().map(|name| format!("p_{name}")).zip(outcome.p.iter().copied()));
-    end.extend(outcome.z.map(|z| ("z".to_owned(), z)));
+    end.extend(scene.system.formula().momenta().into_iter().zip(outcome.p.iter().copied()));
+    end.extend(outcome.z.map(|z| (scene.system.formula().action().to_owned(), z)));
     end.extend(outcome.log_factor.map(|x| ("log_factor".to_owned(), x)));
     end
 }

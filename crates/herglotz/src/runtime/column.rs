@@ -39,18 +39,20 @@ impl Column {
         if let Some(i) = index(name) {
             return Ok(Column::Position(i));
         }
-        if let Some(i) = coordinates.iter().position(|c| velocity_name(c) == name) {
+        // The velocity and the energy of a Hamiltonian are expressions: `H_p`, and H.
+        let of_lagrangian = !formula.is_hamiltonian();
+        if let Some(i) = coordinates.iter().position(|c| velocity_name(c) == name).filter(|_| of_lagrangian) {
             return Ok(Column::Velocity(i));
         }
         let taken = formula.parameters().any(|(parameter, _)| parameter == name);
         match name {
             "t" => return Ok(Column::Time),
-            "z" => return Ok(Column::Action),
-            "energy" if !taken => return Ok(Column::Energy),
+            _ if name == formula.action() => return Ok(Column::Action),
+            "energy" if !taken && of_lagrangian => return Ok(Column::Energy),
             "log_factor" if !taken => return Ok(Column::LogFactor),
             _ => {}
         }
-        if !taken && let Some(i) = name.strip_prefix("p_").and_then(index) {
+        if !taken && let Some(i) = formula.momenta().iter().position(|momentum| momentum == name) {
             return Ok(Column::Momentum(i));
         }
         Ok(Column::Expression(Box::new(formula.named_expression(text)?)))
@@ -65,13 +67,19 @@ impl Column {
         }
     }
 
-    /// The columns of a full state with their names: `t`, the coordinates, the velocities and `z`.
+    /// The columns of a full state with their names: `t`, the coordinates, the velocities and the action; for a
+    /// Hamiltonian the momenta instead of the velocities.
     pub fn state(formula: &Formula) -> Vec<(String, Column)> {
         let names = formula.coordinates();
         let positions = names.iter().cloned().enumerate().map(|(i, name)| (name, Column::Position(i)));
         let velocities = names.iter().enumerate().map(|(i, name)| (velocity_name(name), Column::Velocity(i)));
-        let (t, z) = (("t".to_owned(), Column::Time), ("z".to_owned(), Column::Action));
-        [t].into_iter().chain(positions).chain(velocities).chain([z]).collect()
+        let momenta = formula.momenta().into_iter().enumerate().map(|(i, name)| (name, Column::Momentum(i)));
+        let (t, z) = (("t".to_owned(), Column::Time), (formula.action().to_owned(), Column::Action));
+        let all = [t].into_iter().chain(positions);
+        if formula.is_hamiltonian() {
+            return all.chain(momenta).chain([z]).collect();
+        }
+        all.chain(velocities).chain([z]).collect()
     }
 }
 

@@ -188,8 +188,10 @@ impl System {
             comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
         }
         // A first-order system has no resets.
-        let peers = if self.formula().resets() > 0 {
-            let why = "it performs no resets".to_owned();
+        let peers = if self.formula().resets() > 0 || self.formula().is_hamiltonian() {
+            let hamiltonian = self.formula().is_hamiltonian();
+            let why = if hamiltonian { "it has the equations of a Lagrangian only" } else { "it performs no resets" };
+            let why = why.to_owned();
             comparison.left_out.extend(peers.iter().map(|peer| (peer.name().to_owned(), why.clone())));
             &[]
         } else {

@@ -71,6 +71,26 @@ pub enum RuntimeError {
         /// The velocities, by name.
         velocities: String,
     },
+    /// A Hamiltonian has more coordinates than are compiled.
+    #[error(
+        "the Hamiltonian has {found} coordinates; it can have from 1 to {most}. Give a Lagrangian, or run a type that \
+         implements `ContactHamiltonian` in Rust"
+    )]
+    HamiltonianDimension {
+        /// The number of coordinates.
+        found: usize,
+        /// The largest number.
+        most: usize,
+    },
+    /// Something that is computed for Lagrangians only was requested of a Hamiltonian.
+    #[error("{what} are not computed for a Hamiltonian; give a Lagrangian, or use the library in Rust")]
+    OfLagrangians {
+        /// What was requested.
+        what: &'static str,
+    },
+    /// H is not defined at the start.
+    #[error("the Hamiltonian or one of its derivatives is not finite at the start; choose a start inside its domain")]
+    HamiltonianUndefined,
     /// An event, or a column of one, contains the conformal factor, and the rate `L_z` of the motion is not constant, or
     /// an impact changes the factor.
     #[error(

@@ -32,6 +32,7 @@ mod interrupt;
 mod kernel;
 mod lyapunov;
 mod member_derivatives;
+mod modified;
 mod outcome;
 mod parameters;
 mod path;
@@ -50,7 +51,7 @@ pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
 pub use error::{RuntimeError, in_words};
 #[cfg(feature = "fits")]
 pub use fit::{FittedMotion, FittedSeries, MotionFit, Series, Unknown};
-pub use geometry::Geometry;
+pub use geometry::{Geometry, HamiltonianGeometry};
 pub use interrupt::Interrupt;
 pub use lyapunov::LyapunovExponents;
 pub use member_derivatives::BatchLoss;
@@ -66,12 +67,13 @@ pub use system::System;
 
 pub use contact_geom::switching::Impact;
 pub use contact_geom::table::{Interpolation, Table, TableError};
-pub use contact_geom::{Statement, Structure};
+pub use contact_geom::{HamiltonianStructure, Statement, Structure};
 pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
-    Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally,
+    Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally, hamiltonian::ModifiedDefect,
 };
 pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
-pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};
+pub use formula_lagrangian::{Expression, Formula, FormulaError, FormulaNames, Graph, ParseError};
+pub use formula_lagrangian::{Symbol, Symbols, nearest_name};
 #[cfg(feature = "fits")]
 pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};

@@ -3,15 +3,16 @@
 use crate::runtime::kernel::{self, Kernel, kernel_of};
 use crate::runtime::outcome::KeptRows;
 use crate::runtime::{
-    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, FoundPath, Geometry, Motion, Outcome, Plan,
-    RunMonitor, RuntimeError, Start,
+    BoundaryProblem, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, FoundPath, Geometry, HamiltonianGeometry,
+    Motion, Outcome, Plan, RunMonitor, RuntimeError, Start,
 };
-use contact_geom::Structure;
+use contact_geom::{HamiltonianStructure, Structure};
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally};
 use formula_lagrangian::Formula;
 use std::sync::Arc;
 
-/// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is inexpensive.
+/// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need; or a contact Hamiltonian, in
+/// 1 to 4 coordinates, which runs by contact Gauss collocation from a momentum. Cloning is inexpensive.
 ///
 /// ```
 /// use herglotz::runtime::{Motion, Start, System, StepControl};
@@ -77,7 +78,12 @@ impl System {
         self.kernel.structure()
     }
 
-    /// Whether L has neither kinks nor jumps.
+    /// The structure of a Hamiltonian that is proved from its formula; `None` for a Lagrangian.
+    pub fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
+        self.kernel.hamiltonian_structure()
+    }
+
+    /// Whether L, or the Hamiltonian, has neither kinks nor jumps.
     pub fn is_smooth(&self) -> bool {
         self.kernel.is_smooth()
     }
@@ -159,6 +165,23 @@ impl System {
         self.kernel.geometry(at)
     }
 
+    /// The contact geometry of a Hamiltonian at a time and a point of T\*Q x R.
+    ///
+    /// ```
+    /// use herglotz::runtime::{Formula, FormulaNames, InitialVelocity, Start, System};
+    /// let names = FormulaNames::new(&["x"], &[]);
+    /// let system = System::new(&Formula::parse_hamiltonian("p_x^2/2 + x^2/2 + z/10", &names)?)?;
+    /// let at = Start { velocity: InitialVelocity::Momentum(vec![2.0]), ..Start::new(0.0, [1.0], [], 0.0) };
+    /// assert_eq!(system.hamiltonian_geometry(&at)?.field, [2.0, -1.2, 1.5]); // q', p', z'
+    /// # Ok::<(), herglotz::runtime::RuntimeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`RuntimeError`] where H is not defined, and for a Lagrangian, which has [`geometry`](Self::geometry).
+    pub fn hamiltonian_geometry(&self, at: &Start) -> Result<HamiltonianGeometry, RuntimeError> {
+        self.kernel.hamiltonian_geometry(at)
+    }
+
     /// Checks at this number of samples of a motion whether its steps are contact transformations.
     ///
     /// # Errors
@@ -182,6 +205,9 @@ impl System {
     /// # Errors
     /// [`RuntimeError`] for an invalid problem.
     pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
+        if self.formula().is_hamiltonian() {
+            return Err(RuntimeError::OfLagrangians { what: "paths between two positions" });
+        }
         kernel::path::search(self.formula(), problem)
     }
 }

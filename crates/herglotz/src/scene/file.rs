@@ -27,7 +27,7 @@ pub(crate) struct File {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
     pub version: Option<Location<i64>>,
-    /// The Lagrangian: a formula, or a system of the catalogue.
+    /// The Lagrangian or the Hamiltonian: a formula, or a system of the catalogue.
     pub system: Location<SystemTable>,
     /// The initial state: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; the action
     /// `z` and the time `t` default to 0. An array of coordinates has a list, or one number for all its entries. A
@@ -59,7 +59,10 @@ pub(crate) struct File {
 
 /// The Lagrangian.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a table with `coordinates` and `lagrangian`, or with `catalogue`")]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a table with `coordinates` and `lagrangian` or `hamiltonian`, or with `catalogue`"
+)]
 pub(crate) struct SystemTable {
     /// The name of a system of the catalogue; see `herglotz list systems`.
     pub catalogue: Option<Location<String>>,
@@ -67,6 +70,14 @@ pub(crate) struct SystemTable {
     pub coordinates: Option<Location<Vec<Location<String>>>>,
     /// L as a formula in the coordinates `x`, the velocities `x'`, `z`, `t` and the parameters.
     pub lagrangian: Option<Location<String>>,
+    /// In place of L, a contact Hamiltonian H as a formula in the coordinates `x`, their momenta `p_x`, `z`, `t` and the
+    /// parameters: `q' = H_p`, `p' = -H_q - p H_z`, `z' = p . H_p - H`. It has up to 4 coordinates, and runs by a Gauss
+    /// method such as `gauss_8`, whatever the rank of `H_pp`.
+    pub hamiltonian: Option<Location<String>>,
+    /// The names of the momenta of `hamiltonian`, in the order of the coordinates; by default `p_x` for `x`.
+    pub momenta: Option<Location<Vec<Location<String>>>>,
+    /// The name of the action, by default `z`; with another one `z` may be a coordinate.
+    pub action: Option<Location<String>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,

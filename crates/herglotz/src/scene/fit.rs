@@ -135,13 +135,13 @@ impl Reader<'_> {
                     let mut all = self.formula.parameters();
                     all.find(|(known, _)| *known == parameter).map_or(f64::NAN, |(_, value)| value)
                 }
-                Ok("z") => self.start.z,
+                Ok(name) if name == self.formula.action() => self.start.z,
                 Ok(name) => {
                     let at = |of: &dyn Fn(&str) -> String| coordinates.iter().position(|x| of(x) == name);
                     let rate = match &self.start.velocity {
                         InitialVelocity::Velocity(v) => entry(v, at(&velocity_name)),
                         InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => {
-                            entry(p, at(&|x| format!("p_{x}")))
+                            entry(p, self.formula.momenta().iter().position(|momentum| momentum == name))
                         }
                     };
                     entry(&self.start.q, at(&str::to_owned)).or(rate).unwrap_or(f64::NAN)

@@ -136,7 +136,8 @@ impl Scene {
         let (formula, resets) = with_resets(text, formula, &file.want.events)?;
         let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
-        let lagrangian = system.lagrangian.as_ref().map_or(system.span(), Location::span);
+        let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
+        let lagrangian = source.map_or(system.span(), Location::span);
         let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
         let step_control = step_control(text, run)?;
         let by = match step_control {
@@ -170,9 +171,9 @@ impl Scene {
             system: runs,
             expressions: expressions(&file).cloned().collect(),
             additions: additions(&file, &tables),
-            lagrangian: match (entry, &system.lagrangian) {
+            lagrangian: match (entry, source) {
                 (Some(entry), _) => entry.lagrangian.to_owned(),
-                (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
+                (None, own) => own.map(|text| (**text).clone()).unwrap_or_default(),
             },
             start,
             end,
@@ -231,7 +232,7 @@ impl Scene {
         if self.has_resets() {
             let names = self.system.formula().coordinates();
             let velocities = names.iter().map(|name| velocity_name(name));
-            let state = names.iter().cloned().chain(velocities).chain(["z".to_owned()]);
+            let state = names.iter().cloned().chain(velocities).chain([self.system.formula().action().to_owned()]);
             columns.extend(state.map(|name| format!("{name} after")));
         }
         columns
@@ -291,7 +292,9 @@ impl Scene {
             self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
-        let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
+        let (momenta, action) = (formula.momenta(), formula.action());
+        let kind = if formula.is_hamiltonian() { "H" } else { "L" };
+        let of_system = format!("{kind} {} {names:?} {momenta:?} {action} {values:?}", self.lagrangian);
         format!(
             "{of_system} {start:?} {end:?} {step_control:?} {rows:?} {conformal_factor} {expressions:?} {events:?} \
              {event_columns:?} {additions}"
@@ -303,7 +306,11 @@ impl Scene {
         use InputError as E;
         let spans = &self.spans;
         let span = match error {
-            RuntimeError::NotRegular { .. } | RuntimeError::Formula(_) => spans.lagrangian,
+            RuntimeError::NotRegular { .. }
+            | RuntimeError::Formula(_)
+            | RuntimeError::HamiltonianDimension { .. }
+            | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
+            RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
             RuntimeError::Input(error) => match error {
                 E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => spans.step,
                 E::Span { .. } => spans.time,

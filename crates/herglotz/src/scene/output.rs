@@ -137,9 +137,8 @@ fn name_of(column: &str) -> &str {
 fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
     if let (Some(name), None) = (unknown, &error.error.nearest) {
-        let momenta = formula.coordinates().into_iter().map(|name| format!("p_{name}"));
         let known: Vec<String> =
-            ["energy", "sigma", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
+            ["energy", "sigma", "log_factor"].map(str::to_owned).into_iter().chain(formula.momenta()).collect();
         error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
         if error.error.nearest.is_none() {
             error.error.message += "; the known names are those of the formula and ";
@@ -154,9 +153,9 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
 pub(crate) fn state_of_event(formula: &Formula) -> Vec<String> {
     let names = formula.coordinates();
     let velocities = names.iter().map(|name| velocity_name(name));
-    let momenta = names.iter().map(|name| format!("p_{name}"));
     let t = ["t".to_owned()].into_iter();
-    t.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
+    let action = [formula.action().to_owned()];
+    t.chain(names.iter().cloned()).chain(velocities).chain(formula.momenta()).chain(action).collect()
 }
 
 /// The events with their names, and their columns.

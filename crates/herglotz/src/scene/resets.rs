@@ -79,7 +79,8 @@ fn with_reset(
             return SceneError::at(text, then.span(), error.to_string());
         }
         // With each text by itself, to find the one of the error.
-        let when_alone = formula.with_reset(FormulaReset { then: &[("z", "z")], rest: None, ..reset });
+        let when_alone =
+            formula.with_reset(FormulaReset { then: &[(formula.action(), formula.action())], rest: None, ..reset });
         of_event(text, formula, event, when_alone.err(), &error)
     })
 }

@@ -27,27 +27,32 @@ struct Key {
 /// All names that may occur in an initial state.
 fn keys(formula: &Formula) -> Vec<Key> {
     let names = formula.coordinates();
-    let mut arrays: Vec<(&str, Range<usize>)> = Vec::new();
+    let velocities: Vec<String> = names.iter().map(|name| velocity_name(name)).collect();
+    let mut keys = Vec::new();
+    for (names, part) in [(names, Part::Position), (velocities, Part::Velocity), (formula.momenta(), Part::Momentum)] {
+        let arrays = arrays(&names);
+        let single = names.into_iter().enumerate().map(|(i, name)| (name, i..i + 1, false));
+        let arrays = arrays.into_iter().map(|(name, entries)| (name, entries, true));
+        let of_part = single.chain(arrays);
+        keys.extend(of_part.map(|(name, entries, is_list)| Key { name, part, entries, is_list }));
+    }
+    for (name, part) in [(formula.action(), Part::Action), ("t", Part::Time)] {
+        keys.push(Key { name: name.into(), part, entries: 0..1, is_list: false });
+    }
+    keys
+}
+
+/// The arrays among some names, such as `q[0]`, `q[1]` or `q'[0]`, with the range of their entries.
+fn arrays(names: &[String]) -> Vec<(String, Range<usize>)> {
+    let mut arrays: Vec<(String, Range<usize>)> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let Some((base, _)) = name.split_once('[') else { continue };
         match arrays.last_mut() {
             Some((last, entries)) if *last == base => entries.end = i + 1,
-            _ => arrays.push((base, i..i + 1)),
+            _ => arrays.push((base.to_owned(), i..i + 1)),
         }
     }
-    let single = names.iter().enumerate().map(|(i, name)| (name.as_str(), i..i + 1, false));
-    let arrays = arrays.into_iter().map(|(name, entries)| (name, entries, true));
-    let mut keys = Vec::new();
-    for (name, entries, is_list) in single.chain(arrays) {
-        let mut push = |name, part| keys.push(Key { name, part, entries: entries.clone(), is_list });
-        push(name.to_owned(), Part::Position);
-        push(velocity_name(name), Part::Velocity);
-        push(format!("p_{name}"), Part::Momentum);
-    }
-    for (name, part) in [("z", Part::Action), ("t", Part::Time)] {
-        keys.push(Key { name: name.into(), part, entries: 0..1, is_list: false });
-    }
-    keys
+    arrays
 }
 
 /// The part and the entry that a name of a single number refers to.
@@ -94,7 +99,7 @@ pub(crate) fn read(
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    complete(text, given(text, keys(formula), "the start", table)?, &formula.coordinates(), entry, at)
+    complete(text, given(text, keys(formula), "the start", table)?, formula, entry, at)
 }
 
 /// The ends of a path: the times, the positions, and the action of the start.
@@ -201,11 +206,13 @@ fn all(
 fn complete(
     text: &str,
     given: Given,
-    names: &[String],
+    formula: &Formula,
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
+    let (names, momenta) = (formula.coordinates(), formula.momenta());
     let of = |given: Vec<Option<f64>>, of_entry: Option<&[f64]>, what: &str, name: &dyn Fn(&str) -> String| {
+        let names = if what == "momentum" { &momenta } else { &names };
         all(text, names, given, of_entry, [what, "start"], at, name)
     };
     let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
@@ -214,8 +221,9 @@ fn complete(
         let message = "the start has both velocities and momenta; give one kind for all coordinates";
         return Err(SceneError::at(text, at, message));
     }
-    let velocity = if by_momentum {
-        InitialVelocity::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
+    let by_velocity = given.v.iter().any(Option::is_some);
+    let velocity = if by_momentum || formula.is_hamiltonian() && !by_velocity {
+        InitialVelocity::Momentum(of(given.p, None, "momentum", &|p| p.to_owned())?)
     } else {
         InitialVelocity::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
     };

@@ -4,12 +4,21 @@ use super::SceneError;
 use super::checked::finite;
 use super::file::SystemTable;
 use super::location::Location;
-use crate::runtime::{CatalogueEntry, Formula, FormulaError, RuntimeError, Table, check_parameters};
+use crate::runtime::{CatalogueEntry, Formula, FormulaError, FormulaNames, RuntimeError, Table, check_parameters};
 
 /// The entry of the catalogue that a scene names.
 pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
     let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
-    match (&system.catalogue, &system.coordinates, &system.lagrangian) {
+    if let (Some(_), Some(hamiltonian)) = (&system.lagrangian, &system.hamiltonian) {
+        return refuse(hamiltonian.span(), "give a `lagrangian` or a `hamiltonian`, not both");
+    }
+    if let (None, Some(momenta)) = (&system.hamiltonian, &system.momenta) {
+        return refuse(momenta.span(), "`momenta` are names for a `hamiltonian`; remove them, or give one");
+    }
+    if let (Some(_), Some(action)) = (&system.catalogue, &system.action) {
+        return refuse(action.span(), "the action of a system of the catalogue is `z`; remove `action`");
+    }
+    match (&system.catalogue, &system.coordinates, system.lagrangian.as_ref().or(system.hamiltonian.as_ref())) {
         (Some(name), None, None) => match CatalogueEntry::find(name) {
             Ok(entry) => Ok(Some(entry)),
             Err(error) => Err(SceneError::at(text, name.span(), error.to_string())),
@@ -40,25 +49,46 @@ pub(super) fn formula(
     let of_tables = || tables.iter().map(|(name, _)| name);
     let at_system = |error: FormulaError| SceneError::at(text, system.span(), error.to_string());
     let Some(entry) = entry else {
-        let (Some(coordinates), Some(lagrangian)) = (&system.coordinates, &system.lagrangian) else {
+        let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
+        let (Some(coordinates), Some(source)) = (&system.coordinates, source) else {
             return Err(SceneError::at(text, system.span(), "the system has no formula"));
         };
         let names: Vec<&str> = coordinates.iter().map(|name| name.as_str()).collect();
         let values: Vec<(&str, f64)> =
             system.parameters.0.iter().map(|(name, value)| (name.as_str(), **value)).collect();
         let tables: Vec<(&str, Table)> = tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
-        return Formula::parse_with_tables(lagrangian, &names, &values, &tables).map_err(|error| match error {
+        let of_momenta = || system.momenta.iter().flat_map(|momenta| momenta.iter());
+        let momenta: Vec<&str> = of_momenta().map(|name| name.as_str()).collect();
+        let names = FormulaNames {
+            tables: &tables,
+            momenta: &momenta,
+            action: system.action.as_ref().map_or("z", |name| name.as_str()),
+            ..FormulaNames::new(&names, &values)
+        };
+        let parsed = match &system.hamiltonian {
+            Some(_) if momenta.is_empty() && system.momenta.is_some() => {
+                Err(FormulaError::Momenta { found: 0, expected: coordinates.len() })
+            }
+            Some(_) => Formula::parse_hamiltonian(source, &names),
+            None => Formula::parse_lagrangian(source, &names),
+        };
+        return parsed.map_err(|error| match error {
             FormulaError::Parse(mut error) => {
                 if error.message.starts_with("unknown name") && error.nearest.is_none() {
                     error.message += "; a parameter needs a value in `parameters` of [system]";
                 }
-                SceneError::in_string(text, lagrangian.span(), &error)
+                SceneError::in_string(text, source.span(), &error)
             }
             FormulaError::Name { ref name, .. } => {
                 let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
-                let mut known = coordinates.iter().chain(of_parameters).chain(of_tables());
+                let of_system = system.action.iter().chain(coordinates.iter()).chain(of_momenta());
+                let mut known = of_system.chain(of_parameters).chain(of_tables());
                 let at = known.rfind(|known| ***known == *name).map(Location::span);
                 SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
+            }
+            FormulaError::Momenta { .. } => {
+                let at = system.momenta.as_ref().map_or(coordinates.span(), Location::span);
+                SceneError::at(text, at, error.to_string())
             }
             FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),
             error => at_system(error),

@@ -38,7 +38,7 @@ _LATER = {
     "_path": "Path path",
     "_ensemble_derivatives": "EnsembleGradient EnsembleSensitivity ensemble_value_and_grad",
     "_sensitivity": "Gradient LyapunovExponents Sensitivity value_and_grad",
-    "_checks": "Check Comparison Contact Geometry check compare geometry is_contact",
+    "_checks": "Check Comparison Contact Geometry HamiltonianGeometry check compare geometry is_contact",
 }
 _LATER = {name: module for module, names in _LATER.items() for name in names.split()}
 
@@ -80,6 +80,7 @@ __all__ = [
     "Fit",
     "Geometry",
     "Gradient",
+    "HamiltonianGeometry",
     "Interrupted",
     "LyapunovExponents",
     "MemberCrossings",

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,7 @@ class System:
         forces: Sequence[tuple[str, str]] = ...,
         rayleigh: Sequence[str] = ...,
         breaks: Sequence[float] = ...,
+        kind: tuple[bool, Sequence[str], str] | None = None,
     ) -> System: ...
     @property
     def lagrangian(self) -> str: ...
@@ -38,6 +39,10 @@ class System:
     def given_coordinates(self) -> list[str]: ...
     @property
     def parameters(self) -> dict[str, float]: ...
+    @property
+    def momenta(self) -> list[str]: ...
+    @property
+    def kind(self) -> tuple[bool, list[str], str]: ...
     @property
     def dimension(self) -> int: ...
     @property
@@ -334,6 +339,18 @@ class Geometry(NamedTuple):
     volume: float
     herglotz_field: Vector
 
+class HamiltonianGeometry(NamedTuple):
+    hamiltonian: float
+    velocity: Vector
+    rate: float
+    hessian: Vector
+    condition: float
+    eta: Vector
+    reeb: Vector
+    field: Vector
+    lie_derivative: Vector
+    brackets: Vector
+
 class Contact(NamedTuple):
     is_contact: bool
     sigma: float
@@ -396,10 +413,13 @@ class Comparison:
     def plot(self, ax: Any = None) -> Any: ...
 
 def system(
-    L: Lagrangian,
+    L: Lagrangian | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
     *,
+    H: Expression | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
     n: int | None = None,
     force: Force | None = None,
     rayleigh: Expression | None = None,
@@ -407,11 +427,12 @@ def system(
     breaks: Sequence[float] | None = None,
 ) -> System: ...
 def solve(
-    L: Lagrangian,
+    L: Lagrangian | None = None,
     q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
     *,
+    H: Expression | None = None,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
     accuracy: float | None = None,
@@ -430,6 +451,8 @@ def solve(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
 ) -> Solution: ...
 def lattice(
     site: str,
@@ -487,6 +510,7 @@ def ensemble(
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
 ) -> Ensemble: ...
+@overload
 def geometry(
     L: Lagrangian,
     t: float,
@@ -494,9 +518,28 @@ def geometry(
     v: ArrayLike,
     z: float = 0.0,
     *,
+    H: None = None,
+    p: None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
+    momenta: None = None,
+    action: str | None = None,
 ) -> Geometry: ...
+@overload
+def geometry(
+    L: System | None = None,
+    t: float = 0.0,
+    q: ArrayLike | None = None,
+    v: None = None,
+    z: float = 0.0,
+    *,
+    H: Expression | None = None,
+    p: ArrayLike,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
+) -> HamiltonianGeometry: ...
 def value_and_grad(loss: Expression) -> Callable[..., tuple[float, Gradient]]: ...
 def ensemble_value_and_grad(loss: Expression) -> Callable[..., tuple[Vector, EnsembleGradient]]: ...
 def fit(

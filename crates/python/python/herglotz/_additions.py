@@ -134,6 +134,17 @@ def breaks_of(breaks, span=None):
     return tuple(map(float, times))
 
 
+def names_in(coordinates, parameters, kind):
+    """The names for a traced function: coordinates, velocities or the momenta of a Hamiltonian, parameters, action."""
+    hamiltonian, momenta, action = kind
+    names, velocities = velocity_names(tuple(coordinates))
+    second = tuple(_core.momentum_names(list(coordinates), list(momenta))) if hamiltonian else velocities
+    return names, second, parameters, action
+
+
 def names_of(system):
-    """The names of the coordinates, the velocities and the parameters of a system."""
-    return (*velocity_names(tuple(system.given_coordinates)), list(system.parameters))
+    """The same for a system."""
+    return names_in(system.given_coordinates, list(system.parameters), system.kind)
+
+
+LAGRANGIAN = (False, (), "z")

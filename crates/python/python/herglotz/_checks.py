@@ -26,24 +26,67 @@ class Geometry(NamedTuple):
     herglotz_field: np.ndarray  # (2n + 1,)
 
 
-def geometry(L, t, q, v, z=0.0, *, coordinates=None, parameters=None):
-    """The contact geometry of a Lagrangian at a point.
+class HamiltonianGeometry(NamedTuple):
+    """The contact geometry of H at a time and a point of T*Q x R, in n coordinates; vectors have the order q, p, z."""
+
+    hamiltonian: float
+    velocity: np.ndarray  # (n,)
+    rate: float
+    hessian: np.ndarray  # (n, n)
+    condition: float
+    eta: np.ndarray  # (2n + 1,)
+    reeb: np.ndarray  # (2n + 1,)
+    field: np.ndarray  # (2n + 1,)
+    lie_derivative: np.ndarray  # (2n + 1,)
+    brackets: np.ndarray  # (2n + 1,)
+
+
+def geometry(
+    L=None,
+    t=0.0,
+    q=None,
+    v=None,
+    z=0.0,
+    *,
+    H=None,
+    p=None,
+    coordinates=None,
+    parameters=None,
+    momenta=None,
+    action=None,
+):
+    """The contact geometry of a Lagrangian, or of a contact Hamiltonian, at a point.
 
     Parameters
     ----------
-    L, coordinates, parameters
+    L, H, coordinates, parameters, momenta, action
         As in `solve`.
     t, z : float
     q, v : arrays of shape (n,)
+    p : array of shape (n,)
+        For a Hamiltonian, the momentum in place of v.
 
     Returns
     -------
-    Geometry
+    Geometry or HamiltonianGeometry
+        For a Hamiltonian: H, the velocity H_p, the rate -H_z, H_pp and its condition, eta = dz - p dq and its Reeb field,
+        the field X_H = (H_p, -H_q - p H_z, p.H_p - H), L_X eta = -H_z eta, and the Jacobi brackets of H with q, p and z.
+        For a Lagrangian:
         L, the momentum L_v (the Legendre transformation is (q, v, z) -> (q, p, z)), the energy v.p - L, the rate L_z,
         the mass matrix W = L_vv and its condition, the contact form eta = dz - L_v dq, its Reeb field, the volume
         eta ^ (d eta)^n, and the Herglotz field (v, a, L).
     """
-    of = system(L, coordinates, parameters, n=np.size(q))
+    if q is None:
+        raise ValueError("`q` is not given: give the position")
+    names = dict(H=H, momenta=momenta, action=action)
+    of = system(L, coordinates, parameters, n=np.size(q), **names)
+    if of.kind[0]:
+        if p is None or v is not None:
+            raise ValueError("give `p` for a Hamiltonian, and not `v`")
+        found = _core.hamiltonian_geometry(of, (t, q, p, z))
+        return HamiltonianGeometry(**{name: np.array(x) if isinstance(x, list) else x for name, x in found.items()})
+    if v is None or p is not None:
+        raise ValueError("give `v` for a Lagrangian, and not `p`")
     found = _core.geometry(of, (t, q, v, z))
     return Geometry(**{name: np.array(x) if isinstance(x, list) else x for name, x in found.items()})
 

@@ -113,7 +113,7 @@ def _law_of(impact, text):
 
 def _assignments_of(what, given, system, tables):
     """The new values of variables: pairs of a variable and a formula."""
-    names = coordinates, velocities, _ = names_of(system)
+    names = coordinates, velocities, _, action = names_of(system)
     if hasattr(given, "items"):
         return [(str(variable), text_of(f"{what}[{variable!r}]", of, names, tables)) for variable, of in given.items()]
     if not callable(given) or isinstance(given, _core.Table):
@@ -130,5 +130,5 @@ def _assignments_of(what, given, system, tables):
     q, v = (_trace.texts_of(x, n, name, given, names, tables) for x, name in zip(found, ("q", "v")))
     z = [_trace.value_text(found[2], given, names, tables)] if len(found) == 3 else []
     # Variables that keep their values are not assigned.
-    pairs = zip((*coordinates, *velocities, "z"), (*q, *v, *z))
+    pairs = zip((*coordinates, *velocities, action), (*q, *v, *z))
     return [(variable, text) for variable, text in pairs if text != variable]

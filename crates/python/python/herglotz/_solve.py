@@ -8,11 +8,12 @@ from ._system import check_parameters, copied, expression, system, with_tables
 
 
 def solve(
-    L,
+    L=None,
     q0=None,
     v0=None,
     t=None,
     *,
+    H=None,
     p0=None,
     z0=0.0,
     accuracy=None,
@@ -31,8 +32,12 @@ def solve(
     rayleigh=None,
     tables=None,
     breaks=None,
+    momenta=None,
+    action=None,
 ):
     """The motion of a Lagrangian system: Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
+
+    Or that of a contact Hamiltonian: q' = H_p, p' = -H_q - p H_z, z' = p.H_p - H.
 
     Parameters
     ----------
@@ -44,6 +49,9 @@ def solve(
     t : float or array of shape (k,)
         The times of the rows: the first is the initial time, the last the final time, in either direction. A single
         number is the final time of a motion from 0.
+    H : function or str, optional
+        In place of `L`, a contact Hamiltonian ``H(t, q, p, z)`` or its formula, as in `system`. It starts from `p0`, or
+        from `v0` where H_pp is regular, and runs by a Gauss method.
     p0 : array of shape (n,), optional
         The initial momentum, in place of `v0`.
     z0 : float
@@ -77,6 +85,9 @@ def solve(
     breaks : list of float, optional
         Times of jumps within the span, in ascending order: steps end there. Those that the formulas show, as samples of
         tables and ``np.where(t < 3, ...)``, are known without it.
+
+    momenta, action
+        As in `system`.
 
     Returns
     -------
@@ -115,12 +126,16 @@ def request_of(
     rayleigh,
     tables,
     breaks,
+    H=None,
+    momenta=None,
+    action=None,
 ):
     """The system and the request for the arguments of `solve`, with the names of the events and of the columns."""
-    given = (L, *functions_of(force, rayleigh))
+    given = (L if H is None else H, *functions_of(force, rayleigh))
     more = force, rayleigh, tables, breaks
-    if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in more):
-        L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
+    kind = H, momenta, action
+    if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in (*more, *kind)):
+        L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more, kind)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or the times of the rows")
     if (v0 is None) == (p0 is None):
@@ -160,9 +175,9 @@ def run(L, request, event_names, observed, halted=None):
     return sol
 
 
-def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4):
+def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4, kind=(None,) * 3):
     """The system of an argument, and the start, which the catalogue may provide."""
-    if isinstance(L, str) and L in CATALOGUE:
+    if isinstance(L, str) and L in CATALOGUE and kind[2] is None:
         entry = CATALOGUE[L]
         if q0 is None and v0 is None and p0 is None:
             q0, v0 = entry[5], entry[6]
@@ -170,7 +185,9 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4):
         raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1
     force, rayleigh, tables, breaks = more
-    of = system(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks)
+    H, momenta, action = kind
+    names = dict(H=H, momenta=momenta, action=action)
+    of = system(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks, **names)
     return of, q0, v0
 
 

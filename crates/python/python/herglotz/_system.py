@@ -7,7 +7,7 @@ from types import FunctionType
 import numpy as np
 
 from . import _core, _trace
-from ._additions import Additions, additions_of, names_of, velocity_names
+from ._additions import LAGRANGIAN, Additions, additions_of, names_in, names_of
 
 _SYSTEMS = {}
 # The number of systems of texts that are cached, so that a text is parsed once.
@@ -15,9 +15,20 @@ _MOST = 256
 
 
 def system(
-    L, coordinates=None, parameters=None, *, n=None, force=None, rayleigh=None, tables=None, breaks=None
+    L=None,
+    coordinates=None,
+    parameters=None,
+    *,
+    H=None,
+    momenta=None,
+    action=None,
+    n=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
 ):
-    """The system of a Lagrangian.
+    """The system of a Lagrangian, or of a contact Hamiltonian.
 
     Parameters
     ----------
@@ -29,6 +40,14 @@ def system(
         ``"q[n]"``.
     parameters : dict of float, optional
         The values of the parameters by name.
+    H : function or str, optional
+        In place of `L`, a contact Hamiltonian: ``H(t, q, p, z)``, or a formula in the coordinates ``x`` and the momenta
+        ``p_x``. Its motions satisfy q' = H_p, p' = -H_q - p H_z, z' = p.H_p - H; H_pp may be singular. It has up to 4
+        coordinates, and no forces and breaks.
+    momenta : list of str, optional
+        The names of the momenta of `H` in formulas, in the order of the coordinates.
+    action : str, optional
+        The name of the action in formulas, by default ``"z"``; with another one ``z`` may be a coordinate.
     n : int, optional
         The number of coordinates, where they have no names.
     force : function, dict of str, or str, optional
@@ -50,6 +69,18 @@ def system(
     """
     if parameters is not None and not hasattr(parameters, "keys"):
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
+    if (L is None) == (H is None):
+        raise ValueError("give either `L` or `H`")
+    if momenta is not None and H is None:
+        raise ValueError("`momenta` are names for `H`: remove them, or give `H`")
+    if isinstance(momenta, str):
+        momenta = [momenta]
+    if action is not None and not isinstance(action, str):
+        raise ValueError(f'`action` is {action!r}; it must be a name, as in action="s"')
+    given = L if H is None else H
+    if isinstance(given, _core.System) and (H is not None or action is not None):
+        raise ValueError("a System has its names already: give it as `L`, without `H` and `action`")
+    kind = (H is not None, tuple(momenta or ()), "z" if action is None else action)
     is_plain = force is None and rayleigh is None and not tables and breaks is None
     if isinstance(L, _core.System):
         if is_plain:
@@ -57,22 +88,23 @@ def system(
         text, coordinates, known = L.lagrangian, L.given_coordinates, L.parameters
         parameters = known | dict(parameters or {})
         more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks))
+        kind = (L.kind[0], tuple(L.kind[1]), L.kind[2])
     else:
         found = {}
-        text, coordinates, parameters = _text_of(L, coordinates, parameters, n, found)
+        text, coordinates, parameters = _text_of(given, coordinates, parameters, n, found, kind)
         more = Additions(tuple(found.items()))
     if not is_plain:
-        of = (*velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        of = names_in(coordinates, tuple(parameters or ()), kind)
         more = more.plus(additions_of(force, rayleigh, tables, breaks, of))
-    return _built(text, coordinates, parameters, more)
+    return _built(text, coordinates, parameters, more, kind)
 
 
-def _text_of(L, coordinates, parameters, n, tables):
+def _text_of(L, coordinates, parameters, n, tables, kind):
     """The formula of a Lagrangian, the coordinates and the parameters; the tables in it are added to `tables`."""
     if isinstance(coordinates, str):
         coordinates = [coordinates]
     if isinstance(L, str):
-        if coordinates is None and L.isidentifier():
+        if coordinates is None and L.isidentifier() and not kind[0]:
             for name, _, coordinates, formula, values, _, _ in _core.catalogue():
                 if name == L:
                     return formula, coordinates, dict(values) | dict(parameters or {})
@@ -80,12 +112,15 @@ def _text_of(L, coordinates, parameters, n, tables):
         return L, names(coordinates, n), parameters
     if type(L) is FunctionType or (callable(L) and not hasattr(L, "free_symbols")):
         coordinates = names(coordinates, n)
-        of = (*velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        of = names_in(coordinates, tuple(parameters or ()), kind)
         return _trace.formula_of(L, of, tables), coordinates, parameters
-    if hasattr(L, "free_symbols"):
+    if hasattr(L, "free_symbols") and kind == LAGRANGIAN:
         from ._sympy import formula_of_expression
 
         return *formula_of_expression(L, coordinates, parameters), parameters
+    if kind != LAGRANGIAN:
+        letter = "H" if kind[0] else "L"
+        raise TypeError(f"{letter} is a {type(L).__name__}; it must be a function or a formula")
     raise TypeError(f"L is a {type(L).__name__}; it must be a function, a formula, a SymPy expression or a System")
 
 
@@ -145,15 +180,15 @@ def names(coordinates, n):
     return [f"q[{n}]"]
 
 
-def _built(text, coordinates, parameters, more):
+def _built(text, coordinates, parameters, more, kind):
     try:
-        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else (), more)
+        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else (), more, kind)
         found = _SYSTEMS.get(key)
     except TypeError:
         # A value that cannot be hashed is not a number, and is refused below.
         key = found = None
     if found is None:
-        found = _core.System(text, list(coordinates), parameters, *map(list, more))
+        found = _core.System(text, list(coordinates), parameters, *map(list, more), kind)
         if len(_SYSTEMS) >= _MOST:
             _SYSTEMS.clear()
         if key is not None:

@@ -255,7 +255,7 @@ def formula_of(function, names, tables):
 
 def call_traced(function, names):
     """The value of a function (t, q, v, z, **parameters) of symbols."""
-    coordinates, _, parameters = names
+    coordinates, _, parameters = names[:3]
     t, q, v, z, values = symbols(len(coordinates), len(parameters))
     wanted = _parameters_of(function)
     if wanted is None:

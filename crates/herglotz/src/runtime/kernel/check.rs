@@ -1,16 +1,18 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
+use super::formula_system::FormulaSystem;
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
 use crate::runtime::{
-    Check, Interrupt, MomentumSample, Motion, NotContact, RuntimeError, Sample, StatementResidual, StepControl,
+    Check, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual, StepControl,
 };
 use contact_geom::{
     ChartVector, Lagrangian, OneParameterGroup, PhasePoint, Statement,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, theory::legendre_inverse,
+    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, hamiltonian,
+    hamiltonian::ModifiedDefect, theory::legendre_inverse,
 };
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
@@ -26,6 +28,9 @@ const THEOREM_SAMPLES: usize = 3;
 /// The number of steps between two polls of the interrupt: a poll is then inexpensive compared with the steps.
 const STEPS_BETWEEN_POLLS: usize = 256;
 
+/// The number of steps of a motion whose modified Hamiltonians are compared.
+const MODIFIED_STEPS: f64 = 256.0;
+
 /// The number of stages of the discrete Lagrangian for the theorems, where the integrator of the motion is not a
 /// collocation method: order 8.
 const DEFAULT_STAGES: usize = 4;
@@ -33,23 +38,26 @@ const DEFAULT_STAGES: usize = 4;
 /// The theorems are given up when the step has been halved six times without a discrete Lagrangian for its two points.
 const MAX_STEP_DIVISION: f64 = 64.0;
 
+/// A sample of a motion: the time, the state, and the logarithm of the conformal factor.
+type State<const N: usize> = (f64, PhasePoint<N>, f64);
+
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
-fn step<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+fn step<L: FormulaSystem<N>, const N: usize>(
+    lagrangian: &L,
     (by, h, count): (AnyIntegrator, f64, usize),
     t: f64,
     from: &PhasePoint<N>,
 ) -> Result<(PhasePoint<N>, f64), RuntimeError> {
     let problem = Problem::new(lagrangian, t, Start::from(*from))?;
-    let plan = problem.by(by).steps(Steps::Count(count)).plan(Until::After(h))?;
+    let plan = problem.by(L::by(by)?).steps(Steps::Count(count)).plan(Until::After(h))?;
     let mut stepper = plan.stepper()?;
     stepper.advance(count).map_err(|failure| failure.cause)?;
     Ok((stepper.state(), stepper.sigma()))
 }
 
 /// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size.
-fn contact_defect<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+fn contact_defect<L: FormulaSystem<N>, const N: usize>(
+    lagrangian: &L,
     map: (AnyIntegrator, f64, usize),
     t: f64,
     at: &PhasePoint<N>,
@@ -81,8 +89,8 @@ fn contact_defect<const N: usize>(
 }
 
 /// The distance of a step from the exact motion, relative to the size of the state and per unit of time.
-fn herglotz_defect<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+fn herglotz_defect<L: FormulaSystem<N>, const N: usize>(
+    lagrangian: &L,
     map: (AnyIntegrator, f64, usize),
     t: f64,
     at: &PhasePoint<N>,
@@ -93,12 +101,23 @@ fn herglotz_defect<const N: usize>(
     Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / map.1.abs())
 }
 
-pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+/// The contact and Herglotz defects of the steps of a motion, without the theorems on discrete Lagrangians.
+pub(super) fn of_steps<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    samples: usize,
+) -> Result<Check, RuntimeError> {
+    Ok(along(system, motion, samples)?.0)
+}
+
+/// The same, with the states at the samples, and with the number of stages of the integrator, if it is a collocation.
+fn along<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    samples: usize,
+) -> Result<(Check, Vec<State<N>>, Option<usize>), RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let by = match motion.step_control {
-        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
-        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
-    };
+    let by = integrator(motion, &plan)?;
     let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
     let problem = system.problem_of(motion)?;
     let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
@@ -106,7 +125,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
     let stride = plan.steps.div_ceil(samples.max(1));
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
-    let mut states: Vec<(f64, PhasePoint<N>, f64)> = vec![(motion.start.t, *problem.state(), 0.0)];
+    let mut states: Vec<State<N>> = vec![(motion.start.t, *problem.state(), 0.0)];
     let mut record = |at: &discrete_herglotz::StepView<'_, N>| {
         if at.k.is_multiple_of(stride) && !at.last {
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
@@ -117,7 +136,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             ControlFlow::Continue(())
         }
     };
-    problem.by(by).steps(steps).with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
+    problem.by(L::by(by)?).steps(steps).with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
     let map = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {
@@ -136,15 +155,48 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             momenta,
         });
     }
-    let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
-    let stages = plan.integrator.collocation.unwrap_or(DEFAULT_STAGES);
-    let forced = Lagrangian::has_force(lagrangian);
-    let not_contact = match forced {
+    let not_contact = match lagrangian.has_force() {
         true => Some(NotContact::Forced),
         false => lagrangian.formula().has_noncontact_resets().then_some(NotContact::Reset),
     };
+    let integrator = plan.integrator.name.to_string();
+    let check = Check { integrator, step_size: h, samples: along, statements: Vec::new(), not_contact };
+    Ok((check, states, plan.integrator.collocation))
+}
+
+/// The integrator of a motion.
+fn integrator(motion: &Motion, plan: &Plan) -> Result<AnyIntegrator, RuntimeError> {
+    Ok(match motion.step_control {
+        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
+        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
+    })
+}
+
+/// See [`System::modified_defects`](crate::runtime::System::modified_defects).
+pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    most: usize,
+) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+    let plan = super::run::plan(system, motion)?;
+    let (by, h, problem) = (L::by(integrator(motion, &plan)?)?, plan.step_size, system.problem_of(motion)?);
+    let span = (motion.end - motion.start.t).abs().min(MODIFIED_STEPS * h.abs());
+    Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?)
+}
+
+pub(super) fn check<const N: usize>(
+    system: &Sized<FormulaLagrangian<N>, N>,
+    motion: &Motion,
+    samples: usize,
+) -> Result<Check, RuntimeError> {
+    let (mut check, states, collocation) = along(system, motion, samples)?;
+    let (h, lagrangian) = (check.step_size, &system.0);
+    let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
+    let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
+    let stages = collocation.unwrap_or(DEFAULT_STAGES);
+    let forced = Lagrangian::has_force(lagrangian);
     let mut shorter = h;
-    let stated = loop {
+    check.statements = loop {
         if forced {
             // The theorems are about discrete Lagrangians, which do not exist with a force.
             break virtual_work(lagrangian, stages, h, &of_theorems)?;
@@ -160,8 +212,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, samples:
             ended => break ended?,
         }
     };
-    let integrator = plan.integrator.name.to_string();
-    Ok(Check { integrator, step_size: h, samples: along, statements: stated, not_contact })
+    Ok(check)
 }
 
 /// The contact defect of Gauss steps beside the virtual work of the force: the largest residual over some samples. Those
@@ -170,9 +221,9 @@ fn virtual_work<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     stages: usize,
     h: f64,
-    samples: &[&(f64, PhasePoint<N>, f64)],
+    samples: &[&State<N>],
 ) -> Result<Vec<StatementResidual>, RuntimeError> {
-    let of = |(t, x, _): &&(f64, PhasePoint<N>, f64)| -> Result<f64, RuntimeError> {
+    let of = |(t, x, _): &&State<N>| -> Result<f64, RuntimeError> {
         let guess = legendre_inverse(lagrangian, *t, x, &x.p)?.v;
         Ok(VirtualWork::of_step(lagrangian, stages, h, *t, x, &guess)?.residual())
     };
@@ -189,9 +240,9 @@ fn virtual_work<const N: usize>(
 /// The theorems for the discrete Lagrangian of contact Gauss collocation with step h: the largest residuals over the
 /// steps from some samples.
 fn theorems_with<const N: usize>(
-    system: &Sized<N>,
+    system: &Sized<FormulaLagrangian<N>, N>,
     stages: usize,
-    (h, samples): (f64, &[&(f64, PhasePoint<N>, f64)]),
+    (h, samples): (f64, &[&State<N>]),
 ) -> Result<Vec<StatementResidual>, RuntimeError> {
     let n = system.0.formula().dimension();
     let mut points = Vec::with_capacity(samples.len());

@@ -1,17 +1,18 @@
 //! Ensembles: many motions at once.
 
+use super::formula_system::{FormulaSystem, Observed};
 use super::observed::{MemberObserver, MemberRecord};
 use super::recorder::{Crossings, check_events, number};
 use super::sized::{Sized, coordinates};
 use crate::runtime::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, StepControl, Varied};
+use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{
     Ensemble, InputError, Row, Start, Until,
     ensemble::{EnsembleError, Member, Tally},
     theory::legendre_inverse,
 };
-use formula_lagrangian::{Expression, FormulaLagrangian};
+use formula_lagrangian::Expression;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -30,8 +31,8 @@ const MAX_SHARDS_BETWEEN_POLLS: usize = 24;
 const MAX_TIME_BETWEEN_POLLS: Duration = Duration::from_millis(100);
 
 /// Runs an ensemble block by block, so that it can be interrupted and its memory does not grow.
-pub(super) fn run<const N: usize>(
-    system: &Sized<N>,
+pub(super) fn run<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
     ensemble: &crate::runtime::Ensemble<'_>,
     monitor: &mut dyn EnsembleMonitor,
 ) -> Result<Tally, RuntimeError> {
@@ -83,8 +84,8 @@ pub(super) fn run<const N: usize>(
 }
 
 /// Members that are run together.
-struct Block<'b, const N: usize> {
-    system: &'b Sized<N>,
+struct Block<'b, L, const N: usize> {
+    system: &'b Sized<L, N>,
     ensemble: &'b crate::runtime::Ensemble<'b>,
     members: Range<usize>,
     tally: &'b mut Tally,
@@ -93,7 +94,7 @@ struct Block<'b, const N: usize> {
     ended: bool,
 }
 
-impl<const N: usize> Block<'_, N> {
+impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
     fn run(&mut self, observed: bool) -> Result<(), RuntimeError> {
         match self.run_as_one(self.members.clone(), observed) {
             // A member that is checked before the run cannot start: run each member by itself.
@@ -125,7 +126,7 @@ impl<const N: usize> Block<'_, N> {
         let crate::runtime::Ensemble { t0, end, step_control, columns, events, .. } = *ensemble;
         let (first, n) = (members.start, system.0.formula().dimension());
         let start = |i: usize| system.start_of_member(&(ensemble.start)(first + i));
-        let own: Option<Vec<Option<MemberSystem<N>>>> = ensemble.varied.as_ref().map(|varied| {
+        let own: Option<Vec<Option<MemberSystem<L>>>> = ensemble.varied.as_ref().map(|varied| {
             let with = |i: usize| {
                 let mut lagrangian = system.0.clone();
                 let values = (varied.values)(i);
@@ -148,10 +149,11 @@ impl<const N: usize> Block<'_, N> {
                 None => (&system.0, invalid_start()),
             }),
         };
+        let refused = |cause| EnsembleError::Member { index: first, cause };
         let many = match step_control {
             StepControl::Accuracy { error, by: None } => many.accuracy(error),
-            StepControl::Accuracy { error, by: Some(by) } => many.by(by).accuracy(error),
-            StepControl::Steps { by, steps } => many.by(by).steps(steps),
+            StepControl::Accuracy { error, by: Some(by) } => many.by(L::by(by).map_err(refused)?).accuracy(error),
+            StepControl::Steps { by, steps } => many.by(L::by(by).map_err(refused)?).steps(steps),
         };
         let many = match ensemble.threads {
             Some(threads) => many.threads(threads),
@@ -197,7 +199,9 @@ impl<const N: usize> Block<'_, N> {
         let of_block = if observed {
             let observer = |i: usize| {
                 let events = own_of(i).map_or(Some(events), |own| own.map(|own| own.events.as_slice()));
-                let crossings = lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l, events, None));
+                let crossings = lagrangian(i)
+                    .zip(events)
+                    .and_then(|(l, events)| Crossings::of(l as &dyn Observed<N>, events, None));
                 MemberObserver::<N>::new(ensemble.rows.as_ref(), columns, crossings)
             };
             let many = many.observe(observer, MemberObserver::into_record);
@@ -218,8 +222,8 @@ impl<const N: usize> Block<'_, N> {
 }
 
 /// The Lagrangian and the events of a member with parameters of its own.
-struct MemberSystem<const N: usize> {
-    lagrangian: FormulaLagrangian<N>,
+struct MemberSystem<L> {
+    lagrangian: L,
     events: Vec<Event>,
 }
 
@@ -270,15 +274,15 @@ pub(super) fn invalid_start<const N: usize>() -> Start<N> {
     VelocityPoint { q: none, v: none, z: f64::NAN }.into()
 }
 
-impl<const N: usize> Sized<N> {
+impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
     pub(super) fn start_of_member(&self, start: &crate::runtime::Start) -> Start<N> {
         self.start(start).unwrap_or_else(|_| invalid_start())
     }
 }
 
 /// The end of a member as a row.
-fn end_of<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+fn end_of<L: FormulaSystem<N>, const N: usize>(
+    lagrangian: &L,
     ending: &discrete_herglotz::ensemble::Ending<N>,
     last: Option<&Row<N>>,
 ) -> Row<N> {
@@ -289,7 +293,11 @@ fn end_of<const N: usize>(
         let guess = last.map_or_else(SVector::zeros, |row| row.p);
         legendre_inverse(lagrangian, t, x, &guess).ok().map(|x| x.v)
     });
-    let energy = v.map(|v| v.dot(&x.p) - lagrangian.value(t, &x.q, &v, x.z));
+    let energy = if const { L::HINTS.hamiltonian } {
+        lagrangian.hamiltonian_with_gradient(t, x).map(|(h, _)| h)
+    } else {
+        v.map(|v| v.dot(&x.p) - lagrangian.value(t, &x.q, &v, x.z))
+    };
     Row {
         t,
         q: x.q,

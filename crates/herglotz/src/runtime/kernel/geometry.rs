@@ -7,6 +7,7 @@ use contact_geom::{
     ChartVector, ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, VelocityPoint, herglotz_field,
     legendre,
 };
+use formula_lagrangian::FormulaLagrangian;
 
 /// The components of a vector on TQ x R in the first n coordinates.
 fn components<const N: usize>(x: &ChartVector<N>, n: usize) -> Vec<f64> {
@@ -19,7 +20,10 @@ fn added(n: usize, all: usize) -> f64 {
     (n + 1..=all).map(|k| if k.is_multiple_of(2) { -(k as f64) } else { k as f64 }).product()
 }
 
-pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geometry, RuntimeError> {
+pub(super) fn at<const N: usize>(
+    system: &Sized<FormulaLagrangian<N>, N>,
+    at: &Start,
+) -> Result<Geometry, RuntimeError> {
     let problem = system.problem(at)?;
     let (lagrangian, t, x, n) = (&system.0, at.t, problem.start(), system.0.formula().dimension());
     let form = LagrangianForm { lagrangian, t };
@@ -42,7 +46,7 @@ pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geomet
 }
 
 /// The Herglotz field at `y = (q, v)` or `y = (q, v, z)`.
-pub(super) fn rates<const N: usize>(system: &Sized<N>, t: f64, y: &[f64], to: &mut [f64]) {
+pub(super) fn rates<const N: usize>(system: &Sized<FormulaLagrangian<N>, N>, t: f64, y: &[f64], to: &mut [f64]) {
     let n = system.0.formula().dimension();
     let part = |first: usize| {
         SVector::<f64, N>::from_fn(|i, _| if i < n { y.get(first + i).copied().unwrap_or(f64::NAN) } else { 0.0 })

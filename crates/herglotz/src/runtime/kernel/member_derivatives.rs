@@ -15,7 +15,7 @@ use formula_lagrangian::FormulaLagrangian;
 const MEMBERS_PER_BLOCK: usize = 1024;
 
 pub(super) fn gradients<const N: usize>(
-    system: &Sized<N>,
+    system: &Sized<FormulaLagrangian<N>, N>,
     ensemble: &Ensemble<'_>,
     times: &[f64],
     loss: &BatchLoss<'_>,
@@ -34,7 +34,7 @@ pub(super) fn gradients<const N: usize>(
 }
 
 pub(super) fn sensitivities<const N: usize>(
-    system: &Sized<N>,
+    system: &Sized<FormulaLagrangian<N>, N>,
     ensemble: &Ensemble<'_>,
     variables: &[Variable],
     times: &[f64],
@@ -49,7 +49,7 @@ pub(super) fn sensitivities<const N: usize>(
 
 /// Calls a function with ensembles of consecutive members, and the index of the first of each.
 fn each_block<R, const N: usize>(
-    system: &Sized<N>,
+    system: &Sized<FormulaLagrangian<N>, N>,
     ensemble: &Ensemble<'_>,
     interrupt: Option<&Interrupt>,
     mut work: impl FnMut(

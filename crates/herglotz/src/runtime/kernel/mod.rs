@@ -2,7 +2,9 @@
 
 mod check;
 mod ensemble;
+mod formula_system;
 mod geometry;
+mod hamiltonian;
 mod member_derivatives;
 mod observed;
 pub(crate) mod path;
@@ -14,12 +16,13 @@ mod theorems;
 mod work_thread;
 
 use crate::runtime::{
-    BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, Interrupt, Loss, LossGradient,
-    LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
+    BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, HamiltonianGeometry, Interrupt, Loss,
+    LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
-use contact_geom::{Lagrangian, Structure, Symmetry};
+use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
+use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
-use formula_lagrangian::{Formula, FormulaError};
+use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use sized::Sized;
 use std::sync::Arc;
 use work_thread::on_large_stack;
@@ -31,7 +34,13 @@ pub(crate) trait Kernel: Send + Sync {
     fn is_smooth(&self) -> bool;
     fn has_force(&self) -> bool;
     fn symmetries(&self) -> Vec<FormulaSymmetry>;
-    fn to_rust(&self, name: &str) -> Result<String, FormulaError>;
+    fn to_rust(&self, _name: &str) -> Result<String, FormulaError> {
+        Err(FormulaError::IsHamiltonian { what: "Rust source", remedy: "implement `ContactHamiltonian` for a type" })
+    }
+    /// The proved structure of a Hamiltonian; `None` for a Lagrangian.
+    fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
+        None
+    }
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError>;
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError>;
@@ -42,51 +51,80 @@ pub(crate) trait Kernel: Send + Sync {
         from: Option<ResumeState>,
     ) -> Result<Outcome, RuntimeError>;
     fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError>;
-    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]);
-    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
+    fn rates(&self, _t: f64, _y: &[f64], to: &mut [f64]) {
+        to.fill(f64::NAN);
+    }
+    fn geometry(&self, _at: &Start) -> Result<Geometry, RuntimeError> {
+        Err(of_lagrangians("geometry on TQ x R"))
+    }
+    fn hamiltonian_geometry(&self, _at: &Start) -> Result<HamiltonianGeometry, RuntimeError> {
+        Err(FormulaError::IsLagrangian.into())
+    }
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError>;
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError>;
     fn sensitivity(
         &self,
-        motion: &Motion,
-        variables: &[Variable],
-        times: &[f64],
-        monitor: &mut dyn RunMonitor,
-    ) -> Result<Sensitivity, RuntimeError>;
+        _motion: &Motion,
+        _variables: &[Variable],
+        _times: &[f64],
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
     fn gradient(
         &self,
-        motion: &Motion,
-        times: &[f64],
-        loss: &mut Loss<'_>,
-        monitor: &mut dyn RunMonitor,
-    ) -> Result<LossGradient, RuntimeError>;
+        _motion: &Motion,
+        _times: &[f64],
+        _loss: &mut Loss<'_>,
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
     fn lyapunov_exponents(
         &self,
-        motion: &Motion,
-        monitor: &mut dyn RunMonitor,
-    ) -> Result<LyapunovExponents, RuntimeError>;
+        _motion: &Motion,
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
     fn ensemble_gradient(
         &self,
-        ensemble: &Ensemble<'_>,
-        times: &[f64],
-        loss: &BatchLoss<'_>,
-        interrupt: Option<&Interrupt>,
-    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError>;
+        _ensemble: &Ensemble<'_>,
+        _times: &[f64],
+        _loss: &BatchLoss<'_>,
+        _interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
     fn ensemble_sensitivity(
         &self,
-        ensemble: &Ensemble<'_>,
-        variables: &[Variable],
-        times: &[f64],
-        interrupt: Option<&Interrupt>,
-    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError>;
+        _ensemble: &Ensemble<'_>,
+        _variables: &[Variable],
+        _times: &[f64],
+        _interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+}
+
+/// What a Hamiltonian has no kernel for.
+const DERIVATIVES: &str = "derivatives of motions";
+
+/// The error of what is compiled for Lagrangians only.
+fn of_lagrangians(what: &'static str) -> RuntimeError {
+    RuntimeError::OfLagrangians { what }
 }
 
 /// The kernel of a formula.
-pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaError> {
+pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
+    if formula.is_hamiltonian() {
+        return hamiltonian::kernel_of(formula);
+    }
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
                 $(found if found <= $n => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
-                found => Err(FormulaError::Dimension { found }),
+                found => Err(FormulaError::Dimension { found }.into()),
             }
         };
     }
@@ -94,7 +132,7 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaErr
     of!(1 2 3 4 6 8 16)
 }
 
-impl<const N: usize> Kernel for Sized<N> {
+impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     fn formula(&self) -> &Formula {
         self.0.formula()
     }
@@ -164,6 +202,10 @@ impl<const N: usize> Kernel for Sized<N> {
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
         on_large_stack(|| check::check(self, motion, samples))
+    }
+
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        check::modified_defects(self, motion, most)
     }
 
     fn sensitivity(

@@ -1,5 +1,6 @@
 //! The observer of a motion: rows, events, nodes, and polling for interruption.
 
+use super::formula_system::Observed;
 use super::sized::coordinates;
 use crate::runtime::{
     AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
@@ -8,9 +9,8 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
     Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
-    theory::legendre_inverse,
 };
-use formula_lagrangian::{Expression, FormulaLagrangian};
+use formula_lagrangian::Expression;
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::rc::Rc;
@@ -34,7 +34,7 @@ pub(super) struct Recorder<'r, const N: usize> {
 
 impl<'r, const N: usize> Recorder<'r, N> {
     pub fn new(
-        lagrangian: &'r FormulaLagrangian<N>,
+        lagrangian: &'r dyn Observed<N>,
         motion: &'r Motion,
         monitor: &'r mut dyn RunMonitor,
     ) -> Result<Self, RuntimeError> {
@@ -109,7 +109,7 @@ pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -
     let any = |of: fn(&Column) -> bool| columns.iter().any(of);
     let velocity = any(|c| match c {
         Column::Velocity(_) => true,
-        Column::Expression(e) => e.has_velocity(),
+        Column::Expression(e) => e.has_velocity() && !e.is_of_hamiltonian(),
         _ => false,
     });
     let action = any(|c| match c {
@@ -136,7 +136,7 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
         Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
         Column::Expression(e) => {
             // An expression that does not contain v or z ignores the zeros here.
-            let v = row.v.unwrap_or_else(SVector::zeros);
+            let v = if e.is_of_hamiltonian() { row.p } else { row.v.unwrap_or_else(SVector::zeros) };
             let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
             e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
         }
@@ -146,7 +146,7 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
 /// Rejects events with the conformal factor where it is not known at all times, terminal events that count from a given
 /// time or have a reset, and events with a reset that the formula does not have.
 pub(super) fn check_events<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+    lagrangian: &dyn Observed<N>,
     events: &[crate::runtime::Event],
 ) -> Result<(), RuntimeError> {
     let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
@@ -180,7 +180,7 @@ struct EventContext<const N: usize> {
 
 /// An expression as a function of time and of a state `(q, p, z)` of a motion.
 fn at_states<'r, const N: usize>(
-    lagrangian: &'r FormulaLagrangian<N>,
+    lagrangian: &'r dyn Observed<N>,
     function: &'r Expression,
     context: Rc<EventContext<N>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
@@ -188,9 +188,9 @@ fn at_states<'r, const N: usize>(
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
-            match legendre_inverse(lagrangian, t, state, &context.velocity.get()) {
-                Ok(x) => context.velocity.set(x.v),
-                Err(_) => return f64::NAN,
+            match lagrangian.velocity_or_momentum(t, state, &context.velocity.get()) {
+                Some(v) => context.velocity.set(v),
+                None => return f64::NAN,
             }
         }
         let v = context.velocity.get();
@@ -200,7 +200,7 @@ fn at_states<'r, const N: usize>(
 
 /// The events of a motion, with the data needed to evaluate them.
 pub(super) struct Crossings<'r, const N: usize> {
-    lagrangian: &'r FormulaLagrangian<N>,
+    lagrangian: &'r dyn Observed<N>,
     /// The events without a reset, whose sign changes are searched for, and their indices.
     events: Events<'r, N>,
     searched: Vec<usize>,
@@ -220,7 +220,7 @@ pub(super) struct Crossings<'r, const N: usize> {
 impl<'r, const N: usize> Crossings<'r, N> {
     /// `None` where there are no events.
     pub fn of(
-        lagrangian: &'r FormulaLagrangian<N>,
+        lagrangian: &'r dyn Observed<N>,
         events: &'r [crate::runtime::Event],
         start: Option<&Start>,
     ) -> Option<Self> {
@@ -293,7 +293,9 @@ impl<'r, const N: usize> Crossings<'r, N> {
             let (PhasePoint { q, p, z }, v) = (before, velocity(&before));
             let log_factor = self.rate * (t - self.context.start_time.get());
             let columns = requested.map_or(&[][..], |event| &event.columns).iter();
-            let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
+            let of_expression = if self.lagrangian.formula().is_hamiltonian() { p } else { v };
+            let state = (q.as_slice(), of_expression.as_slice(), z);
+            let columns = columns.map(|e| e.at_factor(t, state, log_factor)).collect();
             let vectors = |[q, v, p]: [SVector<f64, N>; 3]| [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
             let after = after.as_ref().map(|after| {
                 let [q, v, p] = vectors([after.q, velocity(after), after.p]);
@@ -334,7 +336,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
 type Found<const N: usize> = (usize, f64, PhasePoint<N>, Option<PhasePoint<N>>);
 
 fn of<'r, const N: usize>(
-    lagrangian: &'r FormulaLagrangian<N>,
+    lagrangian: &'r dyn Observed<N>,
     event: &'r crate::runtime::Event,
     context: Rc<EventContext<N>>,
 ) -> Event<'r, N> {

@@ -1,5 +1,6 @@
 //! Derivatives of motions.
 
+use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::run;
 use super::sized::{Sized, coordinates};
@@ -7,7 +8,7 @@ use crate::runtime::{
     Gradient, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
     StateCovector,
 };
-use contact_geom::Lagrangian;
+use contact_geom::Parametric;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::Until;
 use discrete_herglotz::sensitivity::{EndCovector, EndState, StateDerivative, Tangent, Variable};
@@ -59,8 +60,8 @@ pub(super) fn sensitivity_of<const N: usize>(found: &Tangent<N>, n: usize) -> Se
     }
 }
 
-pub(super) fn tangent<const N: usize>(
-    system: &Sized<N>,
+pub(super) fn tangent<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
+    system: &Sized<L, N>,
     motion: &Motion,
     variables: &[Variable],
     times: &[f64],
@@ -74,8 +75,8 @@ pub(super) fn tangent<const N: usize>(
     Ok(sensitivity_of(&found, n))
 }
 
-pub(super) fn lyapunov_exponents<const N: usize>(
-    system: &Sized<N>,
+pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
+    system: &Sized<L, N>,
     motion: &Motion,
     monitor: &mut dyn RunMonitor,
 ) -> Result<LyapunovExponents, RuntimeError> {
@@ -84,13 +85,13 @@ pub(super) fn lyapunov_exponents<const N: usize>(
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
     let found = run.lyapunov_exponents_within(n, Until::Time(motion.end))?;
-    let is_paired = system.0.proved().has_constant_rate() && !Lagrangian::has_force(&system.0);
+    let is_paired = system.0.structure().has_constant_rate() && !system.0.has_force();
     Ok(LyapunovExponents {
         status: found.outcome.status,
         t: found.outcome.t,
         steps: found.outcome.steps,
         pairing_defect: is_paired.then(|| found.pairing_defect()),
-        volume_defect: (!Lagrangian::has_force(&system.0)).then(|| found.volume_defect()),
+        volume_defect: (!system.0.has_force()).then(|| found.volume_defect()),
         exponents: found.exponents,
         of_second_half: found.of_second_half,
         pairs: found.pairs,
@@ -98,8 +99,8 @@ pub(super) fn lyapunov_exponents<const N: usize>(
     })
 }
 
-pub(super) fn gradient<const N: usize>(
-    system: &Sized<N>,
+pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
+    system: &Sized<L, N>,
     motion: &Motion,
     times: &[f64],
     loss: &mut Loss<'_>,

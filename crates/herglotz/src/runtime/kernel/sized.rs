@@ -1,21 +1,21 @@
 //! A system compiled for a number of coordinates.
 
+use super::formula_system::FormulaSystem;
 use crate::runtime::{InitialVelocity, Motion, RuntimeError, Start};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{InputError, Problem, StepError};
-use formula_lagrangian::FormulaLagrangian;
 
 /// A system compiled for N coordinates, at least as many as its formula has. The additional coordinates are at rest and
 /// are not visible from outside.
-pub(super) struct Sized<const N: usize>(pub FormulaLagrangian<N>);
+pub(super) struct Sized<L, const N: usize>(pub L);
 
 /// The first n coordinates of a vector.
 pub(super) fn coordinates<const N: usize>(x: &SVector<f64, N>, n: usize) -> &[f64] {
     x.as_slice().get(..n).unwrap_or(&[])
 }
 
-impl<const N: usize> Sized<N> {
+impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
     /// A vector with one finite number per coordinate.
     pub fn vector(&self, what: &'static str, numbers: &[f64]) -> Result<SVector<f64, N>, RuntimeError> {
         let expected = self.0.formula().dimension();
@@ -47,7 +47,7 @@ impl<const N: usize> Sized<N> {
     }
 
     /// The problem of a start, validated.
-    pub fn problem(&self, start: &Start) -> Result<Problem<'_, FormulaLagrangian<N>, N>, RuntimeError> {
+    pub fn problem(&self, start: &Start) -> Result<Problem<'_, L, N>, RuntimeError> {
         let at = self.start(start)?;
         let problem = Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))?;
         let force = self.0.applied_force(start.t, problem.start());
@@ -59,7 +59,7 @@ impl<const N: usize> Sized<N> {
     }
 
     /// The problem of a motion, with the interrupt of the motion for its trial runs.
-    pub fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, FormulaLagrangian<N>, N>, RuntimeError> {
+    pub fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, L, N>, RuntimeError> {
         let problem = self.problem(&motion.start)?;
         Ok(match &motion.interrupt {
             Some(interrupt) => problem.with_interrupt(interrupt.for_integrators()),
@@ -70,6 +70,7 @@ impl<const N: usize> Sized<N> {
     /// Replaces the error of a singular start by one that names the velocities in which L is linear, if there are any.
     fn explained(&self, error: InputError, t: f64, at: &discrete_herglotz::Start<N>) -> RuntimeError {
         if let (InputError::FirstStep(StepError::Singular { .. }), discrete_herglotz::Start::Velocity(x)) = (&error, at)
+            && const { !L::HINTS.hamiltonian }
         {
             let w = self.0.closed_hessian(t, x).map(|h| h.vv);
             let names = self.0.formula().coordinates();
@@ -80,6 +81,9 @@ impl<const N: usize> Sized<N> {
                 return RuntimeError::NotRegular { velocities: flat.join(", ") };
             }
         }
-        error.into()
+        match error {
+            InputError::Undefined if const { L::HINTS.hamiltonian } => RuntimeError::HamiltonianUndefined,
+            error => error.into(),
+        }
     }
 }

@@ -1,0 +1,174 @@
+//! What the kernels use of a formula: a Lagrangian, or a contact Hamiltonian in its place.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry};
+use discrete_herglotz::hamiltonian::SeparableSplitting;
+use discrete_herglotz::rules::Method;
+use discrete_herglotz::{
+    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme,
+    Stepper, StepperOptions, theory::legendre_inverse,
+};
+use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
+
+/// What observers of a motion use. It is not generic, so that observers are compiled once for each dimension.
+pub(super) trait Observed<const N: usize> {
+    fn formula(&self) -> &Formula;
+    /// `L_z` if it is proved to be constant.
+    fn constant_rate(&self) -> Option<f64>;
+    /// The number of resets.
+    fn resets(&self) -> usize;
+    /// The number of the reset to which a switching function belongs.
+    fn reset_of(&self, index: usize) -> Option<usize>;
+    /// What expressions contain beside the position and the action: the velocity, found from a guess, or the momentum
+    /// for a Hamiltonian. `None` where there is none.
+    fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>>;
+}
+
+/// A formula that is run.
+pub(super) trait FormulaSystem<const N: usize>:
+    Lagrangian<N> + Observed<N> + Clone + Send + Sync + 'static
+{
+    /// The integrators for it, which are compiled.
+    type By: for<'a> Integrator<'a, Self, N> + Copy + Sync;
+
+    /// An integrator by its name.
+    ///
+    /// # Errors
+    /// [`InputError::Hypothesis`] where there is none of this name for it.
+    fn by(integrator: AnyIntegrator) -> Result<Self::By, InputError>;
+    /// Sets the value of a parameter.
+    fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError>;
+    /// The recognised symmetries.
+    fn symmetries(&self) -> Vec<Symmetry<N>>;
+}
+
+impl<const N: usize> Observed<N> for FormulaLagrangian<N> {
+    fn formula(&self) -> &Formula {
+        self.formula()
+    }
+
+    fn constant_rate(&self) -> Option<f64> {
+        self.constant_rate()
+    }
+
+    fn resets(&self) -> usize {
+        self.resets()
+    }
+
+    fn reset_of(&self, index: usize) -> Option<usize> {
+        self.reset_of(index)
+    }
+
+    fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>> {
+        legendre_inverse(self, t, state, guess).ok().map(|x| x.v)
+    }
+}
+
+impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
+    type By = AnyIntegrator;
+
+    fn by(integrator: AnyIntegrator) -> Result<AnyIntegrator, InputError> {
+        Ok(integrator)
+    }
+
+    fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
+        self.set(parameter, value)
+    }
+
+    fn symmetries(&self) -> Vec<Symmetry<N>> {
+        self.symmetries()
+    }
+}
+
+impl<const N: usize> Observed<N> for OfHamiltonian<FormulaHamiltonian<N>> {
+    fn formula(&self) -> &Formula {
+        self.0.formula()
+    }
+
+    fn constant_rate(&self) -> Option<f64> {
+        self.0.constant_rate()
+    }
+
+    fn resets(&self) -> usize {
+        0
+    }
+
+    fn reset_of(&self, _index: usize) -> Option<usize> {
+        None
+    }
+
+    fn velocity_or_momentum(&self, _t: f64, state: &PhasePoint<N>, _: &SVector<f64, N>) -> Option<SVector<f64, N>> {
+        Some(state.p)
+    }
+}
+
+/// The integrators of contact Hamiltonians; the other ones are those of Lagrangians.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum OfHamiltonians {
+    /// Contact Gauss collocation on rho H.
+    Gauss(GaussCollocation),
+    /// Contact Gauss collocation with steps that are divided where they do not resolve the motion, as
+    /// [`Run::accuracy`](discrete_herglotz::Run::accuracy) selects it.
+    Divided(DividedGauss),
+    /// The splitting of a separable H.
+    Splitting(SeparableSplitting),
+}
+
+/// Evaluates an expression with the integrator of a variant.
+macro_rules! each {
+    ($any:expr, $integrator:ident => $result:expr) => {
+        match $any {
+            OfHamiltonians::Gauss($integrator) => $result,
+            OfHamiltonians::Divided($integrator) => $result,
+            OfHamiltonians::Splitting($integrator) => $result,
+        }
+    };
+}
+
+impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N> for OfHamiltonians {
+    fn info(&self) -> MethodInfo {
+        each!(self, by => Integrator::<OfHamiltonian<FormulaHamiltonian<N>>, N>::info(by))
+    }
+
+    fn check(&self, hamiltonian: &OfHamiltonian<FormulaHamiltonian<N>>) -> Result<(), InputError> {
+        each!(self, by => by.check(hamiltonian))
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        each!(self, by => by.stepper(problem, h, options))
+    }
+}
+
+impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {
+    type By = OfHamiltonians;
+
+    fn by(integrator: AnyIntegrator) -> Result<OfHamiltonians, InputError> {
+        match integrator {
+            AnyIntegrator::Gauss { stages } => Ok(OfHamiltonians::Gauss(GaussCollocation { stages })),
+            AnyIntegrator::Divided(divided) => Ok(OfHamiltonians::Divided(divided)),
+            AnyIntegrator::Splitting(scheme) => Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme })),
+            AnyIntegrator::Discrete(Method::Strang) => {
+                Ok(OfHamiltonians::Splitting(SeparableSplitting { scheme: SplittingScheme::STRANG }))
+            }
+            _ => Err(InputError::Hypothesis {
+                hypothesis: "a Lagrangian; a Hamiltonian runs by `gauss_1` to `gauss_16`, and by the splittings where it \
+                             is T(p) + V(t, q) + a*z + b*z^2",
+            }),
+        }
+    }
+
+    fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
+        self.0.set(parameter, value)
+    }
+
+    /// The translations along coordinates on which H does not depend.
+    fn symmetries(&self) -> Vec<Symmetry<N>> {
+        let along = |i: usize| Symmetry::Translation(SVector::from_fn(|j, _| f64::from(u8::from(i == j))));
+        self.0.cyclic().into_iter().map(along).collect()
+    }
+}
