@@ -1,13 +1,13 @@
-//! Motions of Lagrangians whose formula is known at run time only: [`runtime`], and scene files that describe them.
+//! Scene files: motions of systems that depend on the action, described in text.
 //!
-//! A scene file has a Lagrangian as text, an initial state, and the requested output; the program `herglotz` runs it.
-//! `Scene::read` reads a scene; an error is a `SceneError` with the position in the file.
+//! A scene file has a Lagrangian or a contact Hamiltonian as text, an initial state, and the requested output; the program `herglotz` runs it.
+//! [`Scene::read`] reads a scene; an error is a [`SceneError`] with the position in the file. Motions are computed by
+//! [`runtime`].
 //!
-//! Features: `scenes` for scene files, `program` (default) for the program and its pictures.
+//! The feature `program` (default) builds the program and its figures.
 
-pub mod runtime;
-#[cfg(feature = "scenes")]
 mod scene;
 
-#[cfg(feature = "scenes")]
+#[doc(no_inline)]
+pub use herglotz_runtime as runtime;
 pub use scene::{EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, schema};

@@ -4,7 +4,7 @@ use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz::runtime::{InitialVelocity, Interrupt, Start};
+use herglotz_runtime::{InitialVelocity, Interrupt, Start};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::atomic::Ordering;
@@ -73,7 +73,7 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     let (found, raised) = with_signals(py, |ended| {
         let ended = ended.clone();
         let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
-        let request = herglotz::runtime::Motion { interrupt, ..motion.motion.clone() };
+        let request = herglotz_runtime::Motion { interrupt, ..motion.motion.clone() };
         motion.system.check(&request, count)
     })?;
     if let Some(raised) = raised {
@@ -81,12 +81,12 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     }
     let found = found.map_err(value_error)?;
     let is_contact = found.is_contact();
-    let sample = |sample: herglotz::runtime::Sample| {
+    let sample = |sample: herglotz_runtime::Sample| {
         let momenta = sample.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
         (sample.t, sample.sigma, sample.log_factor, sample.contact_defect, sample.herglotz_defect, momenta)
     };
     let samples = found.samples.into_iter().map(sample).collect();
-    let stated = |s: herglotz::runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
+    let stated = |s: herglotz_runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
     let reason = found.not_contact.map(|reason| reason.to_string());
     Ok((found.integrator, found.step_size, samples, statements, is_contact, reason))
@@ -108,6 +108,6 @@ pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
     }
     let found = found.map_err(value_error)?;
     let row =
-        |w: herglotz::runtime::Work| (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds);
+        |w: herglotz_runtime::Work| (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds);
     Ok((found.rows.into_iter().map(row).collect(), found.reference, found.left_out))
 }

@@ -4,7 +4,7 @@ use crate::arrays::{matrix, number, numbers, value_error, vector};
 use crate::table::Table;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, Darboux, Dual, support::conformality_with_jacobian};
-use herglotz::runtime::Formula;
+use herglotz_runtime::Formula;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 

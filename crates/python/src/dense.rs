@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, numbers, value_error, vector};
 use crate::motion::{Motion, columns};
 use crate::signals::Signals;
-use herglotz::runtime::{
+use herglotz_runtime::{
     AnyIntegrator, Column, Crossing, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps,
 };
 use numpy::{PyArray1, PyArray2};
@@ -58,7 +58,7 @@ impl RunMonitor for NodeStore {
 /// Dense output of a motion: a state is computed by a step from the node before it.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Dense {
-    system: herglotz::runtime::System,
+    system: herglotz_runtime::System,
     by: AnyIntegrator,
     nodes: Nodes,
     /// The times of the resets, with the states before them.
@@ -83,7 +83,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
         };
         let Ok(by) = by else { return Ok(None) };
-        let again = herglotz::runtime::Motion {
+        let again = herglotz_runtime::Motion {
             // A motion whose end is its start has no step.
             step_control: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
@@ -99,7 +99,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }
-    let by = by.map_err(|error: herglotz::runtime::RuntimeError| value_error(error))?;
+    let by = by.map_err(|error: herglotz_runtime::RuntimeError| value_error(error))?;
     let by = by.ok_or_else(|| {
         value_error(
             "the integrator of the plan does not support dense output: name another \
@@ -139,10 +139,10 @@ impl Dense {
     /// The rows at times of one step from a state.
     fn rows(&self, start: Start, end: f64, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
         let step_control = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
-        let motion = herglotz::runtime::Motion {
+        let motion = herglotz_runtime::Motion {
             rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
-            ..herglotz::runtime::Motion::new(start, end, step_control)
+            ..herglotz_runtime::Motion::new(start, end, step_control)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)
     }

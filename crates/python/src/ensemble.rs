@@ -6,7 +6,7 @@ use crate::motion::{self, GivenStepControl};
 use crate::run::{After, after};
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz::runtime::{
+use herglotz_runtime::{
     Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
     Start, Status, StepControl, Tally, Varied, in_words,
 };

@@ -4,7 +4,7 @@ use crate::arrays::{shown, value_error};
 use crate::motion::named;
 use crate::system::System;
 use formula_lagrangian::Reset;
-use herglotz::runtime::{Direction, Event, Formula, Impact};
+use herglotz_runtime::{Direction, Event, Formula, Impact};
 use pyo3::prelude::*;
 
 /// Variables with the formulas of their new values.
@@ -18,7 +18,7 @@ type GivenChange<'py> = (Option<Assignments>, Option<(String, Option<Bound<'py, 
 pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool, Option<GivenChange<'py>>);
 
 /// The requested events, and the system with their resets.
-pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz::runtime::System, Vec<Event>)> {
+pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz_runtime::System, Vec<Event>)> {
     let mut formula = of.formula.clone();
     let mut events = Vec::with_capacity(given.len());
     for (text, direction, terminal, change) in given {
@@ -32,7 +32,7 @@ pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz::ru
         events.push(event);
     }
     let system = if formula.resets() > 0 {
-        herglotz::runtime::System::new(&formula).map_err(value_error)?
+        herglotz_runtime::System::new(&formula).map_err(value_error)?
     } else {
         of.inner.clone()
     };

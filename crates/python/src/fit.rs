@@ -4,7 +4,7 @@ use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::sensitivity::detached;
 use contact_geom::nalgebra::DMatrix;
-use herglotz::runtime::{
+use herglotz_runtime::{
     Bound as HeldAt, FittedMotion, FittedSeries, InitialVelocity, MotionFit, ResidualLoss, Series, StepControl, Steps,
     Unknown,
 };

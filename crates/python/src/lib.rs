@@ -23,7 +23,7 @@ mod system;
 mod table;
 mod text;
 
-use herglotz::runtime::{AnyIntegrator, CATALOGUE};
+use herglotz_runtime::{AnyIntegrator, CATALOGUE};
 use pyo3::prelude::*;
 
 /// The extension module.
@@ -82,7 +82,7 @@ type Entry =
 /// The systems of the catalogue.
 #[pyfunction]
 fn catalogue() -> Vec<Entry> {
-    let entry = |e: &herglotz::runtime::CatalogueEntry| {
+    let entry = |e: &herglotz_runtime::CatalogueEntry| {
         (e.name, e.about, e.coordinates.to_vec(), e.lagrangian, e.parameters.to_vec(), e.q.to_vec(), e.v.to_vec())
     };
     CATALOGUE.iter().map(entry).collect()

@@ -6,7 +6,7 @@ use crate::motion::{self, GivenStepControl};
 use crate::sensitivity::loss_of;
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz::runtime::{Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StateCovector, Status};
+use herglotz_runtime::{Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StateCovector, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::sync::atomic::Ordering;

@@ -4,14 +4,14 @@ use crate::arrays::{number, numbers, value_error, whole, word};
 use crate::events::GivenEvent;
 use crate::signals::Signals;
 use crate::system::System;
-use herglotz::runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, Start, StepControl, Steps};
+use herglotz_runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, Start, StepControl, Steps};
 use pyo3::prelude::*;
 
 /// A request for a motion, from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Motion {
-    pub system: herglotz::runtime::System,
-    pub motion: herglotz::runtime::Motion,
+    pub system: herglotz_runtime::System,
+    pub motion: herglotz_runtime::Motion,
     /// Whether the rows have the conformal factor.
     pub conformal_factor: bool,
     /// The signals that interrupt its plan and its runs.
@@ -84,7 +84,7 @@ fn no_times() -> PyErr {
 }
 
 /// The error of a column or an event, with its text.
-pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz::runtime::RuntimeError>) -> PyResult<T> {
+pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz_runtime::RuntimeError>) -> PyResult<T> {
     read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
 }
 
@@ -152,7 +152,7 @@ impl Motion {
         let start = Start { t: first, q, velocity, z: number("z0", &z)? };
         let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();
-        let motion = herglotz::runtime::Motion {
+        let motion = herglotz_runtime::Motion {
             rows,
             columns: all,
             events,
@@ -160,7 +160,7 @@ impl Motion {
             estimate,
             scales,
             interrupt: Some(signals.interrupt()),
-            ..herglotz::runtime::Motion::new(start, end, step_control)
+            ..herglotz_runtime::Motion::new(start, end, step_control)
         };
         Ok(Motion { system: with_resets, motion, conformal_factor, signals })
     }

@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole, word};
 use crate::signals::leaving_at_signals;
 use crate::system::System;
-use herglotz::runtime::{BoundaryProblem, FoundPath, PathStatus};
+use herglotz_runtime::{BoundaryProblem, FoundPath, PathStatus};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 

@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use herglotz::runtime::{
+use herglotz_runtime::{
     AfterReset, Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor,
     RuntimeError, Status,
 };

@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::{Motion, named};
 use crate::signals::Signals;
-use herglotz::runtime::{Expression, LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
+use herglotz_runtime::{Expression, LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -98,7 +98,7 @@ pub fn value_and_gradient(py: Python<'_>, motion: &Motion, loss: &str) -> PyResu
 }
 
 /// A loss as an expression of the final state.
-pub fn loss_of(system: &herglotz::runtime::System, loss: &str) -> PyResult<Expression> {
+pub fn loss_of(system: &herglotz_runtime::System, loss: &str) -> PyResult<Expression> {
     let expression = system.formula().named_expression(loss).map_err(Into::into);
     let expression = named("the loss", loss, expression)?;
     if expression.has_conformal_factor() {

@@ -1,6 +1,6 @@
 //! Signals of the user (Ctrl-C) during a run.
 
-use herglotz::runtime::Interrupt;
+use herglotz_runtime::Interrupt;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

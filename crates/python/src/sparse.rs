@@ -3,7 +3,7 @@
 use crate::arrays::{number, numbers, value_error};
 use crate::run::{Record, RowStore, record};
 use crate::signals::Signals;
-use herglotz::runtime::{
+use herglotz_runtime::{
     AnyIntegrator, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError, SiteMotion, SiteSystem,
     Start, Steps,
 };

@@ -3,14 +3,14 @@
 use crate::arrays::value_error;
 use crate::table::Table;
 use contact_geom::table::Table as Samples;
-use herglotz::runtime::{Formula, FormulaError, FormulaNames, FormulaSymmetry};
+use herglotz_runtime::{Formula, FormulaError, FormulaNames, FormulaSymmetry};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
 /// A Lagrangian, or a contact Hamiltonian, with all that integrators need.
 #[pyclass(frozen, module = "herglotz")]
 pub struct System {
-    pub inner: herglotz::runtime::System,
+    pub inner: herglotz_runtime::System,
     /// The formula before it is differentiated, to which resets are added.
     pub formula: Formula,
     additions: Additions,
@@ -136,7 +136,7 @@ impl System {
         let tables = tables.into_iter().map(|(name, table)| (name, table.get().inner.clone())).collect();
         let additions = Additions { tables, forces, rayleigh, breaks };
         let formula = additions.formula(&kind, &lagrangian, &texts(&coordinates), &values)?;
-        let inner = herglotz::runtime::System::new(&formula).map_err(value_error)?;
+        let inner = herglotz_runtime::System::new(&formula).map_err(value_error)?;
         Ok(System { inner, formula, additions, kind, lagrangian, given_coordinates: coordinates })
     }
 
@@ -311,7 +311,7 @@ pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<St
     let names = FormulaNames { action: "_action", ..FormulaNames::new(&coordinates, &[]) };
     let formula = Formula::parse_lagrangian("0", &names).map_err(value_error)?;
     let names = formula.coordinates();
-    let velocities = names.iter().map(|name| herglotz::runtime::velocity_name(name)).collect();
+    let velocities = names.iter().map(|name| herglotz_runtime::velocity_name(name)).collect();
     Ok((names, velocities))
 }
 

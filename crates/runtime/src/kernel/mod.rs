@@ -1,0 +1,258 @@
+//! One kernel for each dimension: all code that is compiled for a fixed number of coordinates is in this module.
+
+mod check;
+mod ensemble;
+mod formula_system;
+mod geometry;
+mod hamiltonian;
+mod member_derivatives;
+mod observed;
+pub(crate) mod path;
+mod recorder;
+mod run;
+mod sensitivity;
+mod sized;
+mod theorems;
+mod work_thread;
+
+use crate::{
+    BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, HamiltonianGeometry, Interrupt, Loss,
+    LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
+};
+use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
+use discrete_herglotz::hamiltonian::ModifiedDefect;
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
+use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
+use sized::Sized;
+use std::sync::Arc;
+use work_thread::on_large_stack;
+
+/// A system whose dimension is not part of its type.
+pub(crate) trait Kernel: Send + Sync {
+    fn formula(&self) -> &Formula;
+    fn structure(&self) -> Structure;
+    fn is_smooth(&self) -> bool;
+    fn has_force(&self) -> bool;
+    fn symmetries(&self) -> Vec<FormulaSymmetry>;
+    fn to_rust(&self, _name: &str) -> Result<String, FormulaError> {
+        Err(FormulaError::IsHamiltonian { what: "Rust source", remedy: "implement `ContactHamiltonian` for a type" })
+    }
+    /// The proved structure of a Hamiltonian; `None` for a Lagrangian.
+    fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
+        None
+    }
+    fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
+    fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError>;
+    fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError>;
+    fn run(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+        from: Option<ResumeState>,
+    ) -> Result<Outcome, RuntimeError>;
+    fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError>;
+    fn rates(&self, _t: f64, _y: &[f64], to: &mut [f64]) {
+        to.fill(f64::NAN);
+    }
+    fn geometry(&self, _at: &Start) -> Result<Geometry, RuntimeError> {
+        Err(of_lagrangians("geometry on TQ x R"))
+    }
+    fn hamiltonian_geometry(&self, _at: &Start) -> Result<HamiltonianGeometry, RuntimeError> {
+        Err(FormulaError::IsLagrangian.into())
+    }
+    fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError>;
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError>;
+    fn sensitivity(
+        &self,
+        _motion: &Motion,
+        _variables: &[Variable],
+        _times: &[f64],
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+    fn gradient(
+        &self,
+        _motion: &Motion,
+        _times: &[f64],
+        _loss: &mut Loss<'_>,
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+    fn lyapunov_exponents(
+        &self,
+        _motion: &Motion,
+        _monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+    fn ensemble_gradient(
+        &self,
+        _ensemble: &Ensemble<'_>,
+        _times: &[f64],
+        _loss: &BatchLoss<'_>,
+        _interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+    fn ensemble_sensitivity(
+        &self,
+        _ensemble: &Ensemble<'_>,
+        _variables: &[Variable],
+        _times: &[f64],
+        _interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+        Err(of_lagrangians(DERIVATIVES))
+    }
+}
+
+/// What a Hamiltonian has no kernel for.
+const DERIVATIVES: &str = "derivatives of motions";
+
+/// The error of what is compiled for Lagrangians only.
+fn of_lagrangians(what: &'static str) -> RuntimeError {
+    RuntimeError::OfLagrangians { what }
+}
+
+/// The kernel of a formula.
+pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
+    if formula.is_hamiltonian() {
+        return hamiltonian::kernel_of(formula);
+    }
+    macro_rules! of {
+        ($($n:literal)*) => {
+            match formula.dimension() {
+                $(found if found <= $n => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
+                found => Err(FormulaError::Dimension { found }.into()),
+            }
+        };
+    }
+    // Each dimension is half a minute of compiling: a system of five coordinates is computed with one more at rest.
+    of!(1 2 3 4 6 8 16)
+}
+
+impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
+    fn formula(&self) -> &Formula {
+        self.0.formula()
+    }
+
+    fn structure(&self) -> Structure {
+        *self.0.proved()
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.0.is_smooth()
+    }
+
+    fn has_force(&self) -> bool {
+        Lagrangian::has_force(&self.0)
+    }
+
+    fn symmetries(&self) -> Vec<FormulaSymmetry> {
+        let recognised = |symmetry: &Symmetry<N>| match symmetry {
+            Symmetry::Translation(a) => Some(FormulaSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
+            Symmetry::Rotation(i, j) => Some(FormulaSymmetry::Rotation(vec![(*i, *j)])),
+            Symmetry::Rotations(planes) => Some(FormulaSymmetry::Rotation(
+                planes.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect(),
+            )),
+            _ => None,
+        };
+        self.0.symmetries().iter().filter_map(recognised).collect()
+    }
+
+    fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
+        self.0.to_rust(name)
+    }
+
+    fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
+        let mut lagrangian = self.0.clone();
+        values.iter().try_for_each(|(name, value)| lagrangian.set(name, *value))?;
+        Ok(Arc::new(Sized(lagrangian)))
+    }
+
+    fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
+        integrator.check(&self.0)
+    }
+
+    fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
+        run::plan(self, motion)
+    }
+
+    fn run(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+        from: Option<ResumeState>,
+    ) -> Result<Outcome, RuntimeError> {
+        run::run(self, motion, monitor, from)
+    }
+
+    fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        ensemble::run(self, ensemble, monitor)
+    }
+
+    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        geometry::rates(self, t, y, to);
+    }
+
+    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
+        geometry::at(self, at)
+    }
+
+    fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        on_large_stack(|| check::check(self, motion, samples))
+    }
+
+    fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        check::modified_defects(self, motion, most)
+    }
+
+    fn sensitivity(
+        &self,
+        motion: &Motion,
+        variables: &[Variable],
+        times: &[f64],
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        sensitivity::tangent(self, motion, variables, times, monitor)
+    }
+
+    fn gradient(
+        &self,
+        motion: &Motion,
+        times: &[f64],
+        loss: &mut Loss<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        sensitivity::gradient(self, motion, times, loss, monitor)
+    }
+
+    fn lyapunov_exponents(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        sensitivity::lyapunov_exponents(self, motion, monitor)
+    }
+
+    fn ensemble_gradient(
+        &self,
+        ensemble: &Ensemble<'_>,
+        times: &[f64],
+        loss: &BatchLoss<'_>,
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        member_derivatives::gradients(self, ensemble, times, loss, interrupt)
+    }
+
+    fn ensemble_sensitivity(
+        &self,
+        ensemble: &Ensemble<'_>,
+        variables: &[Variable],
+        times: &[f64],
+        interrupt: Option<&Interrupt>,
+    ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+        member_derivatives::sensitivities(self, ensemble, variables, times, interrupt)
+    }
+}

@@ -1,0 +1,398 @@
+//! The observer of a motion: rows, events, nodes, and polling for interruption.
+
+use super::formula_system::Observed;
+use super::sized::coordinates;
+use crate::{
+    AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
+};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::{
+    Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
+};
+use formula_lagrangian::Expression;
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::rc::Rc;
+
+/// The number of steps between two polls: a poll is then inexpensive compared with the steps.
+const STEPS_BETWEEN_POLLS: usize = 256;
+
+/// Observes a motion on behalf of a [`RunMonitor`].
+pub(super) struct Recorder<'r, const N: usize> {
+    rows: Option<Rows<'r, N>>,
+    columns: &'r [Column],
+    /// The numbers of a row, in a buffer that is reused.
+    numbers: Vec<f64>,
+    crossings: Option<Crossings<'r, N>>,
+    nodes: bool,
+    needs: OutputRequest,
+    run_info: Option<RunInfo>,
+    dimension: usize,
+    monitor: &'r mut dyn RunMonitor,
+}
+
+impl<'r, const N: usize> Recorder<'r, N> {
+    pub fn new(
+        lagrangian: &'r dyn Observed<N>,
+        motion: &'r Motion,
+        monitor: &'r mut dyn RunMonitor,
+    ) -> Result<Self, RuntimeError> {
+        let columns = motion.columns.as_slice();
+        let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
+        check_events(lagrangian, &motion.events)?;
+        let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
+        let needs = |of: Option<OutputRequest>| of.unwrap_or_default();
+        let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
+        let of_all = OutputRequest { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
+        Ok(Recorder {
+            rows,
+            columns,
+            numbers: Vec::with_capacity(columns.len()),
+            crossings,
+            nodes: motion.nodes,
+            needs: of_rows.and(of_all),
+            run_info: None,
+            dimension: lagrangian.formula().dimension(),
+            monitor,
+        })
+    }
+
+    /// Passes on the rows, up to a time if one is given.
+    fn pass_on_rows(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
+        let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
+        let backward = self.run_info.is_some_and(|run_info| run_info.t_end < run_info.t0);
+        let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
+        for row in rows.rows.drain(..).filter(|row| !beyond(row.t)) {
+            self.numbers.clear();
+            self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
+            if self.monitor.row(&self.numbers).is_break() {
+                return ControlFlow::Break(Stop::here("the monitor"));
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn notify(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.nodes {
+            let PhasePoint { q, p, z } = &at.state;
+            // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
+            let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
+            self.monitor.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
+        }
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+            && let Some(RunInfo { t0, t_end, .. }) = self.run_info
+            && self.monitor.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
+        {
+            if let Some(interrupted) = at.resume_state() {
+                self.monitor.interrupted(interrupted);
+            }
+            return ControlFlow::Break(Stop::here("the monitor"));
+        }
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+            && self.monitor.wants_checkpoint()
+            && let Some(saved) = at.resume_state()
+            && self.monitor.checkpoint(at.k, saved).is_break()
+        {
+            return ControlFlow::Break(Stop::here("the monitor"));
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The rows that have the quantities of these columns.
+pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
+    let rows = match when {
+        OutputTimes::Every(stride) => Rows::every(*stride)?,
+        OutputTimes::At(times) => Rows::at(times.iter().copied())?,
+    };
+    let any = |of: fn(&Column) -> bool| columns.iter().any(of);
+    let velocity = any(|c| match c {
+        Column::Velocity(_) => true,
+        Column::Expression(e) => e.has_velocity() && !e.is_of_hamiltonian(),
+        _ => false,
+    });
+    let action = any(|c| match c {
+        Column::Action => true,
+        Column::Expression(e) => e.has_action(),
+        _ => false,
+    });
+    let rows = if velocity { rows.with_velocity() } else { rows };
+    let rows = if any(|c| matches!(c, Column::Energy)) { rows.with_energy() } else { rows };
+    let rows = if any(Column::has_conformal_factor) { rows.with_conformal_factor() } else { rows };
+    Ok(if action { rows } else { rows.without_action() })
+}
+
+/// The value of a column in a row; NaN where the row does not have it.
+pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
+    let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+    match column {
+        Column::Time => row.t,
+        Column::Position(i) => of(Some(&row.q), *i),
+        Column::Velocity(i) => of(row.v.as_ref(), *i),
+        Column::Momentum(i) => of(Some(&row.p), *i),
+        Column::Action => row.z.unwrap_or(f64::NAN),
+        Column::Energy => row.energy.unwrap_or(f64::NAN),
+        Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
+        Column::Expression(e) => {
+            // An expression that does not contain v or z ignores the zeros here.
+            let v = if e.is_of_hamiltonian() { row.p } else { row.v.unwrap_or_else(SVector::zeros) };
+            let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
+            e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
+        }
+    }
+}
+
+/// Rejects events with the conformal factor where it is not known at all times, terminal events that count from a given
+/// time or have a reset, and events with a reset that the formula does not have.
+pub(super) fn check_events<const N: usize>(
+    lagrangian: &dyn Observed<N>,
+    events: &[crate::Event],
+) -> Result<(), RuntimeError> {
+    let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
+    if of_terminal {
+        let why = "is given for a terminal event, which is detected from the start of the motion; remove one of the \
+                   two";
+        return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
+    }
+    if events.iter().any(|event| event.terminal && event.reset.is_some()) {
+        let why = "is given for a terminal event, which ends the motion before its reset; remove one of the two";
+        return Err(RuntimeError::argument("reset", why));
+    }
+    if events.iter().any(|event| event.reset.is_some_and(|reset| reset >= lagrangian.resets())) {
+        return Err(RuntimeError::argument(
+            "reset",
+            format!("of an event is not one of the {} resets of the formula", lagrangian.resets()),
+        ));
+    }
+    let has_factor = events.iter().flat_map(crate::Event::expressions).any(Expression::has_conformal_factor);
+    let is_known = lagrangian.constant_rate().is_some() && !lagrangian.formula().has_conformal_impacts();
+    if has_factor && !is_known { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
+}
+
+/// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
+struct EventContext<const N: usize> {
+    /// The initial time.
+    start_time: Cell<f64>,
+    /// The last velocity that was found, the initial guess for the next.
+    velocity: Cell<SVector<f64, N>>,
+}
+
+/// An expression as a function of time and of a state `(q, p, z)` of a motion.
+fn at_states<'r, const N: usize>(
+    lagrangian: &'r dyn Observed<N>,
+    function: &'r Expression,
+    context: Rc<EventContext<N>>,
+) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
+    // `check_events` ensures that the rate is constant wherever it is needed.
+    let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
+    move |t, state| {
+        if function.has_velocity() {
+            match lagrangian.velocity_or_momentum(t, state, &context.velocity.get()) {
+                Some(v) => context.velocity.set(v),
+                None => return f64::NAN,
+            }
+        }
+        let v = context.velocity.get();
+        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - context.start_time.get()))
+    }
+}
+
+/// The events of a motion, with the data needed to evaluate them.
+pub(super) struct Crossings<'r, const N: usize> {
+    lagrangian: &'r dyn Observed<N>,
+    /// The events without a reset, whose sign changes are searched for, and their indices.
+    events: Events<'r, N>,
+    searched: Vec<usize>,
+    /// The events as they were requested.
+    requested: &'r [crate::Event],
+    /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
+    rate: f64,
+    /// Whether an event or a column contains the action.
+    action: bool,
+    /// Whether an event contains the velocity.
+    velocity: bool,
+    context: Rc<EventContext<N>>,
+    backward: bool,
+    dimension: usize,
+}
+
+impl<'r, const N: usize> Crossings<'r, N> {
+    /// `None` where there are no events.
+    pub fn of(lagrangian: &'r dyn Observed<N>, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
+        let numbers = match start.map(|start| &start.velocity) {
+            Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
+            _ => &[],
+        };
+        let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
+        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: Cell::new(v) });
+        let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
+        let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
+        let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
+        (!events.is_empty()).then(|| Crossings {
+            lagrangian,
+            events: all,
+            searched,
+            requested: events,
+            rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
+            action,
+            velocity: events.iter().any(|event| event.function.has_velocity()),
+            context: context.clone(),
+            backward: false,
+            dimension: lagrangian.formula().dimension(),
+        })
+    }
+
+    pub fn needs(&self) -> OutputRequest {
+        OutputRequest { action: self.action, ..OutputRequest::default() }
+    }
+
+    pub fn prepare(&mut self, run_info: &RunInfo) -> Result<(), InputError> {
+        self.context.start_time.set(run_info.t0);
+        self.backward = run_info.t_end < run_info.t0;
+        self.events.prepare(run_info)
+    }
+
+    pub fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.velocity
+            && let Ok(v) = at.velocity()
+        {
+            self.context.velocity.set(v);
+        }
+        self.events.start(at)
+    }
+
+    /// The terminal events, at which trial runs end.
+    pub fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.events.terminal()
+    }
+
+    /// Passes on the sign changes in a step; `Break` at a terminal event.
+    pub fn step(
+        &mut self,
+        at: &StepView<'_, N>,
+        mut pass_on_rows: impl FnMut(Crossing) -> ControlFlow<()>,
+    ) -> ControlFlow<Stop<N>> {
+        let ended = self.events.step(at);
+        let end = match &ended {
+            ControlFlow::Break(Stop { at: Some((t, _)), .. }) => Some(*t),
+            _ => None,
+        };
+        for (event, t, before, after) in self.found(at, end) {
+            let requested = self.requested.get(event);
+            let from = requested.and_then(|event| event.from);
+            if from.is_some_and(|from| if self.backward { t > from } else { t < from }) {
+                continue;
+            }
+            // The velocity at the end of the step is close enough as an initial guess.
+            let velocity = |state| at.velocity_at(t, state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let (PhasePoint { q, p, z }, v) = (before, velocity(&before));
+            let log_factor = self.rate * (t - self.context.start_time.get());
+            let columns = requested.map_or(&[][..], |event| &event.columns).iter();
+            let of_expression = if self.lagrangian.formula().is_hamiltonian() { p } else { v };
+            let state = (q.as_slice(), of_expression.as_slice(), z);
+            let columns = columns.map(|e| e.at_factor(t, state, log_factor)).collect();
+            let vectors = |[q, v, p]: [SVector<f64, N>; 3]| [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
+            let after = after.as_ref().map(|after| {
+                let [q, v, p] = vectors([after.q, velocity(after), after.p]);
+                AfterReset { q, v, p, z: after.z }
+            });
+            let [q, v, p] = vectors([q, v, p]);
+            if pass_on_rows(Crossing { t, event, q, v, p, z, columns, after }).is_break() {
+                return ControlFlow::Break(Stop::here("the monitor"));
+            }
+        }
+        ended
+    }
+
+    /// The crossings in a step, up to a time at which the motion ends within it: the index of the event, the time, the
+    /// state, and that after a reset. They are in the order of the motion, resets after others at the same time.
+    fn found(&mut self, at: &StepView<'_, N>, end: Option<f64>) -> Vec<Found<N>> {
+        let searched = &self.searched;
+        let changes = self.events.crossings.drain(..);
+        let changes = changes.map(|c| (searched.get(c.event).copied().unwrap_or(usize::MAX), c.t, c.state, None));
+        let mut found: Vec<Found<N>> = changes.collect();
+        let count = found.len();
+        for Reset { t, index, before, after } in at.resets() {
+            let Some(reset) = self.lagrangian.reset_of(*index) else { continue };
+            let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) else { continue };
+            if end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
+                found.push((event, *t, *before, Some(*after)));
+            }
+        }
+        if found.len() > count {
+            let backward = self.backward;
+            found.sort_by(|a, b| if backward { b.1.total_cmp(&a.1) } else { a.1.total_cmp(&b.1) });
+        }
+        found
+    }
+}
+
+/// A crossing: the index of the event, the time, the state, and that after a reset.
+type Found<const N: usize> = (usize, f64, PhasePoint<N>, Option<PhasePoint<N>>);
+
+fn of<'r, const N: usize>(
+    lagrangian: &'r dyn Observed<N>,
+    event: &'r crate::Event,
+    context: Rc<EventContext<N>>,
+) -> Event<'r, N> {
+    let found = Event::new(at_states(lagrangian, &event.function, context));
+    let found = match event.direction {
+        Direction::Rising => found.rising(),
+        Direction::Falling => found.falling(),
+        Direction::Both => found,
+    };
+    if event.terminal { found.terminal() } else { found }
+}
+
+impl<const N: usize> Observer<N> for Recorder<'_, N> {
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.crossings.as_ref().and_then(Crossings::terminal)
+    }
+
+    fn needs(&self) -> OutputRequest {
+        self.needs
+    }
+
+    fn prepare(&mut self, run_info: &RunInfo) -> Result<(), InputError> {
+        self.run_info = Some(*run_info);
+        if let Some(rows) = &mut self.rows {
+            rows.prepare(run_info)?;
+        }
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(run_info))
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        if self.nodes || self.crossings.is_some() {
+            return taken + 1;
+        }
+        let poll = (taken / STEPS_BETWEEN_POLLS + 1) * STEPS_BETWEEN_POLLS;
+        self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.start(at)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            crossings.start(at)?;
+        }
+        self.pass_on_rows(None)?;
+        self.notify(at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.step(at)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            let ended = crossings.step(at, |crossing| self.monitor.crossing(&crossing));
+            if let ControlFlow::Break(stop) = ended {
+                self.pass_on_rows(stop.at.map(|(t, _)| t))?;
+                return ControlFlow::Break(stop);
+            }
+        }
+        self.pass_on_rows(None)?;
+        self.notify(at)
+    }
+}

@@ -1,0 +1,102 @@
+//! Runs of one motion.
+
+use super::formula_system::FormulaSystem;
+use super::recorder::Recorder;
+use super::sized::{Sized, coordinates};
+use crate::system::LOSSES_WITH_FORCE;
+use crate::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
+use discrete_herglotz::{Problem, ResumeState, Run, Until};
+use formula_lagrangian::Formula;
+
+/// The run of a motion, without its observer.
+///
+/// # Errors
+/// [`RuntimeError::Length`] where the number of scales is not the number of coordinates.
+pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    problem: &'p Problem<'p, L, N>,
+    motion: &Motion,
+) -> Result<Run<'p, 'o, L, N>, RuntimeError> {
+    let run = match motion.step_control {
+        StepControl::Accuracy { error, by: None } => problem.accuracy(error),
+        StepControl::Accuracy { error, by: Some(by) } => problem.by(L::by(by)?).accuracy(error),
+        StepControl::Steps { by, steps } => problem.by(L::by(by)?).steps(steps),
+    };
+    let run = if motion.action { run } else { run.without_action() };
+    let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
+    let run = if motion.estimate { run.with_error_estimate() } else { run };
+    Ok(match &motion.scales {
+        Some(scales) => run.scales(system.vector("scales", scales)?.into()),
+        None => run,
+    })
+}
+
+/// The first line of the plan of a formula in which z may have been meant to be a coordinate.
+const ACTION_IS_NO_COORDINATE: &str = "z is the action and acts as drag: it is no coordinate beside x and y; \
+                                       for a coordinate z, give the action another name, as in action = \"s\"";
+
+/// Whether a formula has coordinates x and y, and depends on an action that is named z.
+fn acts_as_drag(formula: &Formula) -> bool {
+    let names = formula.coordinates();
+    let has = |name: &str| names.iter().any(|coordinate| coordinate == name);
+    has("x") && has("y") && formula.action() == "z" && formula.has_action()
+}
+
+pub(super) fn plan<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+) -> Result<Plan, RuntimeError> {
+    let problem = system.problem_of(motion)?;
+    let mut no_monitor = ();
+    let mut recorder = Recorder::new(&system.0, motion, &mut no_monitor)?;
+    let run = of(system, &problem, motion)?.observe(&mut recorder);
+    let plan = run.plan(Until::Time(motion.end))?;
+    let (mut text, mut items) = (plan.to_string(), plan.entries());
+    if acts_as_drag(system.0.formula()) {
+        text.insert_str(0, &format!("{ACTION_IS_NO_COORDINATE}\n"));
+    }
+    if system.0.has_force() {
+        for (what, why) in LOSSES_WITH_FORCE {
+            // The entries that are skipped are the last ones in the text.
+            text += &format!("  {what}: {why}\n");
+            items.push(PlanEntry::skipped(what, *why));
+        }
+    }
+    Ok(Plan {
+        text,
+        integrator: plan.integrator().clone(),
+        step_size: plan.step_size(),
+        steps: plan.count(),
+        error: plan.error(),
+        items,
+    })
+}
+
+pub(super) fn run<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    monitor: &mut dyn RunMonitor,
+    from: Option<ResumeState>,
+) -> Result<Outcome, RuntimeError> {
+    let problem = system.problem_of(motion)?;
+    let mut recorder = Recorder::new(&system.0, motion, monitor)?;
+    let run = of(system, &problem, motion)?.observe(&mut recorder);
+    let run = match from {
+        Some(from) => run.resume(from),
+        None => run,
+    };
+    let (outcome, n) = (run.run(Until::Time(motion.end))?, system.0.formula().dimension());
+    Ok(Outcome {
+        status: outcome.status,
+        unresolved: outcome.unresolved,
+        steps: outcome.steps,
+        t: outcome.t,
+        q: coordinates(&outcome.q, n).to_vec(),
+        p: coordinates(&outcome.p, n).to_vec(),
+        v: outcome.v.map(|v| coordinates(&v, n).to_vec()),
+        z: outcome.z,
+        log_factor: outcome.log_factor,
+        error_estimate: outcome.error_estimate,
+        evaluations: outcome.evaluations,
+    })
+}

@@ -1,0 +1,68 @@
+//! The theorems of the discrete theory, evaluated at points of a motion.
+
+use crate::{RuntimeError, StatementResidual};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, numbers::max_or_nan};
+use discrete_herglotz::{AnyIntegrator, DiscreteLagrangian, gauss::Gauss, theory::statements};
+use formula_lagrangian::{Formula, FormulaError};
+
+/// Two positions of a motion that are one step apart, and the action at the first.
+pub(super) struct Points {
+    pub t: f64,
+    pub q0: Vec<f64>,
+    pub q1: Vec<f64>,
+    pub z0: f64,
+}
+
+/// The theorems for the discrete Lagrangian of contact Gauss collocation: the largest residuals over some points.
+///
+/// They are compiled for a few dimensions; a formula in another one uses the next larger. With second derivatives of
+/// second derivatives this is the longest code of each dimension, and its run time is not critical.
+pub(super) fn theorems(
+    formula: &Formula,
+    stages: usize,
+    h: f64,
+    points: &[Points],
+) -> Result<Vec<StatementResidual>, RuntimeError> {
+    macro_rules! of {
+        ($($n:literal)*) => {
+            match formula.dimension() {
+                $(found if found <= $n => within::<$n>(formula, stages, h, points),)*
+                found => Err(FormulaError::Dimension { found }.into()),
+            }
+        };
+    }
+    of!(1 2 3 4 8 16)
+}
+
+fn within<const N: usize>(
+    formula: &Formula,
+    stages: usize,
+    h: f64,
+    points: &[Points],
+) -> Result<Vec<StatementResidual>, RuntimeError> {
+    let lagrangian = formula.lagrangian_within::<N>()?;
+    let (gauss, symmetries) = (Gauss::new::<N>(&lagrangian, stages, h)?, lagrangian.symmetries());
+    let vector = |q: &[f64]| SVector::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
+    let point = |p: &Points| (p.t, DiscretePoint { q0: vector(&p.q0), q1: vector(&p.q1), z0: p.z0 });
+    let mut points: Vec<(f64, DiscretePoint<N>)> = points.iter().map(point).collect();
+    // Newton's method for the discrete Lagrangian measures its residual relative to the momentum at the start, and does
+    // not converge where that is 0. Such points are dropped, unless all points fail.
+    if points.iter().any(|(t, x)| gauss.second_jet(*t, x).is_ok()) {
+        points.retain(|(t, x)| gauss.second_jet(*t, x).is_ok());
+    }
+    let method = AnyIntegrator::Gauss { stages }.to_string();
+    let mut stated = Vec::new();
+    for statement in statements::STATEMENTS {
+        let mut worst: Option<f64> = None;
+        for (t, point) in &points {
+            if let Some(residual) = statements::residual(statement, &gauss, &symmetries, *t, point)? {
+                worst = Some(worst.map_or(residual, |worst| max_or_nan(worst, residual)));
+            }
+        }
+        if let Some(residual) = worst {
+            stated.push(StatementResidual { statement, method: method.clone(), step_size: h, residual });
+        }
+    }
+    Ok(stated)
+}

@@ -1,0 +1,133 @@
+//! Systems of one to sixteen coordinates.
+
+use super::{Seen, accurate, by_steps, members};
+use discrete_herglotz::{AnyIntegrator, Status, Steps};
+use herglotz_runtime::{Column, Ensemble, Event, FormulaSymmetry, Motion, OutputTimes, Start, StepControl, System};
+
+/// The energy decays with the conformal factor, to the requested accuracy, in any number of coordinates.
+#[test]
+fn one_to_sixteen_coordinates() {
+    for n in 1..=16 {
+        let text = "sum(i, 0, n-1, v[i]^2 - q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 + gamma*z";
+        let system = System::parse(text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
+        assert_eq!(system.dimension(), n);
+        let motion = Motion {
+            rows: Some(OutputTimes::Every(usize::MAX)),
+            columns: vec![Column::Energy, Column::LogFactor],
+            ..Motion::new(Start::new(0.0, vec![0.7; n], vec![0.1; n], 0.0), 5.0, accurate(1e-10))
+        };
+        let (outcome, rows) = system.record(&motion).unwrap();
+        let ([first, last], [from, to]) = ([rows[0][0], rows[1][0]], [rows[0][1], rows[1][1]]);
+        assert_eq!((outcome.status, from), (Status::Completed, 0.0));
+        assert!((to + 1.0).abs() < 1e-14, "the factor is e^(gamma t): {to}");
+        assert!((last / (first * to.exp()) - 1.0).abs() < 1e-9, "{n}: {first} to {last}");
+    }
+    let error = System::parse("q[0]", &["q[17]"], &[]).err().unwrap();
+    assert!(error.to_string().contains("1 to 16"), "{error}");
+}
+
+/// The general case in sixteen coordinates fits into the stack of a thread: masses that depend on all positions, a rate
+/// that depends on z.
+#[test]
+fn sixteen_coupled_coordinates() {
+    let mass = "sum(i, 0, n-1, v[i]^2) + 0.05*sum(i, 0, n-1, v[i]*cos(q[i]))^2";
+    let text = format!("({mass})/2 + sum(i, 0, n-1, cos(q[i])) + 0.1*cos(sum(i, 0, n-1, q[i])) - 0.05*z^2");
+    let system = System::parse(&text, &["x[16]"], &[]).unwrap();
+    let start = Start::new(0.0, vec![0.3; 16], (0..16).map(|i| 0.05 * f64::from(i)).collect::<Vec<_>>(), 0.5);
+    let of = |step_control: StepControl| system.run(&Motion::new(start.clone(), 2.0, step_control), &mut ()).unwrap();
+    let exact = of(accurate(1e-10));
+    let six = of(StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) });
+    assert_eq!((exact.status, six.status), (Status::Completed, Status::Completed));
+    for (a, b) in exact.q.iter().zip(&six.q).chain(exact.p.iter().zip(&six.p)) {
+        assert!((a - b).abs() < 1e-9, "{a} and {b}");
+    }
+    let all = |_: usize| start.clone();
+    let many = Ensemble {
+        count: 12,
+        start: &all,
+        t0: 0.0,
+        varied: None,
+        end: 2.0,
+        step_control: StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
+        rows: None,
+        columns: &[],
+        events: &[],
+        threads: Some(2),
+    };
+    for member in members(&system, &many) {
+        let ending = member.ending.unwrap();
+        assert!(ending.q.iter().zip(&six.q).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", ending.q);
+    }
+}
+
+/// Ten coordinates are computed with the kernel for sixteen, and the other six are not visible: the motion is that of
+/// its two parts, which have kernels of their own, and the geometry is that of ten coordinates.
+#[test]
+fn what_fills_a_kernel_is_not_seen() {
+    // Pendula with masses 1, 2, ..., coupled by springs.
+    let chain = |from: usize, to: usize, mass: usize| {
+        let springs = format!("sum(i, {from}+1, {to}, (q[i] - q[i-1])^4)");
+        format!("(sum(i, {from}, {to}, v[i]^2*(i + {mass})) + sum(i, {from}, {to}, cos(q[i])) - {springs})/2")
+    };
+    let whole = format!("{} + {} + gamma*z", chain(0, 6, 1), chain(7, 9, 1));
+    let system = System::parse(&whole, &["x[10]"], &[("gamma", -0.2)]).unwrap();
+    let (q, v): (Vec<f64>, Vec<f64>) = (0..10).map(|i| (0.1 * f64::from(i) - 0.3, 0.4 - 0.07 * f64::from(i))).unzip();
+    let start = Start::new(0.0, q.clone(), v.clone(), 0.0);
+    let event = Event::new(system.formula().expression("x[8] - x'[9]").unwrap());
+    let motion = Motion {
+        nodes: true,
+        resumable: true,
+        events: vec![event],
+        rows: Some(OutputTimes::Every(8)),
+        columns: vec![Column::Position(9), Column::parse("sum(i, 0, n-1, q[i])", system.formula()).unwrap()],
+        ..Motion::new(start.clone(), 6.0, by_steps(24))
+    };
+    let mut seen = Seen::default();
+    let outcome = system.run(&motion, &mut seen).unwrap();
+    assert_eq!((outcome.q.len(), outcome.p.len(), outcome.v.as_ref().unwrap().len()), (10, 10, 10));
+    let last = seen.rows.last().unwrap();
+    assert_eq!(last[0], outcome.q[9]);
+    assert!((last[1] - outcome.q.iter().sum::<f64>()).abs() < 1e-14);
+    assert!(!seen.crossings.is_empty());
+    assert!(seen.crossings.iter().all(|c| c.q.len() == 10 && (c.q[8] - c.v[9]).abs() < 1e-9), "{:?}", seen.crossings);
+    for range in [0..7, 7..10] {
+        let n = range.len();
+        let text = format!("{} + gamma*z", chain(0, n - 1, range.start + 1));
+        let part = System::parse(&text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
+        let start = Start::new(0.0, &q[range.clone()], &v[range.clone()], 0.0);
+        let alone = part.run(&Motion::new(start, 6.0, by_steps(24)), &mut ()).unwrap();
+        for (a, b) in alone.q.iter().zip(&outcome.q[range.clone()]).chain(alone.p.iter().zip(&outcome.p[range])) {
+            assert!((a - b).abs() < 1e-13, "{n}: {a} and {b}");
+        }
+    }
+    let member = Ensemble {
+        count: 1,
+        start: &|_| start.clone(),
+        t0: 0.0,
+        varied: None,
+        end: 6.0,
+        step_control: by_steps(24),
+        rows: None,
+        columns: &[],
+        events: &[],
+        threads: Some(1),
+    };
+    let member = members(&system, &member).remove(0).ending.unwrap();
+    assert!(member.q.iter().zip(&outcome.q).all(|(a, b)| (a - b).abs() < 1e-13) && member.q.len() == 10);
+
+    // W = diag(1, ..., 10).
+    let geometry = system.geometry(&start).unwrap();
+    assert_eq!((geometry.mass.len(), geometry.mass[9].len(), geometry.momentum.len()), (10, 10, 10));
+    assert_eq!([&geometry.eta, &geometry.reeb, &geometry.herglotz_field].map(Vec::len), [21; 3]);
+    let factorial: f64 = (1..=10).map(f64::from).product();
+    assert!((geometry.condition - 10.0).abs() < 1e-12, "{}", geometry.condition);
+    assert!((geometry.volume + factorial * factorial).abs() < 1e-9 * factorial.powi(2), "{:e}", geometry.volume);
+    assert_eq!(geometry.eta[20], 1.0);
+
+    let check = system.check(&motion, 2).unwrap();
+    assert!(check.samples.iter().all(|sample| sample.contact_defect < 1e-9), "{:?}", check.samples);
+    assert!(check.statements.iter().all(|stated| stated.residual < 1e-9), "{:?}", check.statements);
+    let free = System::parse("sum(i, 0, n-1, v[i]^2)/2 - q[1]^2", &["x[9]"], &[]).unwrap();
+    assert_eq!(free.symmetries().iter().filter(|s| matches!(s, FormulaSymmetry::Translation(_))).count(), 8);
+    assert!(system.to_rust("Halves").unwrap().contains("impl Lagrangian<10> for Halves"));
+}
