@@ -42,6 +42,8 @@ pub mod solve;
 pub mod splitting;
 mod status;
 mod switching;
+#[cfg(test)]
+mod test_lagrangians;
 pub mod theory;
 
 /// Checks of a motion for programs that advance a stepper themselves: the claimed structure of L, the energy drift,

@@ -1,5 +1,4 @@
-//! Tests of steps that are solved by Newton's method on all stages at once. `.ci/run` runs them with and without the
-//! feature `faer`.
+//! Tests of steps that are solved by Newton's method on all stages at once.
 
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, numbers::max_abs_or_nan};

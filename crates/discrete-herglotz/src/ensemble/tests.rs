@@ -1,9 +1,10 @@
 use crate::ensemble::*;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
+use crate::test_lagrangians::{InPlane, OnLine};
 use crate::{Ensemble, GaussCollocation, SplittingScheme, Steps, Until};
 use contact_geom::Lagrangian;
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
+use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -92,10 +93,10 @@ fn ends<const N: usize>(
 /// lanes.
 #[test]
 fn members_in_all_widths_are_the_same() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+    let pendulum = OnLine::from(Pendulum { gamma: -0.1 });
     let pendula = |i: usize| VelocityPoint::new([0.03 * i as f64], [1.0 - 0.02 * i as f64], 0.1);
     let orbits = |i: usize| VelocityPoint::new([1.0 + 0.003 * i as f64, 0.0], [0.1, 1.0], 0.0);
-    let kepler = Kepler::<2>::default();
+    let kepler = InPlane::from(Kepler::default());
     for by in [
         BatchKernel::Splitting(SplittingScheme::BLANES_CASAS_8),
         BatchKernel::Splitting(SplittingScheme::KAHAN_LI_6),

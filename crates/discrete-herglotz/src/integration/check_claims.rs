@@ -175,30 +175,12 @@ pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::Scalar;
-
-    /// `v^2/2 - q^2/2` with a term whose time derivative vanishes at t = 0.
-    enum Even {
-        Drag,
-        Spring,
-    }
-
-    impl Lagrangian<1> for Even {
-        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            let oscillator = (v[0] * v[0] - q[0] * q[0]) * 0.5;
-            oscillator + t.cos() * if let Even::Drag = self { z * -0.3 } else { q[0] * q[0] * 0.4 }
-        }
-        fn structure(&self) -> Structure {
-            match self {
-                Even::Drag => Structure { z_affine: true, constant_rate: true, ..Structure::default() },
-                Even::Spring => Structure { quadratic: true, autonomous: true, ..Structure::default() },
-            }
-        }
-    }
+    use crate::test_lagrangians::{Even, OnLine};
 
     #[test]
     fn a_slope_in_time_that_vanishes_at_the_start_is_seen() {
         for (system, false_claim) in [(Even::Drag, "constant_rate"), (Even::Spring, "autonomous")] {
+            let system = OnLine::from(system);
             for t in [0.0, std::f64::consts::PI] {
                 let found = check_claims(&system, t, &VelocityPoint::new([1.0], [0.5], 0.2));
                 let refused =

@@ -1,12 +1,14 @@
 //! The solution of the equations of a step: Newton's method and linear solvers. Only this module uses faer.
 
 pub(crate) mod chebyshev;
+#[cfg(test)]
+mod dense_lu_tests;
 #[cfg(feature = "faer")]
 mod faer_lu;
 pub(crate) mod hermite;
 pub(crate) mod inverse;
 pub(crate) mod mass_matrix;
-#[cfg(not(feature = "faer"))]
+#[cfg(any(test, not(feature = "faer")))] // In tests next to faer, to compare them.
 mod nalgebra_lu;
 pub(crate) mod newton;
 pub(crate) mod roots;

@@ -183,34 +183,9 @@ pub(super) fn without_symmetry(i: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use crate::test_lagrangians::{InPlane, Whisper};
     use crate::{Ensemble, Problem, SplittingScheme, Steps, Until};
-    use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
-
-    /// `v.v/2 + c f(t) q0 - b q1^2/2` with `f = 1` or `f = t`: a very small force acts on the first coordinate.
-    struct Whisper {
-        force: f64,
-        later: bool,
-        spring: f64,
-    }
-
-    impl Lagrangian<2> for Whisper {
-        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-            let push = q[0] * self.force;
-            let push = if self.later { push * t } else { push };
-            v.dot(v) * 0.5 + push - q[1] * q[1] * (0.5 * self.spring)
-        }
-
-        fn structure(&self) -> Structure {
-            Structure {
-                separable: true,
-                z_affine: true,
-                constant_rate: true,
-                autonomous: !self.later,
-                ..Structure::default()
-            }
-        }
-    }
+    use contact_geom::{VelocityPoint, numbers::max_or_nan};
 
     /// A very small force accumulates correctly: from rest, next to a coordinate with large motion, and for a momentum
     /// with small kicks; in single runs and in lanes.
@@ -222,7 +197,7 @@ mod tests {
             .into_iter()
             .flat_map(|v| [false, true].into_iter().flat_map(move |later| [0.0, 1.0].map(|spring| (v, later, spring))))
         {
-            let system = Whisper { force: 1e-13, later, spring };
+            let system = InPlane::from(Whisper { force: 1e-13, later, spring });
             // The contribution of the force to position and momentum; for the force t it is t^3/6 and t^2/2.
             let added = if later { [t * t * t / 6.0, t * t / 2.0] } else { [t * t / 2.0, t] }.map(|x| x * 1e-13);
             let start = VelocityPoint::new([1.0, spring], [v, 0.0], 0.0);

@@ -233,48 +233,31 @@ mod tests {
     use crate::gauss::Gauss;
     use crate::gauss::GaussStepper;
     use crate::gauss::stages::equations::{Given, StageEquations};
+    use crate::test_lagrangians::{Coupled, Cubic, InPlane, OnLine};
     use crate::{DiscreteLagrangian, Stepper, solve::Solver};
     use crate::{Problem, Start, StepperOptions};
-    use contact_geom::{PhasePoint, Scalar, Structure, numbers::max_or_nan};
+    use contact_geom::{PhasePoint, Structure, numbers::max_or_nan};
     use std::sync::atomic::{AtomicUsize, Ordering};
-
-    /// Two coupled pendulums with masses that are not diagonal, and drag.
-    struct Coupled;
-
-    impl Coupled {
-        const MASS: [[f64; 2]; 2] = [[2.0, 0.5], [0.5, 1.0]];
-        const GAMMA: f64 = -0.3;
-    }
-
-    impl Lagrangian<2> for Coupled {
-        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-            let [[a, b], [_, c]] = Self::MASS;
-            let kinetic = v[0] * v[0] * (0.5 * a) + v[0] * v[1] * b + v[1] * v[1] * (0.5 * c);
-            kinetic + q[0].cos() + (q[0] - q[1]).cos() * 2.0 + q[1] * t.sin() * 0.1 + z * Self::GAMMA
-        }
-        fn structure(&self) -> Structure {
-            Structure { separable: true, z_affine: true, constant_mass: true, ..Structure::default() }
-        }
-    }
 
     /// The stages found from the positions alone are those found from velocities, actions and factors: to 64 units of
     /// round-off of the largest position or force, times the condition of the two systems, which is below 10 for these
     /// steps. Longer steps have several solutions.
     #[test]
     fn the_stages_are_those_of_all_equations() {
+        let coupled = InPlane::from(Coupled);
         let mass: SMatrix<f64, 2, 2> = SMatrix::from(Coupled::MASS);
         let inverse = mass.try_inverse().unwrap();
         let (q, v) = (SVector::from([1.0, -2.0]), SVector::from([0.5, 1.0]));
         for s in [1, 2, 3, 5, 8, 16] {
             for h in [0.1, 0.4, 0.7] {
-                let (t, gauss) = (0.4, Gauss::new::<2>(Coupled, s, h).unwrap());
+                let (t, gauss) = (0.4, Gauss::new::<2>(&coupled, s, h).unwrap());
                 let equations: StageEquations<_, 2> = gauss.equations(t, true);
                 let given = Given::Start(PhasePoint { q, p: mass * v, z: 0.0 });
                 let mut work = equations.workspace(&given);
                 equations.solve(&given, &v, &(mass * v), &mut work).unwrap();
                 let table = Condensed::new(s, h, Coupled::GAMMA).unwrap();
                 let mut positions = PositionNewton::new(s);
-                let at = At { lagrangian: &Coupled, table: &table, inverse_mass: Some(&inverse), t, q, v };
+                let at = At { lagrangian: &coupled, table: &table, inverse_mass: Some(&inverse), t, q, v };
                 positions.solve(&at).unwrap();
                 let mut off = 0.0;
                 for (i, (a, q)) in positions.stages().enumerate() {
@@ -287,22 +270,6 @@ mod tests {
         }
     }
 
-    /// A cubic potential, with a count of the evaluations of L: for long steps the stage equations have no solution.
-    struct Hill {
-        count: AtomicUsize,
-        claims: Structure,
-    }
-
-    impl Lagrangian<1> for Hill {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            self.count.fetch_add(1, Ordering::Relaxed);
-            v[0] * v[0] * 0.5 + q[0].powi(3) / 3.0 - z * 0.1
-        }
-        fn structure(&self) -> Structure {
-            self.claims
-        }
-    }
-
     /// A step without a solution fails after at most 60 evaluations of forces and second derivatives per stage, about
     /// 20 iterations, by both forms of the stage equations; 50 iterations took 100.
     #[test]
@@ -310,17 +277,21 @@ mod tests {
         let condensed = Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() };
         for s in [1, 4, 16] {
             for start in [1.0, 2.0] {
-                let hill = Hill { count: AtomicUsize::new(0), claims: condensed };
+                let cubic = OnLine::from(Cubic { count: AtomicUsize::new(0), claims: condensed });
+                let evaluations = || match &cubic {
+                    OnLine::Cubic(cubic) => cubic.count.swap(0, Ordering::Relaxed) / s,
+                    _ => unreachable!("it is the cubic potential"),
+                };
                 let table = Condensed::new(s, 5.0, -0.1).unwrap();
                 let (q, v) = (SVector::from([start]), SVector::from([0.5]));
-                let at = At { lagrangian: &hill, table: &table, inverse_mass: None, t: 0.0, q, v };
+                let at = At { lagrangian: &cubic, table: &table, inverse_mass: None, t: 0.0, q, v };
                 let outcome = PositionNewton::new(s).solve(&at);
-                let of_positions = hill.count.swap(0, Ordering::Relaxed) / s;
+                let of_positions = evaluations();
                 assert!(matches!(outcome, Err(StepError::NotConverged { .. })), "{outcome:?}");
-                let gauss = Gauss::new(&hill, s, 5.0).unwrap();
+                let gauss = Gauss::new(&cubic, s, 5.0).unwrap();
                 let state = PhasePoint { q, p: v, z: 0.2 };
                 let outcome = gauss.forward(0.0, &state, &v, &mut Solver::default());
-                let of_all = hill.count.swap(0, Ordering::Relaxed) / s;
+                let of_all = evaluations();
                 assert!(matches!(outcome, Err(StepError::NotConverged { .. })), "{outcome:?}");
                 assert!(of_positions <= 60 && of_all <= 60, "s = {s}: {of_positions}, {of_all} evaluations a stage");
             }
@@ -334,9 +305,9 @@ mod tests {
             Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() },
             Structure::default(),
         ] {
-            let hill = Hill { count: AtomicUsize::new(0), claims };
+            let cubic = OnLine::from(Cubic { count: AtomicUsize::new(0), claims });
             let start = PhasePoint::new([1.0], [0.5], 0.2);
-            let problem = Problem::new(&hill, 0.0, Start::Momentum(start, [0.5].into())).unwrap();
+            let problem = Problem::new(&cubic, 0.0, Start::Momentum(start, [0.5].into())).unwrap();
             let mut run =
                 GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, check_resolution: false }).unwrap();
             let halt = run.advance(3).unwrap_err();

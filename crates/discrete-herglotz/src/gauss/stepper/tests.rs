@@ -2,53 +2,11 @@
 
 use super::*;
 use crate::gauss::Gauss;
+use crate::test_lagrangians::{How, OnLine, OneSided};
 use crate::{DiscreteLagrangian, DiscreteStep, solve::Solver};
-use contact_geom::systems::{OneCoordinate, QuadraticInZ};
-use contact_geom::{Scalar, Structure};
+use contact_geom::Structure;
+use contact_geom::systems::QuadraticInZ;
 use pulp::Arch;
-
-/// How the Lagrangian of a spring that acts only for `q > 0` is written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum How {
-    /// `max(0, q)^2`.
-    Max,
-    /// `if_less` with two values.
-    Select,
-    /// `(q + |q|)^2 / 4`.
-    Abs,
-    /// `if` on the value of q.
-    Branch,
-}
-
-/// `v^2/2 - 2 max(0, q)^2 + 0.3 q - 0.1 z`: a mass that falls onto a spring. The force is continuous with a kink.
-#[derive(Clone, Copy, Debug)]
-struct OneSided {
-    how: How,
-    claims: Structure,
-}
-
-impl Lagrangian<1> for OneSided {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        let (q, zero) = (q[0], T::zero());
-        let square = match self.how {
-            How::Max => q.max(zero).powi(2),
-            How::Select => zero.if_less(q, q * q, zero),
-            How::Abs => (q + q.abs()).powi(2) * 0.25,
-            How::Branch => {
-                if q.re() > 0.0 {
-                    q * q
-                } else {
-                    zero
-                }
-            }
-        };
-        v[0] * v[0] * 0.5 - square * 2.0 + q * 0.3 - z * 0.1
-    }
-    fn structure(&self) -> Structure {
-        self.claims
-    }
-}
 
 /// The condensed route and the general one.
 fn routes() -> [(GaussRoute, Structure); 2] {
@@ -69,7 +27,8 @@ fn instruction_sets() -> Vec<Arch> {
 /// Takes 100 steps from `q < 0` and compares each with the same step over `f64`. Returns the number of steps that cross
 /// the kink, and the number solved by a Newton method.
 fn follow(spring: OneSided, stages: usize, set: Arch, route: GaussRoute) -> (usize, u64) {
-    let gauss = Gauss::new(spring, stages, 0.2).unwrap();
+    let spring = OnLine::from(spring);
+    let gauss = Gauss::new(&spring, stages, 0.2).unwrap();
     let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
     let mut run =
         GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, check_resolution: false }).unwrap();
@@ -109,7 +68,7 @@ fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
 fn actions_that_follow_spare_iterations_and_change_nothing() {
     let (steps, start) = (100, PhasePoint::new([1.0], [0.5], 0.8));
     for (stages, h) in [(4, 0.1), (8, 0.5), (8, 1.0), (16, 0.5), (16, 1.0)] {
-        let system = OneCoordinate::from(QuadraticInZ::default());
+        let system = OnLine::from(QuadraticInZ::default());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let [(with, a), (without, b)] = [true, false].map(|follows| {
             let mut run =
@@ -135,7 +94,8 @@ fn actions_that_follow_spare_iterations_and_change_nothing() {
 fn lanes_have_no_value_to_branch_on() {
     for (route, claims) in routes() {
         let spring = OneSided { how: How::Branch, claims };
-        let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
+        let system = OnLine::from(spring);
+        let problem = Problem::new(&system, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
         for set in instruction_sets() {
             if matches!(set, Arch::Scalar) {
                 assert!(follow(spring, 8, set, route).0 >= 4);

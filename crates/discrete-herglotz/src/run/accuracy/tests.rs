@@ -7,21 +7,20 @@ use crate::run::accuracy::select::select_within_budget;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::{Request, Shared};
 use crate::run::{OutputRequest, Until};
-use crate::{AnyIntegrator, Stepper, StepperOptions};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use crate::test_lagrangians::{InPlane, OnLine, Unstated};
+use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
+use contact_geom::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
+use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
 /// The integrator and the number of steps that are selected for a run, and the cost of the selection.
-fn search<L: Lagrangian<N>, const N: usize>(
-    problem: &Problem<'_, L, N>,
+fn search<'p, L: Lagrangian<N>, const N: usize>(
+    problem: &'p Problem<'p, L, N>,
     span: f64,
-    integrator: Option<AnyIntegrator>,
+    integrator: Option<Shared<'p, L, N>>,
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
-    let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
     let request = Request { problem, t_end: span, span, integrator, needs: OutputRequest::default(), scales: None };
     let mut trials = TrialRuns::new(&request, wanted);
     let selection = select_within_budget(&mut trials).unwrap();
@@ -33,7 +32,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 /// more than 1.2 k.
 #[test]
 fn trial_runs_cost_little() {
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
+    let pendulum = OnLine::from(Pendulum { gamma: -0.01 });
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
         let (_, count, spent) = search(&problem, span, None, wanted);
@@ -53,14 +52,14 @@ fn trial_runs_cost_little() {
 /// runs, and runs that would need Newton's method, do not.
 #[test]
 fn long_motions_take_more_stages() {
-    let selected = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
+    let selected = |system: &OnLine, integrator: Option<AnyIntegrator>, span| {
         let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
         let run = problem.accuracy(1e-7);
         let run = if let Some(by) = integrator { run.by(by) } else { run };
         let plan = run.plan(Until::Time(span)).unwrap();
         (plan.integrator().name.to_string(), plan.count())
     };
-    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
+    let pendulum = OnLine::from(Pendulum { gamma: -0.01 });
     let (name, ours) = selected(&pendulum, None, 1000.0);
     let (_, of_eight) = selected(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
     assert_eq!(name, "gauss_16");
@@ -74,7 +73,7 @@ fn long_motions_take_more_stages() {
 /// are taken.
 #[test]
 fn steps_that_cost_less_are_taken() {
-    let system = OneCoordinate::from(QuadraticInZ { c: -0.05 });
+    let system = OnLine::from(QuadraticInZ { c: -0.05 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 1.0)).unwrap();
     let (_, count, _) = search(&problem, 100.0, None, 1e-3);
     let newton_steps = |count: usize| {
@@ -87,10 +86,10 @@ fn steps_that_cost_less_are_taken() {
 }
 
 /// Trial runs in transformed time cost a small multiple of the run too. If transformed time has no advantage, testing
-/// it costs nothing: the cost equals that for the integrator given by name.
+/// it costs nothing: the cost equals that for the given integrator.
 #[test]
 fn trial_runs_in_transformed_time_cost_little() {
-    let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
+    let kepler = InPlane::from(Kepler { gamma: 0.0, mu: 1.0 });
     for e in [0.0, 0.1, 0.6, 0.9, 0.99] {
         for apocentre in [false, true] {
             let e = if apocentre { -e } else { e };
@@ -98,47 +97,14 @@ fn trial_runs_in_transformed_time_cost_little() {
             let problem = Problem::new(&kepler, 0.0, start).unwrap();
             let (integrator, _, spent) = search(&problem, 40.0, None, 1e-8);
             if e.abs() < 0.5 {
-                let equal = AnyIntegrator::Gauss { stages: 8 };
-                let (name, _, by_name) = search(&problem, 40.0, Some(equal), 1e-8);
-                assert_eq!((integrator, spent), (name, by_name), "{e}");
+                let (name, _, of_given) = search(&problem, 40.0, Some(Arc::new(GaussCollocation { stages: 8 })), 1e-8);
+                assert_eq!((integrator, spent), (name, of_given), "{e}");
                 continue;
             }
             assert_eq!(integrator, "transformed_gauss_8", "{e}");
             let run = problem.accuracy(1e-8).run(Until::Time(40.0)).unwrap();
             let most = 7.0 * run.evaluations as f64 + 2.5 * 2.0 * 2000.0;
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
-        }
-    }
-}
-
-/// Lagrangians that do not declare their kinks: a spring that is stiffer under compression, and a force that starts at
-/// a given time.
-enum Unstated {
-    Stiffer(f64),
-    Begins(f64),
-}
-
-impl Lagrangian<1> for Unstated {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        let (kinetic, potential) = (v[0] * v[0] * 0.5, q[0] * q[0] * 0.5);
-        match self {
-            Unstated::Stiffer(k) => kinetic - T::zero().if_less(q[0], potential, potential * *k),
-            Unstated::Begins(at) => kinetic - potential + T::from(*at).if_less(t, q[0], T::zero()),
-        }
-    }
-
-    /// Only the accelerations are iterated, with the number of stages for long runs.
-    fn structure(&self) -> Structure {
-        let autonomous = matches!(self, Unstated::Stiffer(_));
-        let (separable, constant_mass) = (true, true);
-        Structure {
-            autonomous,
-            z_free: true,
-            z_affine: true,
-            constant_rate: true,
-            separable,
-            constant_mass,
-            ..Structure::default()
         }
     }
 }
@@ -157,6 +123,7 @@ fn kinks_at_nodes_do_not_hide() {
     }
     let mut refused = 0;
     for (system, q, span, [x, v]) in cases {
+        let system = OnLine::from(system);
         let problem = Problem::new(&system, 0.0, VelocityPoint::new([q], [0.0], 0.0)).unwrap();
         for wanted in [1e-4, 1e-6, 1e-9] {
             match problem.accuracy(wanted).run(Until::Time(span)) {

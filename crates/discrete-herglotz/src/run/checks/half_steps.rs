@@ -52,48 +52,29 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{GaussCollocation, Plan, Problem, Stepper, Steps, Until};
-    use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
-
-    /// Oscillators with drag, of frequencies 1, 2 .. N: `v.v/2 - (k x_k)^2/2 - z/10`.
-    struct Oscillators;
-
-    impl<const N: usize> Lagrangian<N> for Oscillators {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-            (0..N).fold(-z * 0.1, |l, k| l + (v[k] * v[k] - q[k] * q[k] * ((k + 1) as f64).powi(2)) * 0.5)
-        }
-        fn structure(&self) -> Structure {
-            Structure {
-                autonomous: true,
-                separable: true,
-                quadratic: true,
-                z_affine: true,
-                constant_rate: true,
-                constant_mass: true,
-                ..Structure::default()
-            }
-        }
-    }
+    use crate::test_lagrangians::{InPlane, NearlyOne, Oscillators};
+    use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Plan, Problem, Stepper, StepperOptions};
+    use crate::{Steps, Until};
+    use contact_geom::VelocityPoint;
 
     const H: f64 = 0.0625;
 
     /// The plan of a number of steps from `q = 1, v = 0`.
-    fn plan<'a, const N: usize>(
-        problem: &'a Problem<'a, Oscillators, N>,
-        stages: usize,
+    fn plan<'a>(
+        problem: &'a Problem<'a, InPlane, 2>,
+        integrator: impl Integrator<'a, InPlane, 2> + 'a,
         steps: usize,
-    ) -> Plan<'a, Oscillators, N> {
-        let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(H));
-        run.plan(Until::Time(H * steps as f64)).unwrap()
+    ) -> Plan<'a, InPlane, 2> {
+        problem.by(integrator).steps(Steps::Size(H)).plan(Until::Time(H * steps as f64)).unwrap()
     }
 
-    fn problem<const N: usize>() -> Problem<'static, Oscillators, N> {
-        Problem::new(&Oscillators, 0.0, VelocityPoint::new([1.0; N], [0.0; N], 0.0)).unwrap()
+    fn problem() -> Problem<'static, InPlane, 2> {
+        let start = VelocityPoint::new([1.0; 2], [0.0; 2], 0.0);
+        Problem::new(&InPlane::Oscillators(Oscillators), 0.0, start).unwrap()
     }
 
     /// Whether a stepper multiplies by one matrix: it then makes no evaluations.
-    fn by_one_matrix<const N: usize>(mut stepper: Box<dyn Stepper<N> + '_>) -> bool {
+    fn by_one_matrix(mut stepper: Box<dyn Stepper<2> + '_>) -> bool {
         stepper.advance(1).unwrap();
         stepper.evaluations() == 0
     }
@@ -102,8 +83,8 @@ mod tests {
     /// as at the time of a row or of an event.
     #[test]
     fn a_step_of_another_length_makes_no_matrix() {
-        let problem = problem::<2>();
-        let plan = plan(&problem, 8, 100);
+        let problem = problem();
+        let plan = plan(&problem, GaussCollocation { stages: 8 }, 100);
         assert!(by_one_matrix(plan.stepper().unwrap()));
         for h in [0.3 * H, -0.5 * H] {
             let part = plan.steps.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
@@ -118,40 +99,47 @@ mod tests {
         }
     }
 
+    /// Collocation with eight stages that states another number of them: with two coordinates it has as many unknowns as
+    /// one with more coordinates.
+    struct Stating {
+        stages: usize,
+    }
+
+    impl<'a> Integrator<'a, InPlane, 2> for Stating {
+        fn info(&self) -> MethodInfo {
+            MethodInfo { collocation: Some(self.stages), ..MethodInfo::of_discrete::<2>("stating", 16) }
+        }
+        fn check(&self, _: &InPlane) -> Result<(), InputError> {
+            Ok(())
+        }
+        fn stepper(
+            &self,
+            problem: &Problem<'a, InPlane, 2>,
+            h: f64,
+            options: StepperOptions,
+        ) -> Result<Box<dyn Stepper<2> + 'a>, InputError> {
+            GaussCollocation { stages: 8 }.stepper(problem, h, options)
+        }
+    }
+
     /// The matrix is not computed for so few steps that it costs more than it saves: with 96 unknowns it takes as long
     /// as about a thousand steps, with half as many unknowns an eighth of that.
     #[test]
-    fn a_few_steps_of_many_coordinates_make_no_matrix() {
-        let problem = problem::<6>();
-        for (steps, stages, expected) in [(500, 16, false), (1000, 16, true), (50, 8, false), (200, 8, true)] {
-            let plan = plan(&problem, stages, steps);
+    fn a_few_steps_with_many_unknowns_make_no_matrix() {
+        let problem = problem();
+        for (steps, stages, expected) in [(500, 48, false), (1000, 48, true), (50, 24, false), (200, 24, true)] {
+            let plan = plan(&problem, Stating { stages }, steps);
             assert_eq!(by_one_matrix(plan.stepper().unwrap()), expected, "{steps} steps of {stages} stages");
         }
     }
 
-    /// An oscillator in two nearly dependent coordinates: the mass matrix and the stiffness matrix have condition
-    /// number 1e10.
-    struct NearlyOne;
-
-    impl Lagrangian<2> for NearlyOne {
-        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-            let turned = |x: &SVector<T, 2>| {
-                let (sin, cos) = 0.6f64.sin_cos();
-                SVector::from([x[0] * cos + x[1] * sin, (x[1] * cos - x[0] * sin) * 1e-5])
-            };
-            Oscillators.value(t, &turned(q), &turned(v), z) + turned(q)[1] * turned(q)[1] * 1.5
-        }
-        fn structure(&self) -> Structure {
-            Lagrangian::<2>::structure(&Oscillators)
-        }
-    }
-
-    /// The stage equations of such a motion cannot be solved without the matrix: the comparison with half steps, and
-    /// the states within a step, use it too.
+    /// The stage equations of a motion with an ill-conditioned mass matrix cannot be solved without the matrix: the
+    /// comparison with half steps, and the states within a step, use it too.
     #[test]
     fn an_ill_conditioned_mass_matrix_is_no_flaw_of_the_steps() {
         let start = VelocityPoint::new([1.0, -0.4], [0.3, 0.8], 0.0);
-        let problem = Problem::new(&NearlyOne, 0.0, start).unwrap();
+        let system = InPlane::from(NearlyOne);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
         for stages in [1, 2] {
             let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
             assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");

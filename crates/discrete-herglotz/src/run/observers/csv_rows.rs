@@ -75,14 +75,12 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_lagrangians::OnLine;
     use crate::{GaussCollocation, Problem, Status, Steps, Until};
-    use contact_geom::{
-        VelocityPoint,
-        systems::{OneCoordinate, Pendulum},
-    };
+    use contact_geom::{VelocityPoint, systems::Pendulum};
 
     fn run(observer: &mut impl Observer<1>) -> Status {
-        let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
+        let pendulum = OnLine::from(Pendulum { gamma: -0.1 });
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).observe(observer);
         run.run(Until::Time(2.0)).unwrap().status

@@ -32,15 +32,16 @@ impl<const N: usize> Observer<N> for Interruption<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_lagrangians::OnLine;
     use crate::{AnyIntegrator, Ensemble, InputError, Problem, Status, Steps, Until};
     use contact_geom::VelocityPoint;
-    use contact_geom::systems::{OneCoordinate, Pendulum};
+    use contact_geom::systems::Pendulum;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// Trial runs end at the first interrupt request, whatever other search would follow.
     #[test]
     fn a_plan_is_interrupted() {
-        let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
+        let pendulum = OnLine::from(Pendulum { gamma: -0.01 });
         for by in [None, Some("gauss_8"), Some("strang"), Some("gauss_2")] {
             for yes in [0, 1, 5] {
                 let asked = AtomicUsize::new(0);
@@ -63,7 +64,7 @@ mod tests {
     /// Members in lanes and members with their own runs end at their current state: complete runs would take hours.
     #[test]
     fn long_members_are_interrupted() {
-        let pendulum = OneCoordinate::from(Pendulum { gamma: -1e-9 });
+        let pendulum = OnLine::from(Pendulum { gamma: -1e-9 });
         let start = |i: usize| VelocityPoint::new([0.5 + 0.01 * i as f64], [0.0], 0.0);
         for by in ["strang", "gauss_2", "midpoint"] {
             let asked = AtomicUsize::new(0);
@@ -83,7 +84,7 @@ mod tests {
     /// An interrupt that never requests the end leaves the results bitwise unchanged.
     #[test]
     fn a_question_changes_nothing() {
-        let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
+        let pendulum = OnLine::from(Pendulum { gamma: -0.01 });
         let start = |i: usize| VelocityPoint::new([0.5 + 0.01 * i as f64], [0.0], 0.0);
         for by in ["strang", "gauss_2", "midpoint"] {
             let ends = |interrupt: Option<Interrupt<'_>>| {

@@ -1,8 +1,9 @@
 //! The Strang splittings as discrete Lagrangians.
 
-use super::{ActionStrang, Curved, Inertia, Outcome, SCHEMES, Splitting, Strang, Tides, distance, run};
+use super::{ActionStrang, Outcome, SCHEMES, Splitting, Strang, distance, run};
 use crate::rules::Composition;
 use crate::solve::Solver;
+use crate::test_lagrangians::{Curved, InPlane, Inertia, OnLine, Tides};
 use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, Stepper};
 use contact_geom::systems::{Duffing, Pendulum, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, PhasePoint, Scalar, numbers::MaxAbsOrNan};
@@ -42,12 +43,16 @@ fn assert_step_is_of_value<const N: usize>(ld: &impl DiscreteLagrangian<N>, star
 fn strang_is_the_flow_of_its_value() -> Outcome {
     let (one, two) = (PhasePoint::new([1.0], [0.7], 0.4), PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2));
     for h in [0.5, 0.1, 0.01] {
-        assert_step_is_of_value(&Strang::new(Pendulum { gamma: -0.3 }, h, 0.7, &one)?, one)?;
-        assert_step_is_of_value(&Strang::new(Duffing { gamma: 0.0, ..Duffing::forced() }, h, 0.7, &one)?, one)?;
-        assert_step_is_of_value(&Strang::new(&Inertia, h, 0.7, &two)?, two)?;
-        assert_step_is_of_value(&Strang::new(&Tides, h, 0.7, &one)?, one)?;
-        assert_step_is_of_value(&ActionStrang::new(QuadraticInZ { c: 0.4 }, h, 0.7, &one)?, one)?;
-        assert_step_is_of_value(&ActionStrang::new(&Curved, h, 0.7, &one)?, one)?;
+        for system in
+            [Pendulum { gamma: -0.3 }.into(), Duffing { gamma: 0.0, ..Duffing::forced() }.into(), Tides.into()]
+        {
+            let system: OnLine = system;
+            assert_step_is_of_value(&Strang::new(&system, h, 0.7, &one)?, one)?;
+        }
+        assert_step_is_of_value(&Strang::new(&InPlane::from(Inertia), h, 0.7, &two)?, two)?;
+        for system in [OnLine::from(QuadraticInZ { c: 0.4 }), Curved.into()] {
+            assert_step_is_of_value(&ActionStrang::new(&system, h, 0.7, &one)?, one)?;
+        }
     }
     Ok(())
 }
@@ -56,17 +61,18 @@ fn strang_is_the_flow_of_its_value() -> Outcome {
 #[test]
 fn compositions_of_strang_are_splittings() -> Outcome {
     let (start, h) = (PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2), 0.1);
+    let (tides, inertia) = (OnLine::from(Tides), InPlane::from(Inertia));
     for scheme in SCHEMES.iter().filter(|s| !s.is_nystrom()) {
-        let mut composed = Composition::new(|h| Strang::new(&Inertia, h, 0.0, &start), scheme, h, 0.3, start)?;
+        let mut composed = Composition::new(|h| Strang::new(&inertia, h, 0.0, &start), scheme, h, 0.3, start)?;
         assert_eq!(composed.advance(10), Ok(()));
-        let split = run(Splitting::new(&Inertia, scheme, h, 0.3, start)?, 10);
+        let split = run(Splitting::new(&inertia, scheme, h, 0.3, start)?, 10);
         let apart = distance(composed.state(), split);
         assert!(apart < 200.0 * f64::EPSILON, "{}: {apart}", scheme.name());
         let rate = (composed.sigma() / (-0.15 * h).exp() - 1.0).abs();
         assert!(rate < 70.0 * f64::EPSILON, "{}: {rate}", scheme.name());
         let start = PhasePoint::new([0.8], [0.3], 0.2);
-        let mut composed = Composition::new(|h| Strang::new(&Tides, h, 0.0, &start), scheme, h, 0.3, start)?;
-        let mut split = Splitting::new(&Tides, scheme, h, 0.3, start)?;
+        let mut composed = Composition::new(|h| Strang::new(&tides, h, 0.0, &start), scheme, h, 0.3, start)?;
+        let mut split = Splitting::new(&tides, scheme, h, 0.3, start)?;
         assert_eq!((composed.advance(10), split.advance(10)), (Ok(()), Ok(())));
         let apart = distance(composed.state(), split.state());
         assert!(apart < 200.0 * f64::EPSILON, "{}: {apart}", scheme.name());
@@ -74,7 +80,7 @@ fn compositions_of_strang_are_splittings() -> Outcome {
         assert!(rate < 70.0 * f64::EPSILON, "{}: {rate}", scheme.name());
     }
     let refused =
-        Composition::new(|h| Strang::new(&Inertia, h, 0.0, &start), &SplittingScheme::BLANES_MOAN_6, h, 0.0, start);
+        Composition::new(|h| Strang::new(&inertia, h, 0.0, &start), &SplittingScheme::BLANES_MOAN_6, h, 0.0, start);
     assert!(matches!(refused.err(), Some(InputError::Hypothesis { .. })));
     Ok(())
 }

@@ -1,10 +1,10 @@
 //! The flows of the action, and the hypotheses of splittings.
 
-use super::{ActionFlow, ActionMap, ActionSplitting, Curved, Riccati, RiccatiMap, Splitting, action_flow};
+use super::{ActionFlow, ActionMap, ActionSplitting, Riccati, RiccatiMap, Splitting, action_flow};
+use crate::test_lagrangians::{Curved, Magnetic, OnLine, Rate};
 use crate::{InputError, SplittingScheme};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
+use contact_geom::systems::QuadraticInZ;
+use contact_geom::{PhasePoint, Scalar, Structure};
 
 /// The closed form of the Riccati flow is a one-parameter group with the stated rate, and NaN after the blow-up.
 #[test]
@@ -63,48 +63,27 @@ impl ActionMap for EulerMap {
 #[test]
 fn what_does_not_fit_is_refused() {
     let (start, scheme) = (PhasePoint::new([1.0], [1.0], 0.2), &SplittingScheme::STRANG);
-    struct Rate(Structure);
-    impl Lagrangian<1> for Rate {
-        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 - z * t.sin() * 0.1
-        }
-        fn structure(&self) -> Structure {
-            self.0
-        }
-    }
-    struct Magnetic;
-    impl Lagrangian<1> for Magnetic {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 + v[0] - q[0] * q[0] * 0.5
-        }
-        fn structure(&self) -> Structure {
-            Structure { z_free: true, ..affine() }
-        }
-    }
-    fn affine() -> Structure {
-        Structure { separable: true, z_affine: true, ..Structure::default() }
-    }
-    let linear = |l: &Rate, h: f64| Splitting::new(l, scheme, h, 0.0, start).err();
-    assert_eq!(linear(&Rate(affine()), 0.1), None);
+    let affine = || Structure { separable: true, z_affine: true, ..Structure::default() };
+    let with_rate = |claims: Structure| OnLine::from(Rate(claims));
+    let linear = |claims: Structure, h: f64| Splitting::new(&with_rate(claims), scheme, h, 0.0, start).err();
+    assert_eq!(linear(affine(), 0.1), None);
     let steady = Structure { constant_rate: true, ..affine() };
-    assert!(matches!(linear(&Rate(steady), 0.1), Some(InputError::FalseClaim { claim: "constant_rate", .. })));
+    assert!(matches!(linear(steady, 0.1), Some(InputError::FalseClaim { claim: "constant_rate", .. })));
     let nonlinear = Structure { z_affine: false, ..affine() };
-    let in_time = ActionSplitting::new(&Rate(nonlinear), scheme, 0.1, 0.0, start).err();
+    let in_time = ActionSplitting::new(&with_rate(nonlinear), scheme, 0.1, 0.0, start).err();
     assert!(matches!(in_time, Some(InputError::Hypothesis { .. })));
-    assert_eq!(linear(&Rate(affine()), 0.0), Some(InputError::Step { h: 0.0 }));
-    assert_eq!(linear(&Rate(Structure::default()), 0.1), Some(InputError::Unclaimed { claim: "separable" }));
+    assert_eq!(linear(affine(), 0.0), Some(InputError::Step { h: 0.0 }));
+    assert_eq!(linear(Structure::default(), 0.1), Some(InputError::Unclaimed { claim: "separable" }));
     let lie = Structure { autonomous: true, ..affine() };
-    assert!(matches!(linear(&Rate(lie), 0.1), Some(InputError::FalseClaim { claim: "autonomous", .. })));
-    let magnetic = Splitting::new(&Magnetic, scheme, 0.1, 0.0, start).err();
+    assert!(matches!(linear(lie, 0.1), Some(InputError::FalseClaim { claim: "autonomous", .. })));
+    let magnetic = Splitting::new(&OnLine::from(Magnetic), scheme, 0.1, 0.0, start).err();
     assert!(matches!(magnetic, Some(InputError::FalseClaim { claim: "separable", .. })), "{magnetic:?}");
-    let double = PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0);
-    let coupled = Splitting::new(&DoublePendulum::default(), scheme, 0.1, 0.0, double).err();
-    assert_eq!(coupled, Some(InputError::Unclaimed { claim: "separable" }));
-    let curved = Splitting::new(&Curved, scheme, 0.1, 0.0, start).err();
-    assert_eq!(curved, Some(InputError::Unclaimed { claim: "z_affine" }));
-    let nystrom = ActionSplitting::new(&Curved, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, start).err();
+    let curved = OnLine::from(Curved);
+    let refused = Splitting::new(&curved, scheme, 0.1, 0.0, start).err();
+    assert_eq!(refused, Some(InputError::Unclaimed { claim: "z_affine" }));
+    let nystrom = ActionSplitting::new(&curved, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, start).err();
     assert!(matches!(nystrom, Some(InputError::Hypothesis { .. })));
-    let quadratic = QuadraticInZ { c: 0.4 };
+    let quadratic = OnLine::from(QuadraticInZ { c: 0.4 });
     let with = |rate, map| ActionSplitting::with_flow(&quadratic, &Wrong { rate, map }, scheme, 0.1, 0.0, start).err();
     assert_eq!(with(-0.2, -0.2), None);
     assert!(matches!(with(-0.3, -0.3), Some(InputError::Hypothesis { .. })));

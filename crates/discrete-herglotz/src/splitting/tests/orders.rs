@@ -1,9 +1,10 @@
 //! The observed orders of the schemes.
 
-use super::{ActionSplitting, Curved, Inertia, Outcome, SCHEMES, Splitting, Tides, distance, run};
+use super::{ActionSplitting, Outcome, SCHEMES, Splitting, distance, run};
 use crate::rules::{Composition, Midpoint};
+use crate::test_lagrangians::{Curved, InPlane, Inertia, OnLine, Tides};
 use crate::{InputError, SplittingScheme, Stepper};
-use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
+use contact_geom::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The time after which errors are measured.
@@ -54,7 +55,8 @@ fn gentle() -> impl Iterator<Item = &'static SplittingScheme> {
 
 #[test]
 fn linear_drag_has_the_schemes_order() -> Outcome {
-    let [pendulum, forced] = [OneCoordinate::from(Pendulum { gamma: -0.1 }), Duffing::forced().into()];
+    let [pendulum, forced] = [OnLine::from(Pendulum { gamma: -0.1 }), Duffing::forced().into()];
+    let (tides, inertia) = (OnLine::from(Tides), InPlane::from(Inertia));
     let (one, two) = (PhasePoint::new([1.0], [1.0], 0.2), PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2));
     assert_orders("pendulum", gentle(), by_midpoint(&pendulum, one)?, |scheme, h| {
         Ok(Splitting::new(&pendulum, scheme, h, 0.0, one)?.compensated())
@@ -62,17 +64,18 @@ fn linear_drag_has_the_schemes_order() -> Outcome {
     assert_orders("forced", gentle(), by_midpoint(&forced, one)?, |scheme, h| {
         Ok(Splitting::new(&forced, scheme, h, 0.0, one)?.compensated())
     })?;
-    assert_orders("tides", gentle(), by_midpoint(&Tides, one)?, |scheme, h| {
-        Ok(Splitting::new(&Tides, scheme, h, 0.0, one)?.compensated())
+    assert_orders("tides", gentle(), by_midpoint(&tides, one)?, |scheme, h| {
+        Ok(Splitting::new(&tides, scheme, h, 0.0, one)?.compensated())
     })?;
-    assert_orders("inertia", gentle(), by_midpoint(&Inertia, two)?, |scheme, h| {
-        Ok(Splitting::new(&Inertia, scheme, h, 0.0, two)?.compensated())
+    assert_orders("inertia", gentle(), by_midpoint(&inertia, two)?, |scheme, h| {
+        Ok(Splitting::new(&inertia, scheme, h, 0.0, two)?.compensated())
     })
 }
 
 #[test]
 fn all_orders_show_on_half_a_kepler_orbit() -> Outcome {
-    let (kepler, start) = (Kepler::<2> { mu: 1.0, gamma: -0.1 }, PhasePoint::new([0.7, 0.0], [0.0, 1.3], 0.1));
+    let kepler = InPlane::from(Kepler { mu: 1.0, gamma: -0.1 });
+    let start = PhasePoint::new([0.7, 0.0], [0.0, 1.3], 0.1);
     let high = SCHEMES.iter().filter(|s| s.order() >= 8);
     assert_orders("kepler", high, by_midpoint(&kepler, start)?, |scheme, h| {
         Ok(Splitting::new(&kepler, scheme, h, 0.0, start)?.compensated())
@@ -82,11 +85,12 @@ fn all_orders_show_on_half_a_kepler_orbit() -> Outcome {
 #[test]
 fn nonlinear_drag_has_the_schemes_order() -> Outcome {
     let compositions = || gentle().filter(|s| !s.is_nystrom());
-    let (quadratic, start) = (OneCoordinate::from(QuadraticInZ { c: 0.4 }), PhasePoint::new([1.0], [1.0], 0.5));
+    let [quadratic, curved] = [OnLine::from(QuadraticInZ { c: 0.4 }), Curved.into()];
+    let start = PhasePoint::new([1.0], [1.0], 0.5);
     assert_orders("quadratic", compositions(), by_midpoint(&quadratic, start)?, |scheme, h| {
         Ok(ActionSplitting::new(&quadratic, scheme, h, 0.0, start)?.compensated())
     })?;
-    assert_orders("curved", compositions(), by_midpoint(&Curved, start)?, |scheme, h| {
-        Ok(ActionSplitting::new(&Curved, scheme, h, 0.0, start)?.compensated())
+    assert_orders("curved", compositions(), by_midpoint(&curved, start)?, |scheme, h| {
+        Ok(ActionSplitting::new(&curved, scheme, h, 0.0, start)?.compensated())
     })
 }

@@ -1,18 +1,19 @@
 //! The steps of a splitting: conformal factors, round-off, and the bits of their results.
 
-use super::{ActionSplitting, Curved, Inertia, Outcome, SCHEMES, Splitting, Strang, Tides, run};
+use super::{ActionSplitting, Outcome, SCHEMES, Splitting, Strang, run};
 use crate::rules::{Composition, Flow, Midpoint};
+use crate::test_lagrangians::{Curved, Fall, Free, InPlane, Inertia, OnLine, Quartic, Tides};
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
-use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, LaneEmden};
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint};
 
 /// `sigma_d = e^(gamma h)`, and the number of evaluations is that of the stages.
 #[test]
 fn steps_are_what_they_say() -> Outcome {
     let (forced, start, h) = (Duffing::forced(), PhasePoint::new([1.0], [1.0], 0.2), 0.1);
+    let system = OnLine::from(forced);
     for scheme in &SCHEMES {
-        let mut motion = Splitting::new(&forced, scheme, h, 0.5, start)?;
+        let mut motion = Splitting::new(&system, scheme, h, 0.5, start)?;
         assert_eq!((motion.sigma(), motion.evaluations(), motion.state()), (1.0, 1, start));
         assert_eq!(motion.advance(10), Ok(()));
         assert_eq!(motion.sigma(), (forced.gamma * h).exp());
@@ -61,20 +62,21 @@ fn what_is_observed_changes_no_bit() -> Outcome {
         }
         Ok(())
     }
-    linear("forced", &Duffing::forced(), 0.05, PhasePoint::new([1.0], [1.0], 0.2))?;
-    linear("tides", &Tides, 0.05, PhasePoint::new([1.0], [1.0], 0.2))?;
-    linear("inertia", &Inertia, 0.05, PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2))?;
+    let [forced, tides, curved] = [OnLine::from(Duffing::forced()), Tides.into(), Curved.into()];
+    linear("forced", &forced, 0.05, PhasePoint::new([1.0], [1.0], 0.2))?;
+    linear("tides", &tides, 0.05, PhasePoint::new([1.0], [1.0], 0.2))?;
+    linear("inertia", &InPlane::from(Inertia), 0.05, PhasePoint::new([0.8, -0.5], [0.3, 0.6], 0.2))?;
     let start = PhasePoint::new([1.0], [1.0], 0.5);
     for scheme in SCHEMES.iter().filter(|s| !s.is_nystrom()) {
-        let motion = || ActionSplitting::new(&Curved, scheme, 0.05, 0.5, start);
+        let motion = || ActionSplitting::new(&curved, scheme, 0.05, 0.5, start);
         assert_same_bits(scheme.name(), motion)?;
         assert_same_bits(scheme.name(), || Ok(motion()?.compensated()))?;
     }
     let kahan_li = &SplittingScheme::KAHAN_LI_6;
-    assert_same_bits("composition", || Composition::new(|h| Midpoint::new(&Curved, h), kahan_li, 0.05, 0.5, start))?;
-    let midpoint = Midpoint::new(&Curved, 0.05)?;
+    assert_same_bits("composition", || Composition::new(|h| Midpoint::new(&curved, h), kahan_li, 0.05, 0.5, start))?;
+    let midpoint = Midpoint::new(&curved, 0.05)?;
     assert_same_bits("midpoint", || Flow::new(&midpoint, 0.5, start))?;
-    let strang = Strang::new(&Tides, 0.05, 0.5, &start)?;
+    let strang = Strang::new(&tides, 0.05, 0.5, &start)?;
     assert_same_bits("strang", || Flow::new(&strang, 0.5, start))?;
     Ok(())
 }
@@ -83,11 +85,11 @@ fn what_is_observed_changes_no_bit() -> Outcome {
 /// of Lane and Emden it is `(t/(t + h))^2`. The relative error of the quadrature is of the order of `(h/t)^13`.
 #[test]
 fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
-    let (system, h, t0) = (LaneEmden::default(), 0.05, 1.0);
+    let ([system, tides], h, t0) = ([OnLine::from(LaneEmden::default()), Tides.into()], 0.05, 1.0);
     let start = PhasePoint::new([0.8], [-0.2], 0.1);
     for scheme in &SCHEMES {
         let mut motion = Splitting::new(&system, scheme, h, t0, start)?;
-        let mut without_force = Splitting::new(&Tides, scheme, h, t0, PhasePoint::new([0.0], [0.0], 1.0))?;
+        let mut without_force = Splitting::new(&tides, scheme, h, t0, PhasePoint::new([0.0], [0.0], 1.0))?;
         let (mut factor, mut product) = (1.0, 1.0);
         for k in 0..20 {
             assert_eq!((motion.advance(1), without_force.advance(1)), (Ok(()), Ok(())));
@@ -108,18 +110,9 @@ fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
 /// motion.
 #[test]
 fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
-    // Without forces the momentum changes only by the conformal factor.
-    struct Free;
-    impl Lagrangian<1> for Free {
-        fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 - z * 0.3 + z * z * 0.2
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, separable: true, constant_mass: true, ..Structure::default() }
-        }
-    }
+    let free = OnLine::from(Free);
     for scheme in SCHEMES.iter().filter(|s| !s.is_nystrom()) {
-        let mut motion = ActionSplitting::new(&Free, scheme, 0.2, 0.0, PhasePoint::new([0.0], [1.0], 0.5))?;
+        let mut motion = ActionSplitting::new(&free, scheme, 0.2, 0.0, PhasePoint::new([0.0], [1.0], 0.5))?;
         let mut product = 1.0;
         for _ in 0..5 {
             assert_eq!(motion.advance(1), Ok(()));
@@ -135,22 +128,13 @@ fn the_rate_of_a_nonlinear_drag_is_the_product_of_its_factors() -> Outcome {
 /// thousand steps.
 #[test]
 fn compensated_sums_keep_the_floor() -> Outcome {
-    #[derive(Clone)]
-    struct Fall;
-    impl Lagrangian<1> for Fall {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-            v[0] * v[0] * 0.5 + q[0] * 0.3
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, separable: true, z_free: true, z_affine: true, ..Structure::default() }
-        }
-    }
+    let fall = OnLine::from(Fall);
     let (steps, h) = (100_000, 0.1);
     let t = steps as f64 * h;
     let exact = 1.0 + t * (0.5 + 0.15 * t);
-    let plain = Splitting::new(&Fall, &SplittingScheme::STRANG, h, 0.0, PhasePoint::new([1.0], [0.5], 0.3))?;
+    let plain = || Splitting::new(&fall, &SplittingScheme::STRANG, h, 0.0, PhasePoint::new([1.0], [0.5], 0.3));
     let error = |motion| (run::<1>(motion, steps).q[0] / exact - 1.0).abs();
-    let (compensated, plain) = (error(plain.clone().compensated()), error(plain));
+    let (compensated, plain) = (error(plain()?.compensated()), error(plain()?));
     assert!(compensated < 8.0 * f64::EPSILON, "{compensated:e}");
     assert!(plain > 30.0 * f64::EPSILON, "{plain:e}");
     Ok(())
@@ -159,17 +143,9 @@ fn compensated_sums_keep_the_floor() -> Outcome {
 /// An unbounded motion stops at its last finite state, also within a chunk of steps, and stays there.
 #[test]
 fn a_run_away_halts_at_its_last_finite_state() -> Outcome {
-    struct Hill;
-    impl Lagrangian<1> for Hill {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-            v[0] * v[0] * 0.5 + q[0].powi(4) - z * 0.1
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() }
-        }
-    }
+    let quartic = OnLine::from(Quartic);
     let mut motion =
-        Splitting::new(&Hill, &SplittingScheme::KAHAN_LI_6, 0.001, 0.0, PhasePoint::new([1.0], [0.0], 0.0))?;
+        Splitting::new(&quartic, &SplittingScheme::KAHAN_LI_6, 0.001, 0.0, PhasePoint::new([1.0], [0.0], 0.0))?;
     let cause = StepError::NonFinite;
     let failure = motion.advance(5000);
     let taken = failure.err().map_or(0, |failure| failure.taken);

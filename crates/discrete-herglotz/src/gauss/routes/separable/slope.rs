@@ -89,28 +89,15 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
 #[cfg(test)]
 mod tests {
     use crate::gauss::{GaussRoute, GaussStepper};
+    use crate::test_lagrangians::{Anharmonic, InPlane, OnLine};
     use crate::{Problem, Stepper, StepperOptions};
-    use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
-
-    /// `v.v/2 - x^4/4 + cos x - 0.001 z` with x the first coordinate; no force acts on the others.
-    #[derive(Clone, Copy)]
-    struct Anharmonic;
-
-    impl<const N: usize> Lagrangian<N> for Anharmonic {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-            v.iter().fold(q[0].cos() - q[0].powi(4) * 0.25 - z * 0.001, |l, v| l + *v * *v * 0.5)
-        }
-        fn structure(&self) -> Structure {
-            Structure { autonomous: true, separable: true, z_affine: true, constant_rate: true, ..Structure::default() }
-        }
-    }
+    use contact_geom::{Lagrangian, PhasePoint};
 
     /// The first coordinate after 100 units of time, the iterations per step, and the number of steps by Newton
     /// methods.
-    fn motion<const N: usize>(stages: usize, h: f64) -> (f64, f64, u64) {
+    fn motion<const N: usize>(anharmonic: &impl Lagrangian<N>, stages: usize, h: f64) -> (f64, f64, u64) {
         let start = PhasePoint::new(std::array::from_fn(|i| 1.2 * (i == 0) as u8 as f64), [0.0; N], 0.0);
-        let problem = Problem::new(&Anharmonic, 0.0, start).unwrap();
+        let problem = Problem::new(anharmonic, 0.0, start).unwrap();
         let mut run =
             GaussStepper::new(&problem, stages, h, StepperOptions { action: true, check_resolution: false }).unwrap();
         assert_eq!(run.route(), GaussRoute::Condensed);
@@ -125,9 +112,10 @@ mod tests {
     /// units of round-off after about a hundred oscillations.
     #[test]
     fn secants_spare_iterations_and_change_nothing() {
+        let (alone, accompanied) = (OnLine::from(Anharmonic), InPlane::from(Anharmonic));
         for (stages, h, part) in [(8, 0.25, 0.9), (8, 0.5, 0.85), (16, 0.5, 0.9), (16, 1.0, 0.9)] {
             let ((q, iterations, newton), (beside, more, more_newton)) =
-                (motion::<1>(stages, h), motion::<2>(stages, h));
+                (motion(&alone, stages, h), motion(&accompanied, stages, h));
             assert!((q - beside).abs() <= 500.0 * f64::EPSILON, "gauss_{stages}, h = {h}: {q:e}, {beside:e}");
             assert!(iterations <= part * more, "gauss_{stages}, h = {h}: {iterations}, {more} iterations");
             assert!(newton <= more_newton, "gauss_{stages}, h = {h}: {newton}, {more_newton} steps by Newton's method");
