@@ -1,11 +1,10 @@
 //! Critical paths between given ends: against the discrete Herglotz equations, the differential of the action, the flow
 //! and closed forms. (`scale --case path` compares them with Newton's method on a sparse factorisation.)
 
-mod conjugate_points;
-mod end_conditions;
+pub mod conjugate_points;
+pub mod end_conditions;
 mod equations;
-mod forces;
-mod lagrangians;
+pub mod forces;
 mod several_paths;
 
 use contact_geom::nalgebra::SVector;

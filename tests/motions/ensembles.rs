@@ -1,11 +1,12 @@
 //! Ensembles: each member is the same as a single run, for any number of threads and any neighbours.
 
 mod failures;
-mod lagrangians;
 mod resolution;
 mod rows;
 mod single_runs;
+pub mod systems;
 
+use crate::lagrangians::One;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{BatchKernel, EnsembleError, Member};
 use discrete_herglotz::rules::{MidpointRule, QuadratureMethod};
@@ -13,8 +14,8 @@ use discrete_herglotz::{
     CheckpointError, Ensemble, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Status,
     Stepper, StepperOptions, Steps, Until,
 };
-use lagrangians::{One, pendulum};
 use proptest::prelude::*;
+use systems::pendulum;
 
 fn unit(seed: usize) -> f64 {
     2.0 * ((seed as f64 + 0.5) * 0.618_033_988_749_894_9).fract() - 1.0

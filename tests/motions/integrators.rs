@@ -1,16 +1,15 @@
 //! Integrators: steppers, runs, dense output and events, over the catalogue of systems.
 
-mod accuracy;
+pub mod accuracy;
 mod conformal_steppers;
 mod dense_output;
-mod event_roots;
-mod events;
+pub mod event_roots;
+pub mod events;
 mod every_run;
-mod forces;
-mod gauss;
+pub mod forces;
+pub mod gauss;
 mod gauss_catalogue;
-mod gauss_stress;
-mod lagrangians;
+pub mod gauss_stress;
 mod round_off;
-mod runs;
+pub mod runs;
 mod transformed_time;

@@ -1,14 +1,13 @@
 //! Invalid input: not numbers, infinite, subnormal, huge, empty, wrong; at every public entry point, and by every
 //! variant of every error.
 
-mod discrete;
+pub mod discrete;
 mod entries;
 mod geometry;
-mod known_issues;
-mod numbers;
-mod one;
-mod refusals;
-mod sentences;
+pub mod known_issues;
+pub mod numbers;
+pub mod refusals;
+pub mod sentences;
 
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -16,8 +16,10 @@ mod common;
 
 mod boundary_paths;
 mod ensembles;
+mod forces;
 mod integrators;
 mod invalid_input;
+mod lagrangians;
 mod motions;
 mod paper;
 mod path_branches;

@@ -1,17 +1,16 @@
 //! Motions from the user's point of view: rows, events and progress, steps that are too long, many coordinates,
 //! round-off.
 
-mod accuracy;
-mod claims;
-mod coarse;
-mod lagrangians;
+pub mod accuracy;
+pub mod claims;
+pub mod coarse;
 mod many_coordinates;
 mod observed;
-mod resolution;
-mod rest;
-mod round_off;
-mod unresolved;
-mod velocity;
+pub mod resolution;
+pub mod rest;
+pub mod round_off;
+pub mod unresolved;
+pub mod velocity;
 
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, Steps, Until};

@@ -2,10 +2,11 @@
 //! and paths that do not fit in memory.
 
 use crate::common::lagrangians::Bratu;
+use crate::lagrangians::{One, Two, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
 use contact_geom::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, lagrangian_enum};
+use contact_geom::{Lagrangian, PhasePoint, Scalar};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,
     boundary::{BoundaryPath, CriticalPath, End},
@@ -16,26 +17,6 @@ use discrete_herglotz::{
     rules::Midpoint,
     solve::Solver,
 };
-
-lagrangian_enum! {
-    /// Lagrangians with one coordinate.
-    #[derive(Clone)]
-    pub enum One<1> {
-        HarmonicOscillator(HarmonicOscillator),
-        Pendulum(Pendulum),
-        QuadraticInZ(QuadraticInZ),
-        Bratu(Bratu),
-    }
-}
-
-lagrangian_enum! {
-    /// Lagrangians with two coordinates.
-    #[derive(Clone)]
-    pub enum Two<2> {
-        CoupledPlane(CoupledPlane),
-        Crossed(Crossed),
-    }
-}
 
 const EPS: f64 = f64::EPSILON;
 
@@ -96,7 +77,7 @@ const Z0: f64 = 0.4;
 
 /// `L = (v^2 - q^2 - 0.7 z^2)/2`, the momentum given at the start, the position at the end; by the span of time.
 fn mixed(span: f64) -> Result<BoundaryPath<Midpoint<One>, 1>, InputError> {
-    let ld = Midpoint::new(One::from(QuadraticInZ { c: 0.7 }), span / MIXED as f64)?;
+    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), span / MIXED as f64)?;
     BoundaryPath::new(ld, MIXED, [End::Momentum([P0].into()), at([1.0])])?.starting_at(0.0, Z0)
 }
 
@@ -104,7 +85,7 @@ fn mixed(span: f64) -> Result<BoundaryPath<Midpoint<One>, 1>, InputError> {
 /// where the motion is not defined up to the end.
 fn missed(span: f64, q0: f64) -> Option<f64> {
     let h = span / MIXED as f64;
-    let ld = Midpoint::new(One::from(QuadraticInZ { c: 0.7 }), h).ok()?;
+    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), h).ok()?;
     let mut x = PhasePoint { q: [q0].into(), p: [P0].into(), z: Z0 };
     let (mut v, mut solver) = (x.p, Solver::default());
     for k in 0..MIXED {
@@ -175,12 +156,12 @@ fn mixed_ends_have_a_fold() {
 /// leave 1e-6, 1e-12 and zero, and one more confirms it.
 #[test]
 fn corrections_converge_quadratically() {
-    fn run<const N: usize>(system: impl Lagrangian<N> + Clone, from: [f64; N], to: [f64; N], z0: f64) {
+    fn run<const N: usize>(system: impl Lagrangian<N> + Copy, from: [f64; N], to: [f64; N], z0: f64) {
         let steps = 50;
         let ld = Midpoint::new(system, 0.8 / steps as f64).unwrap();
         let momentum = End::Momentum(SVector::from_fn(|i, _| 0.2 + 0.1 * i as f64));
         for ends in [[at(from), at(to)], [momentum, at(to)], [at(from), momentum], [at(from), End::Free]] {
-            let problem = || BoundaryPath::new(ld.clone(), steps, ends).unwrap().starting_at(0.2, z0).unwrap();
+            let problem = || BoundaryPath::new(ld, steps, ends).unwrap().starting_at(0.2, z0).unwrap();
             let found = problem().search();
             assert_eq!(found.status, PathStatus::Found);
             let disturbed = found.points.iter().enumerate().map(|(k, q)| q.map(|c| c + 1e-3 * (0.1 * k as f64).cos()));
@@ -188,13 +169,13 @@ fn corrections_converge_quadratically() {
             assert!(again.is_found() && again.iterations <= 4, "{ends:?}: {} after {}", again.status, again.iterations);
         }
     }
-    run(One::from(QuadraticInZ { c: 0.7 }), [0.3], [-0.4], 0.8);
-    run(Two::from(CoupledPlane::default()), [0.1, 0.0], [0.3, 0.4], 0.4);
-    run(One::from(Pendulum::default()), [0.1], [0.6], 0.0);
+    run(one(QuadraticInZ { c: 0.7 }), [0.3], [-0.4], 0.8);
+    run(two(CoupledPlane::default()), [0.1, 0.0], [0.3, 0.4], 0.4);
+    run(one(Pendulum::default()), [0.1], [0.6], 0.0);
 }
 
 /// Two oscillators, with a mass matrix without a diagonal.
-#[derive(Clone)]
+#[derive(Clone, Copy, Debug)]
 pub struct Crossed;
 
 impl Lagrangian<2> for Crossed {
@@ -211,10 +192,10 @@ fn a_mass_without_a_diagonal() {
     let found = BoundaryPath::new(ld, steps, [at([0.3, -0.2]), at([1.0, 0.4])]).unwrap().search();
     assert_eq!(found.status, PathStatus::Found, "{}", found.status);
     // Both coordinates are oscillators, with the angle `2 atan(h/2)` of the rule: each agrees with a single oscillator.
-    let one = Midpoint::new(One::from(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
+    let one = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
     for i in 0..2 {
         let ends = [at([[0.3, -0.2][i]]), at([[1.0, 0.4][i]])];
-        let alone = BoundaryPath::new(one.clone(), steps, ends).unwrap().search();
+        let alone = BoundaryPath::new(one, steps, ends).unwrap().search();
         for (a, b) in alone.points.iter().zip(&found.points) {
             // An error of eps q/h in each equation, through an inverse of about a quarter of the span for each step.
             assert!((a[0] - b[i]).abs() <= 4.0 * EPS * (steps * steps) as f64 / 4.0, "{:e}", a[0] - b[i]);
@@ -225,17 +206,15 @@ fn a_mass_without_a_diagonal() {
 /// A path that does not fit in memory is refused before it is computed, and the parameters of branches are checked.
 #[test]
 fn bad_input_is_refused() {
-    let ld = Midpoint::new(One::from(Pendulum::default()), 0.1).unwrap();
+    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
     let ends = [at([0.0]), at([1.0])];
     for steps in [1_000_000_000_000, usize::MAX / 2, usize::MAX] {
-        for refused in
-            [BoundaryPath::new(ld.clone(), steps, ends), BoundaryPath::periodic(ld.clone(), steps, [0.0].into())]
-        {
+        for refused in [BoundaryPath::new(ld, steps, ends), BoundaryPath::periodic(ld, steps, [0.0].into())] {
             let Err(InputError::TooMany { found, most, .. }) = refused else { panic!("{steps} steps are taken") };
             assert!(found == steps as f64 && most < found && most > 1e4, "{most}");
         }
     }
-    assert!(BoundaryPath::new(ld.clone(), 1_000_000, ends).is_ok());
+    assert!(BoundaryPath::new(ld, 1_000_000, ends).is_ok());
     let none = |range, step, most| branch(bratu, range, step, most).unwrap_err();
     assert!(matches!(none([f64::NAN, 4.0], 0.1, 10), InputError::Geometry(_)));
     assert!(matches!(none([3.0, 3.0], 0.1, 10), InputError::Span { .. }));
@@ -244,7 +223,7 @@ fn bad_input_is_refused() {
     }
     assert!(matches!(none([3.0, 4.0], 0.1, 1), InputError::Count { least: 2, found: 1, .. }));
     // The number of steps may not change along a branch.
-    let changing = |n: f64| BoundaryPath::new(ld.clone(), n as usize, ends);
+    let changing = |n: f64| BoundaryPath::new(ld, n as usize, ends);
     assert!(matches!(branch(changing, [10.0, 20.0], 1.0, 10), Err(InputError::PathLength { expected: 10, .. })));
     // Where the first path does not exist, the branch consists of it alone, with its status.
     let paths = branch(bratu, [4.0, 3.0], 0.1, 10).unwrap();

@@ -1,11 +1,10 @@
 //! Motions that are interrupted: impacts, resets, and named times of kinks and jumps.
 
-mod breaks;
-mod campaign;
+pub mod breaks;
+pub mod campaign;
 mod contact;
-mod impacts;
-mod lagrangians;
-mod runs;
+pub mod impacts;
+pub mod runs;
 
 use contact_geom::switching::Surface;
 use contact_geom::{Scalar, nalgebra::SVector};

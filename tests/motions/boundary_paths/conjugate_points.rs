@@ -1,7 +1,7 @@
 //! Conjugate points along a path and at its ends, and paths that are flagged as unresolved.
 
-use super::lagrangians::{Two, one};
 use super::{EPS, at, size};
+use crate::lagrangians::{Two, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler};
@@ -49,7 +49,7 @@ fn conjugate_points_inside_do_no_harm() {
 }
 
 /// Two uncoupled oscillators.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Uncoupled {
     stiffness: [f64; 2],
 }

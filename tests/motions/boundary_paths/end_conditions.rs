@@ -1,10 +1,11 @@
 //! Momenta and free ends, periodic paths, and invalid problems.
 
-use super::lagrangians::{One, Two, one};
 use super::{EPS, at, by, check, largest_of};
+use crate::lagrangians::{One, SwitchingOne, Two, one};
+use crate::resets::Floor;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
-use contact_geom::switching::{Impact, Impacts, Surface};
+use contact_geom::switching::{Impact, Impacts};
 use contact_geom::systems::{Duffing, FreeParticle, Pendulum, QuadraticInZ, Relativistic, UniformField};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
@@ -93,7 +94,7 @@ pub fn closes<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, z0: f64, found: 
 }
 
 /// A pendulum with a torque and an oscillator, forced with the period 3, with a drag that depends on the action.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Driven;
 
 impl Lagrangian<2> for Driven {
@@ -126,14 +127,8 @@ fn undefined_paths_are_a_status() {
 /// A path knows no impacts: it passes through the surface, here below the ground.
 #[test]
 fn paths_pass_through_surfaces() {
-    struct Ground;
-    impl Surface<1> for Ground {
-        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
-            q[0]
-        }
-    }
     let field = UniformField::<1> { field: [1.0], gamma: -0.1 };
-    let ball = Impacts::new(field, Ground, Impact::Elastic);
+    let ball = SwitchingOne::from(Impacts::new(field, Floor, Impact::Elastic));
     let ends = [at([0.1]), at([0.1])];
     let found = BoundaryPath::new(Midpoint::new(ball, 0.1).unwrap(), 20, ends).unwrap().search();
     let free = BoundaryPath::new(&Midpoint::new(One::from(field), 0.1).unwrap(), 20, ends).unwrap().search();

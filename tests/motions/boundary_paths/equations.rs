@@ -1,7 +1,7 @@
 //! Paths satisfy the discrete Herglotz equations, with the order of their method.
 
-use super::lagrangians::{one, two};
 use super::{EPS, at, by, check, largest_of};
+use crate::lagrangians::{one, two};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};

@@ -1,10 +1,11 @@
 //! Paths with forces: they are the runs of the same rule, Newton's method converges quadratically, and closed forms.
 
 use super::end_conditions::closes;
-use super::lagrangians::{forced_one, forced_two, one, two};
 use super::{EPS, at, by, check, largest_of};
 use crate::common::forces::{Drag, Fall, G, Swirl};
 use crate::common::slope;
+use crate::forces::{forced_one, forced_two};
+use crate::lagrangians::{one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan};
 use contact_geom::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ, UniformField};
@@ -31,7 +32,7 @@ impl Rule for Simpson {
 }
 
 /// The drag `-c |v| v`, coordinate by coordinate.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Quadratic(f64);
 
 impl<const N: usize> Force<N> for Quadratic {
@@ -40,19 +41,19 @@ impl<const N: usize> Force<N> for Quadratic {
     }
 }
 
-/// A force on a plane whose derivatives in q, v and z are full matrices and vectors, with a period of 3 in t.
-#[derive(Clone, Copy)]
+/// A force on the first and the last coordinate, which in a plane has full matrices and vectors as its derivatives in
+/// q, v and z, with a period of 3 in t.
+#[derive(Clone, Copy, Debug)]
 pub struct Mixing;
 
-impl Force<2> for Mixing {
-    fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<2, T>) -> SVector<T, 2> {
-        let ([a, b], [u, w]) = ([x.q[0], x.q[1]], [x.v[0], x.v[1]]);
+impl<const N: usize> Force<N> for Mixing {
+    fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        let ([a, b], [u, w]) = ([x.q[0], x.q[N - 1]], [x.v[0], x.v[N - 1]]);
         let drive = (t * (2.0 * PI / 3.0)).sin();
-        [
-            (b * 1.3).sin() * 0.4 - u * w * 0.2 - u * u.abs() * (b * b + 1.0) * 0.1 + drive * 0.2,
-            (a * b) * 0.5 - a * 0.3 + u * 0.15 - w * (a * a + 0.4) * 0.3 + (x.z * 0.5).cos() * w * 0.1,
-        ]
-        .into()
+        let mut force = SVector::zeros();
+        force[0] = (b * 1.3).sin() * 0.4 - u * w * 0.2 - u * u.abs() * (b * b + 1.0) * 0.1 + drive * 0.2;
+        force[N - 1] = (a * b) * 0.5 - a * 0.3 + u * 0.15 - w * (a * a + 0.4) * 0.3 + (x.z * 0.5).cos() * w * 0.1;
+        force
     }
 }
 
@@ -171,7 +172,7 @@ fn periodic_paths_with_forces() {
 }
 
 /// Two balls in wells with a spring, one driven with the period 3.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Rolling;
 
 impl Lagrangian<2> for Rolling {
@@ -192,7 +193,7 @@ fn a_fall_with_quadratic_drag() {
     for method in [Method::Rectangle, Method::Midpoint, Method::Trapezoidal] {
         let errors = [32usize, 64, 128, 256].map(|steps| {
             let h = span / steps as f64;
-            let ld = by(method, forced.clone(), h);
+            let ld = by(method, forced, h);
             let found = BoundaryPath::new(&ld, steps, [at([0.0]), at([exact(span)])]).unwrap().search();
             check(&ld, (0.0, 0.0), &found, 1.0);
             let error = max_abs_or_nan(found.points.iter().enumerate().map(|(k, q)| q[0] - exact(k as f64 * h)));
@@ -251,25 +252,24 @@ fn conjugate_points_with_drag() {
 fn a_branch_along_the_drag() {
     let ends = [at([0.0]), at([1.2])];
     let pendulum = one(Pendulum { gamma: -0.1 });
-    let problem =
-        |c: f64| BoundaryPath::new(Midpoint::new(forced_one(pendulum.clone(), Quadratic(c)), 0.05)?, 40, ends);
+    let problem = |c: f64| BoundaryPath::new(Midpoint::new(forced_one(pendulum, Quadratic(c)), 0.05)?, 40, ends);
     let paths = branch(problem, [0.0, 1.0], 0.2, 50).unwrap();
     let (last, found) = (&paths[paths.len() - 1], problem(1.0).unwrap().search());
     assert!(last.0 == 1.0 && last.1.is_found() && found.is_found(), "{}", last.0);
     // Two searches for one path, each to the rounding of the positions in 40 steps.
     let off = largest_of(&found.points.iter().zip(&last.1.points).map(|(a, b)| a - b).collect::<Vec<_>>());
     assert!(off <= 16.0 * EPS * 40.0 * 1.2, "{off:e}");
-    let free = BoundaryPath::new(&Midpoint::new(pendulum.clone(), 0.05).unwrap(), 40, ends).unwrap().search();
+    let free = BoundaryPath::new(&Midpoint::new(pendulum, 0.05).unwrap(), 40, ends).unwrap().search();
     assert!((0..=40).all(|k| (free.points[k] - paths[0].1.points[k]).max_abs_or_nan() <= 16.0 * EPS * 40.0 * 1.2));
 }
 
 /// `ln(q - 1/2)`, which is not defined for q below 1/2.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Wall;
 
-impl Force<1> for Wall {
-    fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> SVector<T, 1> {
-        [(x.q[0] - 0.5).ln()].into()
+impl<const N: usize> Force<N> for Wall {
+    fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        x.q.map(|q| (q - 0.5).ln())
     }
 }
 

@@ -1,8 +1,8 @@
 //! Several paths between the same ends: by deflation, by continuation, and from a given initial path.
 
-use super::lagrangians::{One, one, two};
 use super::{EPS, at, check, size};
 use crate::common::lagrangians::Bratu;
+use crate::lagrangians::{One, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
 use contact_geom::systems::{DoublePendulum, Pendulum};

@@ -1,7 +1,8 @@
 //! Members that fail, a start that panics, and invalid input.
 
-use super::lagrangians::{Bowl, One, pendulum};
+use super::systems::{Bowl, pendulum};
 use super::{By, gauss, pendulum_start, splitting};
+use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
 use discrete_herglotz::rules::QuadratureMethod;

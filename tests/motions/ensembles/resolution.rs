@@ -1,7 +1,8 @@
 //! Steps that do not resolve the motion of a member, and steps for an accuracy.
 
-use super::lagrangians::{One, Spring, pendulum};
+use super::systems::{Spring, pendulum};
 use super::{By, gauss, members, pendulum_start, splitting};
+use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::UnresolvedStep;
 use discrete_herglotz::ensemble::{EnsembleError, Member};

@@ -1,7 +1,8 @@
 //! Rows of members, and observers of members.
 
-use super::lagrangians::{Bowl, One, pendulum};
+use super::systems::{Bowl, pendulum};
 use super::{By, integrators, members, pendulum_start};
+use crate::lagrangians::{One, one};
 use contact_geom::VelocityPoint;
 use contact_geom::systems::HarmonicOscillator;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
@@ -15,7 +16,7 @@ fn rows_are_those_of_single_runs() {
         for (steps, stride) in [(10, 3), (12, 4), (5, 9), (3, 1)] {
             // To the last bit where no sine is evaluated; up to rounding by collocation, and on the pendulum.
             let exact = matches!(by, By::Splitting(_) | By::Rule(_));
-            let oscillator = One::from(HarmonicOscillator { gamma: -0.1 });
+            let oscillator = one(HarmonicOscillator { gamma: -0.1 });
             for without in [false, true] {
                 let problem = Problem::new(&oscillator, 0.5, pendulum_start(0)).unwrap();
                 let ensemble = problem.ensemble(60, pendulum_start).by(by).steps(Steps::Count(steps));

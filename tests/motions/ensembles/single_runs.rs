@@ -1,9 +1,10 @@
 //! Members of an ensemble are the same as single runs.
 
-use super::lagrangians::{Branching, HenonHeiles, One, Two, pendulum};
+use super::systems::{Branching, HenonHeiles, kepler, pendulum};
 use super::{numbers, pendulum_start, unit};
+use crate::lagrangians::{One, one};
 use contact_geom::numbers::MaxOrNan;
-use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler};
+use contact_geom::systems::{Duffing, HarmonicOscillator};
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{Ending, Member};
 use discrete_herglotz::{
@@ -55,8 +56,8 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
 
 #[test]
 fn by_splittings_members_are_single_runs_to_the_last_bit() {
-    let [oscillator, pendulum] = [HarmonicOscillator { gamma: -0.1 }.into(), pendulum(-0.01)];
-    let [kepler, henon_heiles] = [Two::from(Kepler::default()), HenonHeiles.into()];
+    let [oscillator, pendulum] = [one(HarmonicOscillator { gamma: -0.1 }), pendulum(-0.01)];
+    let [kepler, henon_heiles] = [kepler(), HenonHeiles.into()];
     for scheme in SplittingScheme::ALL {
         let (by, name) = (scheme, scheme.name());
         // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not
@@ -76,14 +77,14 @@ fn by_splittings_members_are_single_runs_to_the_last_bit() {
 fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
     let by = SplittingScheme::BLANES_MOAN_4;
     // The sine of the forcing is the one of the lanes.
-    let apart = distance(&One::from(Duffing::forced()), pendulum_start, by, 50);
+    let apart = distance(&one(Duffing::forced()), pendulum_start, by, 50);
     assert!(apart <= 64.0 * f64::EPSILON, "{apart:e}");
 }
 
 #[test]
 fn by_collocation_members_are_single_runs_but_for_rounding() {
-    let [oscillator, pendulum] = [HarmonicOscillator { gamma: -0.1 }.into(), pendulum(-0.01)];
-    let [kepler, henon_heiles] = [Two::from(Kepler::default()), HenonHeiles.into()];
+    let [oscillator, pendulum] = [one(HarmonicOscillator { gamma: -0.1 }), pendulum(-0.01)];
+    let [kepler, henon_heiles] = [kepler(), HenonHeiles.into()];
     for stages in 1..=16 {
         let by = GaussCollocation { stages };
         let systems = [
@@ -121,7 +122,7 @@ fn a_formula_that_branches_is_run_one_by_one() {
 fn steps_that_do_not_converge_are_those_of_a_single_run() {
     // A step for which the fixed-point iteration fails: a single run solves it by Newton's method, or reports why it
     // cannot.
-    let stiff = One::from(HarmonicOscillator { gamma: -0.1 });
+    let stiff = one(HarmonicOscillator { gamma: -0.1 });
     let by = GaussCollocation { stages: 4 };
     let ensemble = Ensemble::new(&stiff, 0.0, 10, pendulum_start).by(by).steps(Steps::Size(30.0)).threads(1);
     let mut all = Vec::new();

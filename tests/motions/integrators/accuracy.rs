@@ -1,7 +1,7 @@
 //! Runs with a requested accuracy: the error is at most the requested one, or the run is refused with the cause; and
 //! false declarations of structure, which are found along the motion.
 
-use crate::integrators::lagrangians::One;
+use crate::lagrangians::One;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{
@@ -29,7 +29,7 @@ enum Kind {
 }
 
 /// `v^2/2 - k q^2/2 - quartic q^4/4 + gamma z - c z^2 + q (force sin(omega t) + kick e^(-((t - at)/width)^2))`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Bench {
     gamma: f64,
     c: f64,

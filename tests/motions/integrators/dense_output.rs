@@ -3,7 +3,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::integrators::gauss::cut;
-use crate::integrators::lagrangians::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{
     ChartVector, Lagrangian, PhasePoint, VelocityPoint, legendre,

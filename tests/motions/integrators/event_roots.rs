@@ -1,6 +1,6 @@
 //! All sign changes of an event function within one step, and a status where they cannot be told apart.
 
-use crate::integrators::lagrangians::{One, one};
+use crate::lagrangians::{One, SwitchingOne, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, OneCoordinate};
 use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -10,6 +10,7 @@ use discrete_herglotz::{
 use std::f64::consts::PI;
 
 /// `v^2/2 + (6t + 12) x`: the motion from `x = -120` with `v = 92` at t = -8 is `(t + 6)(t + 2)(t - 2)`.
+#[derive(Clone, Copy, Debug)]
 pub struct Cubic;
 
 impl Lagrangian<1> for Cubic {
@@ -202,7 +203,8 @@ fn a_function_that_is_too_fast_is_a_status() {
 }
 
 /// A throw upward in a field of one, with a further force of 100 downward above x = 0.4999, just below the vertex.
-struct Ceiling;
+#[derive(Clone, Copy, Debug)]
+pub struct Ceiling;
 
 const CEILING: f64 = 0.4999;
 
@@ -225,8 +227,9 @@ fn a_kink_beyond_which_the_motion_is_for_a_short_time() {
     let above = 2.0 * speed / 101.0;
     let after = 2.0 - (1.0 - speed) - above;
     let expected = CEILING - speed * after - 0.5 * after * after;
+    let ceiling = SwitchingOne::from(Ceiling);
     for stages in [1, 2, 4, 8, 16] {
-        let problem = Problem::new(&Ceiling, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
+        let problem = Problem::new(&ceiling, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
         let outcome = run.run(Until::Time(2.0)).unwrap();
         assert!((outcome.q[0] - expected).abs() <= 1e-12, "{stages} stages: {}, not {expected}", outcome.q[0]);

@@ -1,6 +1,6 @@
 //! Events of consecutive runs: each change of sign is counted once, in exactly one of the runs.
 
-use crate::integrators::lagrangians::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 /// An oscillation of frequency one about a place.
+#[derive(Clone, Copy, Debug)]
 pub struct About(f64);
 
 impl Lagrangian<1> for About {
@@ -23,6 +24,7 @@ impl Lagrangian<1> for About {
 }
 
 /// A damped oscillation under a force that depends on time.
+#[derive(Clone, Copy, Debug)]
 pub struct Driven {
     force: f64,
     frequency: f64,
@@ -179,6 +181,7 @@ fn all_events_of_an_instant_are_reported() {
 }
 
 /// A fall towards the end of the potential: `v^2/2 - x^(5/2)` for x >= 0.
+#[derive(Clone, Copy, Debug)]
 pub struct EndsAtZero;
 
 impl Lagrangian<1> for EndsAtZero {
@@ -188,6 +191,7 @@ impl Lagrangian<1> for EndsAtZero {
 }
 
 /// `v^2/2 + 1/x`: an attractive centre, beyond which the motion is not defined.
+#[derive(Clone, Copy, Debug)]
 pub struct Well;
 
 impl Lagrangian<1> for Well {

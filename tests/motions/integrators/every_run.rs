@@ -1,6 +1,6 @@
 //! All features of a run, by integrators without a name in the table: the exact flow, and a user's discrete Lagrangian.
 
-use crate::integrators::lagrangians::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{

@@ -3,10 +3,11 @@
 mod rules;
 pub mod splittings;
 
-use crate::common::forces::{Drag, DragInLagrangian, Fall, G};
+use crate::common::forces::{AnyForce, Drag, DragInLagrangian, Fall, G, Swirl, Undeclared};
 use crate::common::oracle::motion;
 use crate::common::{relative_distance, slope};
-use crate::integrators::lagrangians::{Applied, One, one, two};
+use crate::forces::Applied;
+use crate::lagrangians::{One, one, two};
 use contact_geom::systems::{CoupledPlane, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Forced, Lagrangian, PhasePoint, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan};
 use discrete_herglotz::gauss::{GaussRoute, GaussStepper, VirtualWork};
@@ -67,7 +68,7 @@ fn a_fall_with_quadratic_drag() {
 fn orders_are_twice_the_stages() {
     fn of<const N: usize, S: System<N>>(system: &S, lagrangian: impl Lagrangian<N>, finest: [[usize; 4]; 3]) {
         let (t, x) = (system.initial_time(), system.initial());
-        let forced = Forced { lagrangian, force: Applied::Any };
+        let forced = Forced { lagrangian, force: Applied::from(AnyForce) };
         let (truth, route) = gauss(&forced, t, x, 16, 1.0 / 32.0, 32);
         assert!(matches!(route, GaussRoute::General | GaussRoute::ConstantMass), "{} {route:?}", system.name());
         let oracle = legendre(&forced, t + 1.0, &motion(&forced, t, &x, 1.0));
@@ -107,8 +108,8 @@ fn a_force_of_positions_takes_the_condensed_route() {
     fn of<const N: usize, L: Lagrangian<N>>(system: &impl System<N>, lagrangian: fn() -> L, s: usize, h: f64) {
         let x = system.initial();
         let forced = |force| Forced { lagrangian: lagrangian(), force };
-        let condensed = gauss(&forced(Applied::Swirl), 0.0, x, s, h, 100);
-        let general = gauss(&forced(Applied::UndeclaredSwirl), 0.0, x, s, h, 100);
+        let condensed = gauss(&forced(Applied::from(Swirl)), 0.0, x, s, h, 100);
+        let general = gauss(&forced(Applied::from(Undeclared(Swirl))), 0.0, x, s, h, 100);
         assert_eq!((condensed.1, general.1), (GaussRoute::Condensed, GaussRoute::ConstantMass), "{}", system.name());
         let off = relative_distance(condensed.0, general.0) / f64::EPSILON;
         assert!(off <= 30.0, "{} s = {s}: {off} eps", system.name());
@@ -124,8 +125,8 @@ fn a_force_of_positions_takes_the_condensed_route() {
 fn long_steps_by_newtons_method() {
     let forced = |force| Forced { lagrangian: one(Pendulum { gamma: -0.1 }), force };
     let x = VelocityPoint::new([2.0], [1.0], 0.0);
-    let condensed = gauss(&forced(Applied::Swirl), 0.0, x, 4, 5.0, 3).0;
-    let general = gauss(&forced(Applied::UndeclaredSwirl), 0.0, x, 4, 5.0, 3).0;
+    let condensed = gauss(&forced(Applied::from(Swirl)), 0.0, x, 4, 5.0, 3).0;
+    let general = gauss(&forced(Applied::from(Undeclared(Swirl))), 0.0, x, 4, 5.0, 3).0;
     let off = relative_distance(condensed, general);
     assert!(off <= 1e-12, "{off:e}");
 }

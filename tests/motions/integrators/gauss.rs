@@ -4,7 +4,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::common::{relative_distance, slope};
-use crate::integrators::lagrangians::{One, Two, one};
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
@@ -51,6 +51,7 @@ fn run<const N: usize, S: Lagrangian<N>>(
 
 /// A relativistic particle of mass and speed of light 1 in a field that grows with time: its momentum is a polynomial,
 /// and its velocity is not.
+#[derive(Clone, Copy, Debug)]
 pub struct InField {
     growth: f64,
 }
@@ -357,6 +358,7 @@ fn bad_input_is_refused() {
 }
 
 /// A well that ends at q0 = 2 in one coordinate, uncoupled from the other.
+#[derive(Clone, Copy, Debug)]
 pub struct Ends;
 
 impl Lagrangian<2> for Ends {

@@ -3,7 +3,7 @@
 
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
-use crate::integrators::lagrangians::{One, Two, one};
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{
@@ -57,6 +57,7 @@ fn stiff_chains_are_solved_by_fixed_point_iterations() {
 
 /// Two particles, where one direction is heavy and has a force, and the other is lighter by a factor of up to 1e14 and
 /// free.
+#[derive(Clone, Copy, Debug)]
 pub struct IllConditioned(f64);
 
 impl IllConditioned {
@@ -106,6 +107,7 @@ fn ill_conditioned_w_is_accepted() {
 }
 
 /// Two oscillators with masses of 1 and 1e-14.
+#[derive(Clone, Copy, Debug)]
 pub struct Masses;
 
 impl Lagrangian<2> for Masses {

@@ -1,29 +1,11 @@
 //! Growth of round-off in long runs of Gauss collocation: Brouwer's law for every route.
 
 use crate::common::gauss::GaussSteppers;
-use crate::integrators::lagrangians::One;
-use contact_geom::nalgebra::SVector;
+use crate::common::lagrangians::WithGradientAndStructure;
+use crate::lagrangians::One;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{Stepper, gauss::Gauss};
-
-/// A Lagrangian with another structure than it declares itself, and with its closed gradient, whose rounding is part of
-/// the test.
-pub struct WithStructure<L>(L, Structure);
-
-impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for WithStructure<L> {
-    #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        self.0.value(t, q, v, z)
-    }
-    #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
-        self.0.closed_gradient(t, x)
-    }
-    fn structure(&self) -> Structure {
-        self.1
-    }
-}
 
 /// The number of starts, which differ in their last digits, and of steps from each.
 const STARTS: usize = 16;
@@ -76,7 +58,7 @@ fn the_energy_does_not_drift() {
         let pendulum = OneCoordinate::from(Pendulum { gamma });
         let energy = move |x: &PhasePoint<1>| 0.5 * x.p[0] * x.p[0] + 2.0 * (0.5 * x.q[0]).sin().powi(2);
         for (structure, s, h) in [(pendulum.structure(), 12, 1.2), (constant, 12, 1.2)] {
-            let lagrangian = One::from(WithStructure(pendulum, structure));
+            let lagrangian = One::from(WithGradientAndStructure(pendulum, structure));
             let gauss: &'static _ = Box::leak(Box::new(Gauss::new(lagrangian, s, h).unwrap()));
             let start = VelocityPoint::new([1.0], [1.0], 0.0);
             let make = |x: VelocityPoint<1>| gauss.stepper(0.0, legendre(&pendulum, 0.0, &x), x.v).unwrap();

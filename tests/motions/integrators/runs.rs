@@ -2,7 +2,7 @@
 
 use crate::common::lagrangians::WithStructure;
 use crate::common::oracle::motion;
-use crate::integrators::lagrangians::{One, one, two};
+use crate::lagrangians::{One, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
@@ -299,6 +299,7 @@ fn a_run_to_its_start_is_the_start() {
 }
 
 /// `-cos(v) - x/10`: many velocities have the momentum sin(v). From v = 4 the motion has pi/2 < v < 3 pi/2.
+#[derive(Clone, Copy, Debug)]
 pub struct ManyVelocities;
 
 impl Lagrangian<1> for ManyVelocities {

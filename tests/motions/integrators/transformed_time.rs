@@ -1,7 +1,7 @@
 //! Contact Gauss collocation in transformed time.
 
 use crate::common::gauss::GaussSteppers;
-use crate::integrators::lagrangians::{one, two};
+use crate::lagrangians::{one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
 use contact_geom::{

@@ -1,7 +1,7 @@
 //! The limits that `KNOWN_ISSUES.md` lists, each asserted; a limit that no longer holds is removed from both.
 
 use crate::common::gauss::GaussSteppers;
-use crate::invalid_input::one::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};

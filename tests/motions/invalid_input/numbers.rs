@@ -1,5 +1,6 @@
 //! Invalid and extreme numbers, and the report on what functions return for them.
 
+use crate::lagrangians::One;
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{ChartVector, DiscretePoint, Dual, PhasePoint, Scalar, Structure, VelocityPoint};
@@ -220,6 +221,8 @@ impl<A: Numbers, B: Numbers, C: Numbers> Numbers for (A, B, C) {
 #[derive(Clone, Copy, Debug)]
 pub struct Everything;
 
+pub const EVERYTHING: One = One::Everything(Everything);
+
 impl Lagrangian<1> for Everything {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
@@ -232,6 +235,8 @@ impl Lagrangian<1> for Everything {
 /// A pendulum that declares its structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Claiming;
+
+pub const CLAIMING: One = One::Claiming(Claiming);
 
 impl Lagrangian<1> for Claiming {
     #[inline(always)]

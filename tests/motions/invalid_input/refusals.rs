@@ -1,8 +1,8 @@
 //! Invalid input is a typed error before the first step; a failure later is a status that keeps what was computed.
 
 use crate::common::lagrangians::{Bratu, Massless};
-use crate::invalid_input::one::{One, one};
 use crate::invalid_input::sentences::input::Odd;
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};

@@ -37,7 +37,7 @@ pub mod input;
 pub mod steps;
 
 use crate::common::lagrangians::{Bratu, Massless};
-use crate::invalid_input::one::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::support::linear;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator};

@@ -1,6 +1,6 @@
 //! The choice of steps for a requested accuracy: motions that are refused, and motions that come to rest.
 
-use super::lagrangians::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, SelectionFailure, Status, Until};
@@ -17,12 +17,14 @@ fn run_to<L: Lagrangian<N>, const N: usize>(
 }
 
 /// `v^2/2 - V(q) + gamma (1 + swing cos t) z`.
+#[derive(Clone, Copy, Debug)]
 pub struct Line {
     gamma: f64,
     swing: f64,
     potential: Potential,
 }
 
+#[derive(Clone, Copy, Debug)]
 enum Potential {
     /// A jump so narrow that no gradient is evaluated in it.
     Jump { at: f64, height: f64 },

@@ -1,7 +1,7 @@
 //! Declared structure that holds at the start of a motion, and not along it.
 
-use super::lagrangians::One;
 use crate::common::draws::Draws;
+use crate::lagrangians::One;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Status, Steps, Until};

@@ -1,8 +1,8 @@
 //! Steps that are far too long are flagged as unresolved or refused, by every integrator; and properties that must not
 //! affect this.
 
-use super::lagrangians::{One, Two, one};
 use crate::common::gauss::GaussSteppers;
+use crate::lagrangians::{One, Two, one};
 use crate::motions::run_of;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
@@ -54,6 +54,7 @@ fn coarse_steps_of_a_pendulum_are_flagged() {
 }
 
 /// `-v^2/6 + 2 q^4`, a force that grows without bound: long steps are solved by Newton's method, or have no solution.
+#[derive(Clone, Copy, Debug)]
 pub struct Runaway;
 
 impl Lagrangian<1> for Runaway {
@@ -105,6 +106,7 @@ fn a_guess_of_the_velocity_may_be_of_any_size() {
 }
 
 /// `v^2/2 - q^2/2 - slope |q - at|`, whose force jumps.
+#[derive(Clone, Copy, Debug)]
 pub struct Kinked {
     at: f64,
     slope: f64,
@@ -198,6 +200,7 @@ fn a_suspect_interval_is_not_flagged() {
 }
 
 /// A pendulum by `sin(q + pi/2)`, whose forces near the origin have the rounding of numbers near pi/2.
+#[derive(Clone, Copy, Debug)]
 pub struct Shifted;
 
 impl Lagrangian<1> for Shifted {
@@ -280,6 +283,7 @@ fn tiny_steps_lose_nothing() {
 }
 
 /// Two coordinates, the first with a mass that grows with z from a negative value: the motion ends where it vanishes.
+#[derive(Clone, Copy, Debug)]
 pub struct Massless;
 
 impl Lagrangian<2> for Massless {

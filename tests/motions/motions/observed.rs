@@ -1,6 +1,6 @@
 //! Output of runs by every integrator: rows at times, events, runs backward, stopped and resumed runs.
 
-use super::lagrangians::{one, two};
+use crate::lagrangians::{one, two};
 use crate::motions::run_of;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, UniformField};
 use contact_geom::{

@@ -1,6 +1,6 @@
 //! Steps that do not resolve their motion are flagged; steps that resolve it are not.
 
-use super::lagrangians::{One, Two, one, two};
+use crate::lagrangians::{One, Two, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
@@ -18,6 +18,7 @@ fn is_reported<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> boo
 }
 
 /// `z' = v^2/2 + z^2` has a pole before t = 1, and the velocity with it.
+#[derive(Clone, Copy, Debug)]
 pub struct Pole;
 
 impl Lagrangian<1> for Pole {
@@ -149,6 +150,7 @@ fn assert_rules_resolve<L: Lagrangian<N>, const N: usize>(
 }
 
 /// A smooth pulse of force, on a particle at rest.
+#[derive(Clone, Copy, Debug)]
 pub struct Pulse;
 
 impl Lagrangian<1> for Pulse {
@@ -216,6 +218,7 @@ fn the_unresolved_step_is_that_of_its_number() -> Outcome {
 }
 
 /// Linear in the velocity: W is zero.
+#[derive(Clone, Copy, Debug)]
 pub struct Linear;
 
 impl Lagrangian<1> for Linear {
@@ -225,6 +228,7 @@ impl Lagrangian<1> for Linear {
 }
 
 /// Two coordinates whose kinetic energy depends on their difference as `1/condition`.
+#[derive(Clone, Copy, Debug)]
 pub struct Stretched(f64);
 
 impl Lagrangian<2> for Stretched {
@@ -235,6 +239,7 @@ impl Lagrangian<2> for Stretched {
 }
 
 /// Masses in the ratio 1e20.
+#[derive(Clone, Copy, Debug)]
 pub struct Units;
 
 impl Lagrangian<2> for Units {

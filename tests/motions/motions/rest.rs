@@ -1,8 +1,8 @@
 //! Motions that come to rest: none of their steps is flagged as unresolved, wherever they come to rest.
 
-use super::lagrangians::{One, one};
 use crate::common::draws::Draws;
 use crate::common::lagrangians::WithStructure;
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
@@ -203,6 +203,7 @@ fn a_motion_at_rest_ends_with_a_status() {
 
 /// `v^2/2 + q^2/2 + gamma z` from the stable direction of its hill: the motion approaches the hill up to round-off, and
 /// leaves it.
+#[derive(Clone, Copy, Debug)]
 pub struct Hill;
 
 impl Lagrangian<1> for Hill {
@@ -215,6 +216,7 @@ impl Lagrangian<1> for Hill {
 }
 
 /// A pendulum with a pulse of force after a long time.
+#[derive(Clone, Copy, Debug)]
 pub struct Pushed;
 
 impl Lagrangian<1> for Pushed {

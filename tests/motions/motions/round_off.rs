@@ -1,6 +1,6 @@
 //! Brouwer's law: the rounding of steps accumulates as a random walk, without drift.
 
-use super::lagrangians::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
@@ -133,6 +133,7 @@ fn rounding_is_a_random_walk() -> Result<(), InputError> {
 }
 
 /// An oscillator with the rate `L_z = -c z`, at an action of 1e3, which changes by one.
+#[derive(Clone, Copy, Debug)]
 pub struct Slow(f64);
 
 impl Lagrangian<1> for Slow {

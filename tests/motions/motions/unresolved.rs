@@ -1,8 +1,8 @@
 //! Given steps that cannot resolve their motion are flagged by the error of the energy; and steps that resolve it are
 //! not.
 
-use super::lagrangians::Two;
 use crate::common::draws::Draws;
+use crate::lagrangians::Two;
 use crate::motions::run_of;
 use contact_geom::systems::Kepler;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};

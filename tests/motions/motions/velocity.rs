@@ -1,12 +1,13 @@
 //! The accuracy of velocities: where the momenta determine them badly, and where coordinates differ in size.
 
-use super::lagrangians::Two;
+use crate::lagrangians::Two;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Run, SelectionFailure, Status, Steps, Until};
 
 /// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity rotates by the angle `B t`, and `p = v + B (-y,
 /// x)/2` is much larger than it.
+#[derive(Clone, Copy, Debug)]
 pub struct Charge {
     b: f64,
     structured: bool,
@@ -114,6 +115,7 @@ fn an_end_at_rest_is_no_error_of_the_velocity() {
 
 /// Two oscillators, the second the faster the further the first is from its centre: `v.v/2 - x^2/2 - (1 + c x^2)
 /// y^2/2`.
+#[derive(Clone, Copy, Debug)]
 pub struct Oscillators {
     coupling: f64,
 }

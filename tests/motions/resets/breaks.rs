@@ -1,7 +1,7 @@
 //! Named times of kinks and jumps.
 
 use crate::common::draws::Draws;
-use crate::resets::lagrangians::Line;
+use crate::lagrangians::SwitchingOne;
 use contact_geom::switching::Breaks;
 use contact_geom::{Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, Problem, Status, Steps, Until};
@@ -28,7 +28,7 @@ impl Pushed {
     fn exact(&self, t: f64) -> f64 {
         self.push * (f64::cos(if self.to < t { t - self.to } else { 0.0 }) - f64::cos(t - self.from))
     }
-    fn breaking(self) -> Line {
+    fn breaking(self) -> SwitchingOne {
         Breaks::new(self, vec![self.from, self.to]).unwrap().into()
     }
 }
@@ -86,7 +86,7 @@ fn short_pulses_at_named_times_are_met() {
 fn times_beyond_the_run_are_ignored() {
     let pushed = Pushed { from: -1.0, to: 5.0, push: 1.0 };
     let outcome_with = |times: Vec<f64>| {
-        let problem_of = Line::from(Breaks::new(pushed, times).unwrap());
+        let problem_of = SwitchingOne::from(Breaks::new(pushed, times).unwrap());
         let problem = Problem::new(&problem_of, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
         problem.by(AnyIntegrator::Gauss { stages: 3 }).steps(Steps::Count(8)).run(Until::Time(4.0)).unwrap()
     };

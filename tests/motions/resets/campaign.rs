@@ -1,7 +1,7 @@
 //! Random impacts: none is missed, none occurs twice.
 
 use crate::common::draws::Draws;
-use crate::resets::lagrangians::Plane;
+use crate::lagrangians::SwitchingTwo;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, Problem, Resets, Status, StepError, Steps, Until};
@@ -107,7 +107,7 @@ fn ten_thousand_impacts_occur_once_each() {
         let start = ([0.0, draws.between(0.1, 3.0)], [draws.between(-1.0, 1.0), draws.between(-1.0, 1.0)]);
         let (h, t_end) = (f64::exp(draws.between(f64::ln(0.02), f64::ln(5.0))), 20.0);
         let expected = impacts(&flight, &plane, law, start, t_end);
-        let system = Plane::from(Impacts::new(flight, plane, law));
+        let system = SwitchingTwo::from(Impacts::new(flight, plane, law));
         let problem = Problem::new(&system, 0.0, VelocityPoint::new(start.0, start.1, 0.0)).unwrap();
         let mut resets = Resets::new();
         let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Size(h)).observe(&mut resets);

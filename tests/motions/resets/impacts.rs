@@ -1,18 +1,18 @@
 //! Impacts against closed forms.
 
+use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
-use crate::resets::lagrangians::{Line, Plane};
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
 use contact_geom::systems::{Pendulum, UniformField};
 use contact_geom::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, GaussCollocation, Outcome, Problem, Resets, Status, StepError, Steps, Until};
 
-fn ball(gamma: f64, g: f64, law: Impact) -> Line {
+fn ball(gamma: f64, g: f64, law: Impact) -> SwitchingOne {
     Impacts::new(UniformField { field: [-g], gamma }, Floor, law).into()
 }
 
 /// The run of a ball from the height 1 at rest, with its impacts.
-fn dropped(ball: &Line, steps: Steps, t_end: f64) -> (Outcome<1>, Vec<f64>) {
+fn dropped(ball: &SwitchingOne, steps: Steps, t_end: f64) -> (Outcome<1>, Vec<f64>) {
     let problem = Problem::new(ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let mut resets = Resets::new();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(steps);
@@ -41,7 +41,7 @@ fn an_elastic_ball_with_drag_meets_its_closed_form() {
 /// two of the order, up to a factor of two, or it is round-off.
 #[test]
 fn every_integrator_takes_impacts() {
-    let ball = Line::from(Impacts::new(Pendulum { gamma: -0.1 }, Floor, Impact::Elastic));
+    let ball = SwitchingOne::from(Impacts::new(Pendulum { gamma: -0.1 }, Floor, Impact::Elastic));
     let end = |integrator: AnyIntegrator, count: usize| {
         let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
         problem.by(integrator).steps(Steps::Count(count)).run(Until::Time(8.0)).unwrap().q[0]
@@ -122,7 +122,7 @@ impl Lagrangian<2> for Resting {
 
 #[test]
 fn a_resting_contact_continues_where_it_is_asked_for() {
-    let system = Plane::from(Resting);
+    let system = SwitchingTwo::from(Resting);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
     let outcome = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).run(Until::Time(6.0)).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.q[1]), (Status::Completed, 0.0, 1.0));
@@ -144,7 +144,7 @@ impl Surface<1> for Piston {
 fn a_moving_wall_changes_the_energy() {
     for (law, after) in [(Impact::Elastic, 2.0 * 0.25 + 1.0), (Impact::Restitution(0.5), 0.25 + 0.5 * 1.25)] {
         let particle = Impacts::new(UniformField { field: [0.0], gamma: 0.0 }, Piston { u: 0.25 }, law);
-        let particle = Line::from(particle);
+        let particle = SwitchingOne::from(particle);
         let problem = Problem::new(&particle, 0.0, VelocityPoint::new([2.5], [-1.0], 0.0)).unwrap();
         let outcome =
             problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Count(3)).run(Until::Time(4.0)).unwrap();
@@ -166,7 +166,7 @@ impl Lagrangian<1> for High {
 #[test]
 fn a_law_without_a_state_after_it_is_refused() {
     // The law takes nine tenths of the potential at the floor.
-    let ball = Line::from(Impacts::new(High, Floor, Impact::Conformal(0.1)));
+    let ball = SwitchingOne::from(Impacts::new(High, Floor, Impact::Conformal(0.1)));
     let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let outcome = problem.by(GaussCollocation { stages: 2 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
     assert!(

@@ -1,7 +1,7 @@
 //! Runs with resets: rows, events, resumed runs, ensembles.
 
+use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
-use crate::resets::lagrangians::{Line, Plane};
 use contact_geom::switching::{Control, Impact, Impacts};
 use contact_geom::systems::UniformField;
 use contact_geom::{Hints, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
@@ -10,7 +10,7 @@ use discrete_herglotz::{
 };
 
 /// A ball between a floor and a ceiling of a corner, with drag.
-fn ball() -> Plane {
+fn ball() -> SwitchingTwo {
     Impacts::new(UniformField { field: [0.2, -1.0], gamma: -0.05 }, Floor, Impact::Restitution(0.9)).into()
 }
 
@@ -95,7 +95,7 @@ fn runs_are_resumed_across_impacts_bit_by_bit() {
 /// the conformal factor is that of the drag.
 #[test]
 fn elastic_impacts_keep_the_checks_of_the_energy() {
-    let ball = Line::from(Impacts::new(UniformField { field: [-1.0], gamma: -0.05 }, Floor, Impact::Elastic));
+    let ball = SwitchingOne::from(Impacts::new(UniformField { field: [-1.0], gamma: -0.05 }, Floor, Impact::Elastic));
     let problem = Problem::new(&ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let outcome =
         problem.by(AnyIntegrator::Gauss { stages: 3 }).steps(Steps::Size(0.1)).run(Until::Time(30.0)).unwrap();
@@ -127,7 +127,7 @@ impl Lagrangian<2> for Walls {
 }
 
 fn through(walls: Walls, start: ([f64; 2], [f64; 2]), h: f64, t: f64) -> (Status, [f64; 2], usize) {
-    let system = Plane::from(walls);
+    let system = SwitchingTwo::from(walls);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new(start.0, start.1, 0.0)).unwrap();
     let mut resets = Resets::new();
     let run = problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(h)).observe(&mut resets);

@@ -1,7 +1,9 @@
 //! Discrete forces: orders of the rules and of their compositions, and steps of a discrete Lagrangian of a user.
 
+use crate::common::forces::{AnyForce, Swirl};
 use crate::common::{relative_distance, slope};
-use crate::integrators::lagrangians::{Applied, one, two};
+use crate::forces::Applied;
+use crate::lagrangians::{one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledPlane, Kepler, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
@@ -27,7 +29,7 @@ fn reference<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: Velocit
 fn rules_and_compositions_keep_their_orders() {
     fn of<const N: usize, S: System<N>>(system: &S, lagrangian: impl Lagrangian<N>) {
         let (t, x) = (system.initial_time(), system.initial());
-        let forced = Forced { lagrangian, force: Applied::Any };
+        let forced = Forced { lagrangian, force: Applied::from(AnyForce) };
         let (truth, start) = (reference(&forced, t, x, 1.0), legendre(&forced, t, &x));
         let check = |name: &str, order: u32, steps: &[usize], run: &dyn Fn(f64, usize) -> PhasePoint<N>| {
             let points: Vec<_> =
@@ -102,16 +104,16 @@ fn assert_steps<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, from: P
 fn steps_are_those_of_the_values() {
     let plane = CoupledPlane { c: 1.5, ..CoupledPlane::default() };
     let x = plane.initial();
-    let forced = Forced { lagrangian: two(plane), force: Applied::Any };
+    let forced = Forced { lagrangian: two(plane), force: Applied::from(AnyForce) };
     let start = legendre(&forced, 0.0, &x);
     for method in Method::RULES.iter().filter(|method| **method != Method::Rectangle) {
         assert_steps(&method.discretise(&forced, 0.05, 0.3, &start).unwrap(), 0.3, start, x.v);
     }
-    let kepler = Forced { lagrangian: Kepler::<2>::default(), force: Applied::Swirl };
+    let kepler = Forced { lagrangian: Kepler::<2>::default(), force: Applied::from(Swirl) };
     let x = Kepler::<2>::default().initial();
     let start = legendre(&kepler, 0.0, &x);
     assert_steps(&Strang::new(&kepler, 0.05, 0.3, &start).unwrap(), 0.3, start, x.v);
-    let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::Swirl };
+    let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::from(Swirl) };
     let start = PhasePoint::new([0.4], [0.9], 0.2);
     assert_steps(&ActionStrang::new(&nonlinear, 0.05, 0.3, &start).unwrap(), 0.3, start, [0.9].into());
 }
@@ -119,7 +121,7 @@ fn steps_are_those_of_the_values() {
 /// What takes no force says so.
 #[test]
 fn what_takes_no_force_refuses_it() {
-    let forced = Forced { lagrangian: Kepler::<2>::default(), force: Applied::Swirl };
+    let forced = Forced { lagrangian: Kepler::<2>::default(), force: Applied::from(Swirl) };
     let refused = |found: Option<InputError>| assert!(matches!(found, Some(InputError::Forced { .. })), "{found:?}");
     refused(Gauss::new::<2>(&forced, 2, 0.1).err());
 }

@@ -2,7 +2,8 @@
 
 use crate::common::forces::{AnyForce, Drag, Fall, G, Swirl};
 use crate::common::{relative_distance, slope};
-use crate::integrators::lagrangians::{Applied, One, Two, one};
+use crate::forces::Applied;
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
@@ -22,6 +23,7 @@ fn run<L: Lagrangian<N>, I: for<'a> Integrator<'a, L, N> + 'static, const N: usi
 }
 
 /// A force of positions with a drag of the velocity.
+#[derive(Clone, Copy, Debug)]
 pub struct SwirlAndDrag(pub Drag);
 
 impl<const N: usize> Force<N> for SwirlAndDrag {
@@ -77,18 +79,19 @@ fn schemes_keep_their_orders() {
             if c != 0.0 && scheme.order() == 10 {
                 continue;
             }
-            let force = Applied::SwirlAndDrag(Drag { c, k });
+            let force = Applied::from(SwirlAndDrag(Drag { c, k }));
             assert_order(&Forced { lagrangian: kepler, force }, orbit, scheme, counts);
             if k == 0.0 && scheme.order() < 10 {
                 assert_order(&Forced { lagrangian: pendulum(), force }, x, scheme, counts);
             }
         }
     }
-    let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::Swirl };
+    let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::from(Swirl) };
     assert_order(&nonlinear, VelocityPoint::new([0.5], [0.8], 0.1), SplittingScheme::STRANG, &[128, 180, 256, 360]);
 }
 
 /// A body of mass 2 without a field.
+#[derive(Clone, Copy, Debug)]
 pub struct Free;
 
 impl Lagrangian<2> for Free {
@@ -146,16 +149,17 @@ fn ensembles_take_forces() {
         assert_eq!(seen, 19);
     }
     let pendulum = |force| Forced { lagrangian: one(Pendulum { gamma: -0.1 }), force };
-    let dragged = Applied::SwirlAndDrag(Drag { c: 0.2, k: 0.1 });
+    let dragged = Applied::from(SwirlAndDrag(Drag { c: 0.2, k: 0.1 }));
     // Lanes add in another order: a hundred units of round-off in 200 steps.
     let bound = 100.0 * f64::EPSILON;
-    of(&pendulum(Applied::Swirl), SplittingScheme::BLANES_MOAN_6, bound);
-    of(&pendulum(Applied::Swirl), GaussCollocation { stages: 6 }, bound);
+    of(&pendulum(Applied::from(Swirl)), SplittingScheme::BLANES_MOAN_6, bound);
+    of(&pendulum(Applied::from(Swirl)), GaussCollocation { stages: 6 }, bound);
     of(&pendulum(dragged), SplittingScheme::YOSHIDA_4, 0.0);
     of(&pendulum(dragged), GaussCollocation { stages: 4 }, 0.0);
 }
 
 /// A Lagrangian `v.Mv/2` with a mass matrix.
+#[derive(Clone, Copy, Debug)]
 pub struct Massive([[f64; 2]; 2]);
 
 impl Lagrangian<2> for Massive {
@@ -169,6 +173,7 @@ impl Lagrangian<2> for Massive {
 }
 
 /// A force of another form than it declares.
+#[derive(Clone, Copy, Debug)]
 pub struct FalseForce;
 
 impl<const N: usize> Force<N> for FalseForce {
@@ -195,11 +200,11 @@ fn other_forces_are_refused() {
     let (linear, quadratic) = (Applied::Drag(Drag { c: 0.1, k: 0.0 }), Applied::Drag(Drag { c: 0.1, k: 0.2 }));
     let fall = |force| Forced { lagrangian: Two::from(Fall), force };
     let massive = |masses, force| Forced { lagrangian: Two::from(Massive(masses)), force };
-    refused(&fall(Applied::Any), x, strang);
+    refused(&fall(Applied::from(AnyForce)), x, strang);
     refused(&fall(quadratic), x, nystrom);
     refused(&massive([[1.0, 0.2], [0.2, 1.0]], linear), x, strang);
     refused(&massive([[1.0, 0.0], [0.0, 2.0]], quadratic), x, strang);
     refused(&Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: quadratic }, start, strang);
-    let found = Problem::new(&fall(Applied::False), 0.0, x).err();
+    let found = Problem::new(&fall(Applied::from(FalseForce)), 0.0, x).err();
     assert!(matches!(found, Some(InputError::FalseClaim { claim: "force_structure", .. })), "{found:?}");
 }

@@ -1,8 +1,8 @@
 //! Invalid input to paths between given ends.
 
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report};
-use crate::invalid_input::one::{EVERYTHING, One, one};
+use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
 use discrete_herglotz::{

@@ -2,8 +2,8 @@
 
 use super::runs::seven;
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{BASE, EXTREME, Report, places, triples};
-use crate::invalid_input::one::{CLAIMING, One};
+use crate::invalid_input::numbers::{BASE, CLAIMING, EXTREME, Report, places, triples};
+use crate::lagrangians::One;
 use contact_geom::{Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, StateDerivative, Variable};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Until};

@@ -2,8 +2,8 @@
 
 use super::runs::BY;
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report, places, triples};
-use crate::invalid_input::one::{CLAIMING, One};
+use crate::invalid_input::numbers::{CLAIMING, EXTREME, Report, places, triples};
+use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{
     Ensemble, Problem, Rows, Status, Steps, Until,

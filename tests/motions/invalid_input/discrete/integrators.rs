@@ -3,8 +3,8 @@
 use super::runs::{BY, seven, tame};
 use super::{STEPS, starts};
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report};
-use crate::invalid_input::one::{CLAIMING, One};
+use crate::invalid_input::numbers::{CLAIMING, EXTREME, Report};
+use crate::lagrangians::One;
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{

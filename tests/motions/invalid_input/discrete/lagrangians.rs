@@ -1,13 +1,14 @@
 //! Invalid input to discrete Lagrangians: their jets and single steps, the solvers of the steps, and paths.
 
 use super::{STEPS, starts};
+use crate::forces::forced_one;
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Grade, Report, fine, grade, places, triples};
-use crate::invalid_input::one::{CLAIMING, EVERYTHING, one};
+use crate::invalid_input::numbers::{CLAIMING, EVERYTHING, EXTREME, Grade, Report, fine, grade, places, triples};
+use crate::lagrangians::one;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Pendulum, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, Forced, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, DiscreteStep, MomentumDecay, MomentumRow, Problem, Steps, Until,
     checks::{check_claims, check_unforced},
@@ -117,7 +118,7 @@ fn jets(report: &mut Report) {
             report.formula(&input, jet.map(|j| ((j.d11, j.d12, j.d22), (j.d1z, j.d2z, j.dzz))));
         }
         report.formula(&input, sigma_d(&ld, t, &at));
-        let forced = Trapezoidal::new(Forced { lagrangian: EVERYTHING, force: AnyForce(0.3) }, 0.1).unwrap();
+        let forced = Trapezoidal::new(forced_one(EVERYTHING, AnyForce(0.3)), 0.1).unwrap();
         report.formula(&input, forced.forces(t, &at).map(|[minus, plus]| (minus, plus)));
         report.formula(&input, discrete_forces(&forced, t, &at).map(|f| (f.minus, f.plus)));
         report.formula(&input, legendre_minus(&ld, t, &at));
@@ -304,7 +305,7 @@ fn residuals(report: &mut Report) {
                 Err(_) => known,
             };
             report.check(good, || format!("statement {statement} at t = {t}, {x:?}: {found:?}"));
-            let forced = Forced { lagrangian: one(Pendulum::default()), force: AnyForce(0.3) };
+            let forced = forced_one(one(Pendulum::default()), AnyForce(0.3));
             let known = statements::FORCED_STATEMENTS.contains(&statement);
             let found = statements::forced_residual(statement, &forced, &[], 0.1, t, &x.into());
             let good = match &found {
@@ -319,7 +320,7 @@ fn residuals(report: &mut Report) {
 
 /// A property is verified where L is defined; elsewhere it is not assumed to hold.
 fn claims(report: &mut Report) {
-    let forced = Forced { lagrangian: CLAIMING, force: AnyForce(0.3) };
+    let forced = forced_one(CLAIMING, AnyForce(0.3));
     let refused =
         check_unforced::<_, 1>(&forced, "a method").is_err() && check_unforced::<_, 1>(&CLAIMING, "a method").is_ok();
     report.check(refused, || "a force is taken".into());

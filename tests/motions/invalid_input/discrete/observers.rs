@@ -2,8 +2,7 @@
 
 use super::runs::{BY, seven, tame};
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report, fine, triples};
-use crate::invalid_input::one::EVERYTHING;
+use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, CsvRows, Event, Events, InputError, Observer, Outcome, OutputRequest, Problem, Progress, Quotient,

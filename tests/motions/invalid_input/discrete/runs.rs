@@ -1,8 +1,8 @@
 //! Invalid input to problems, runs and plans.
 
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Grade, Report, grade, places, triples};
-use crate::invalid_input::one::{CLAIMING, One};
+use crate::invalid_input::numbers::{CLAIMING, EXTREME, Grade, Report, grade, places, triples};
+use crate::lagrangians::One;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{

@@ -1,14 +1,16 @@
 //! Invalid input to steppers: flows, Gauss collocation, splittings, compositions, and to what monitors them.
 
 use super::{STEPS, starts};
+use crate::common::forces::Drag;
 use crate::common::gauss::GaussSteppers;
+use crate::forces::forced_one;
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Grade, Numbers, Report, fine, grade, triples};
-use crate::invalid_input::one::{CLAIMING, EVERYTHING, one};
+use crate::invalid_input::numbers::{CLAIMING, EVERYTHING, EXTREME, Grade, Numbers, Report, fine, grade, triples};
+use crate::lagrangians::one;
 use contact_geom::nalgebra::SVector;
 use contact_geom::statements::AnyForce;
 use contact_geom::systems::{Kepler, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, Forced, Lagrangian, PhasePoint, Symmetry, VelocityDrag};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Symmetry};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, Problem, SplittingScheme, Start, Stepper, StepperOptions, Steps, TransformedGauss,
     Until,
@@ -142,7 +144,7 @@ fn constructor<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, Phase
 
 /// The contact defect of one step, from invalid starts and with invalid stages and steps.
 fn virtual_work(report: &mut Report) {
-    let forced = Forced { lagrangian: EVERYTHING, force: AnyForce(0.3) };
+    let forced = forced_one(EVERYTHING, AnyForce(0.3));
     let group = Symmetry::Translation(SVector::from([1.0]));
     let guess = SVector::from([0.5]);
     for (t, x) in starts() {
@@ -172,13 +174,12 @@ fn splittings(report: &mut Report) {
     constructor(report, |h, t, x| {
         Splitting::new(&CLAIMING, &scheme, h, t, x).map(|s| s.with_resolution_check().compensated().without_action())
     });
-    let drag = VelocityDrag { linear: SVector::from([0.3]), quadratic: 0.0 };
-    let dragged = Forced { lagrangian: &CLAIMING, force: drag };
+    let dragged = forced_one(CLAIMING, Drag { c: 0.3, k: 0.0 });
     constructor(report, |h, t, x| {
         DragSplitting::new(&dragged, &scheme, h, t, x).map(|s| s.with_resolution_check().without_action())
     });
     let scheme = SplittingScheme::YOSHIDA_4;
-    let turbulent = Forced { lagrangian: &CLAIMING, force: VelocityDrag { quadratic: 0.4, ..drag } };
+    let turbulent = forced_one(CLAIMING, Drag { c: 0.3, k: 0.4 });
     constructor(report, |h, t, x| DragSplitting::new(&turbulent, &scheme, h, t, x));
     let system = one(QuadraticInZ::default());
     constructor(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));

@@ -1,8 +1,7 @@
 //! Invalid input to contact forms, to the fields and brackets that belong to them, and to groups.
 
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report, fine, places, triples};
-use crate::invalid_input::one::EVERYTHING;
+use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::statements::AnyFunction;
 use contact_geom::{

@@ -1,8 +1,7 @@
 //! Invalid input to Lagrangians: their derivatives, fields, declared structure and closed motions.
 
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report, fine, places, triples};
-use crate::invalid_input::one::EVERYTHING;
+use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::{ActionSquared, AnyForce};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};

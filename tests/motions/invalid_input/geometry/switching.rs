@@ -1,8 +1,7 @@
 //! Invalid input to what interrupts a motion: impacts, named times, tables.
 
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{EXTREME, Report};
-use crate::invalid_input::one::EVERYTHING;
+use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report};
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts, Surface};
 use contact_geom::table::{Interpolation, Table, TableError};

@@ -3,7 +3,7 @@
 use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
-use crate::invalid_input::one::{One, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{

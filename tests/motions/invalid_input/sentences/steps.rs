@@ -5,9 +5,10 @@ use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::Massless;
-use crate::invalid_input::one::{One, Switched, one};
+use crate::lagrangians::{One, SwitchingOne, one};
+use crate::resets::Floor;
 use contact_geom::nalgebra::SVector;
-use contact_geom::switching::{Control, Impact, Impacts, Surface};
+use contact_geom::switching::{Control, Impact, Impacts};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler, Pendulum, UniformField};
 use contact_geom::{DiscretePoint, Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::gauss::Gauss;
@@ -56,18 +57,9 @@ impl Lagrangian<1> for Switching {
 /// A ball that falls from the height 1/2 on a floor.
 struct Impacting(Impact);
 
-/// The floor `q = 0`.
-pub struct Floor;
-
-impl Surface<1> for Floor {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {
-        q[0]
-    }
-}
-
 impl Impacting {
     fn fails(self) -> StepError {
-        let ball = Switched::from(Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, self.0));
+        let ball = SwitchingOne::from(Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, self.0));
         let problem = Problem::new(&ball, 0.0, VelocityPoint::new([0.5], [0.0], 0.0)).unwrap();
         match problem.steps(Steps::Size(0.3)).run(Until::Time(3.0)).unwrap().status {
             Status::Failed { cause, .. } => cause,
@@ -78,7 +70,7 @@ impl Impacting {
 
 impl Switching {
     fn fails(self) -> StepError {
-        let system = Switched::from(self);
+        let system = SwitchingOne::from(self);
         let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
         match problem.steps(Steps::Size(0.3)).run(Until::Steps(3)).unwrap().status {
             Status::Failed { cause, .. } => cause,

@@ -1,35 +1,24 @@
-//! The Lagrangians of these tests, as one type for each number of coordinates.
+//! The Lagrangians of these tests beside the catalogue.
 
+use crate::common::lagrangians::WithGradientAndStructure;
+use crate::lagrangians::{One, Two, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler, Pendulum};
-use contact_geom::{Lagrangian, Scalar, Structure, lagrangian_enum};
-
-lagrangian_enum! {
-    /// The Lagrangians with one coordinate.
-    pub enum One<1> {
-        HarmonicOscillator(HarmonicOscillator),
-        Pendulum(Pendulum),
-        Duffing(Duffing),
-        Bowl(Bowl),
-        Spring(Spring),
-        Branching(Branching),
-    }
-}
-
-lagrangian_enum! {
-    /// The Lagrangians with two coordinates.
-    pub enum Two<2> {
-        Kepler(Kepler<2>),
-        HenonHeiles(HenonHeiles),
-    }
-}
+use contact_geom::systems::{Kepler, Pendulum};
+use contact_geom::{Lagrangian, Scalar, Structure};
 
 /// A pendulum with a coefficient of the drag.
 pub fn pendulum(gamma: f64) -> One {
-    Pendulum { gamma }.into()
+    one(Pendulum { gamma })
+}
+
+/// Kepler's problem with drag, without its time transformation.
+pub fn kepler() -> Two {
+    let kepler = Kepler::default();
+    WithGradientAndStructure(kepler, kepler.structure()).into()
 }
 
 /// `v^2/2 + sqrt(1 - q^2) - z/10`: not defined beyond one.
+#[derive(Clone, Copy, Debug)]
 pub struct Bowl;
 
 impl Lagrangian<1> for Bowl {
@@ -43,6 +32,7 @@ impl Lagrangian<1> for Bowl {
 }
 
 /// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator whose stiffness is its parameter.
+#[derive(Clone, Copy, Debug)]
 pub struct Spring {
     pub k: f64,
 }
@@ -59,6 +49,7 @@ impl Lagrangian<1> for Spring {
 }
 
 /// An oscillator whose formula branches on the value of its position.
+#[derive(Clone, Copy, Debug)]
 pub struct Branching;
 
 impl Lagrangian<1> for Branching {
@@ -73,6 +64,7 @@ impl Lagrangian<1> for Branching {
 }
 
 /// The Hénon-Heiles potential with a mass matrix that is not diagonal, and linear drag.
+#[derive(Clone, Copy, Debug)]
 pub struct HenonHeiles;
 
 impl Lagrangian<2> for HenonHeiles {
