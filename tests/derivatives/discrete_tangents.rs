@@ -1,9 +1,10 @@
 //! Tangents and gradients of runs by discrete Lagrangians of a user.
 
+use crate::lagrangians::ForcedOne;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::systems::{CoupledInZ, Kepler, OneCoordinate, Pendulum, System};
-use contact_geom::{DiscretePoint, Forced, Parametric, Scalar, VelocityDrag, VelocityPoint};
+use contact_geom::{DiscretePoint, Parametric, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::rules::{Method, Midpoint};
 use discrete_herglotz::sensitivity::{EndCovector, SensitivityError, StateDerivative, Variable};
 use discrete_herglotz::{CustomMethod, DiscreteLagrangian, Problem, StepError, Steps, Until};
@@ -64,7 +65,7 @@ fn the_midpoint_rule() {
     compare(&Kepler::<2>::default(), Kepler::<2>::default().initial());
     compare(&OneCoordinate::from(CoupledInZ::default()), CoupledInZ::default().initial());
     let force = VelocityDrag { linear: SVector::from([0.2]), quadratic: 0.1 };
-    compare(&Forced { lagrangian: pendulum, force }, VelocityPoint::new([1.0], [0.5], 0.2));
+    compare(&ForcedOne::new(pendulum, force.into()), VelocityPoint::new([1.0], [0.5], 0.2));
 }
 
 /// A discrete Lagrangian of a pendulum that no rule of the library gives, nonlinear in z0, with discrete forces.

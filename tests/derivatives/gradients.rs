@@ -4,12 +4,17 @@ mod agreement;
 mod contact;
 mod ensembles;
 mod flows;
-mod forces;
-mod impacts;
-mod invalid_input;
-mod lagrangians;
+pub mod forces;
+pub mod impacts;
+pub mod invalid_input;
 mod losses;
 mod lyapunov;
 mod pendulum;
 mod runs;
-mod switches;
+pub mod switches;
+
+/// Whether systems of the catalogue with a number of coordinates are compared. Each type takes long to compile, and those
+/// with three, Kepler's problem in space and a free chain, have the formulas of others with two and four.
+const fn is_compared(coordinates: usize) -> bool {
+    coordinates != 3
+}

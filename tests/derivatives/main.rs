@@ -9,4 +9,5 @@
 
 mod discrete_tangents;
 mod gradients;
+mod lagrangians;
 mod second_derivatives;

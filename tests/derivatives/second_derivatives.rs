@@ -3,4 +3,4 @@
 mod closed_form;
 mod differences;
 mod invalid_input;
-mod systems;
+pub mod systems;

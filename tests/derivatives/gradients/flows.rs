@@ -1,8 +1,8 @@
 //! Derivatives of runs by splittings, quadrature rules and compositions.
 
 use crate::gradients::forces::{Forces, Stirring};
-use crate::gradients::lagrangians::ForcedPlane;
 use crate::gradients::runs::{Case, Method, weyl};
+use crate::lagrangians::{ForcedOne, Two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     Chain, CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
@@ -15,7 +15,13 @@ use discrete_herglotz::{Integrator, Problem, SplittingScheme, Steps, Until, rule
 /// A run over 0.1, or back over 0.075, from a sampled state; the draw selects the direction, the number of steps, and whether
 /// the start is given by its momentum. In this time no sampled orbit comes to a centre or a pole, where steps of rules have
 /// no solution.
+///
+/// Not for more than two coordinates: the loops of rules and splittings over coordinates are the same for any number of
+/// them, which is four in `rows`, and each type takes long to compile.
 fn compare<const N: usize, S: System<N>, M: Method>(system: &S, method: M, draw: u32, name: &str) {
+    if const { N > 2 } {
+        return;
+    }
     let (mut t0, start) = system.sample(&weyl(draw, 2 * N + 2));
     t0 += system.initial_time();
     let span = if draw % 4 == 3 { -0.075 } else { 0.1 };
@@ -24,7 +30,8 @@ fn compare<const N: usize, S: System<N>, M: Method>(system: &S, method: M, draw:
     case.compare(&format!("{}, {name}, from {start:?}", system.name()), 3e-13, 1e-8);
 }
 
-/// Every splitting scheme for every system to which it applies: constant and time-dependent linear drag, nonlinear drag.
+/// Every splitting scheme for every system with one or two coordinates to which it applies: constant and time-dependent
+/// linear drag, nonlinear drag.
 #[test]
 fn splittings() {
     struct Visit(u32);
@@ -41,7 +48,7 @@ fn splittings() {
     visit_catalogue(&mut Visit(0));
 }
 
-/// Every quadrature rule, and compositions of the symmetric ones, for every system.
+/// Every quadrature rule, and compositions of the symmetric ones, for every system with one or two coordinates.
 #[test]
 fn quadrature_rules() {
     struct Visit(u32);
@@ -120,12 +127,12 @@ fn forced<const N: usize, S: System<N>, L: Parametric<N>, M: Method>(
 
 fn forced_line<M: Method>(system: impl Into<OneCoordinate>, force: impl Into<Forces<1>>, method: M, name: &str) {
     let system = system.into();
-    forced(&system, &Forced::new(system, force.into()), method, name);
+    forced(&system, &ForcedOne::new(system, force.into()), method, name);
 }
 
 fn forced_plane<M: Method>(system: impl Into<TwoCoordinates>, force: impl Into<Forces<2>>, method: M, name: &str) {
     let system = system.into();
-    forced(&system, &ForcedPlane::from(Forced::new(system, force.into())), method, name);
+    forced(&system, &Two::from(Forced::new(system, force.into())), method, name);
 }
 
 /// A linear drag with a coefficient for each velocity, which are its parameters.
@@ -173,7 +180,7 @@ fn drags_of_the_velocity() {
             for (c, k) in [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, -0.2)] {
                 forced_line(HarmonicOscillator::default(), EqualDrag { c, k, push: 0.4 }, scheme, name);
                 let (kepler, force) = (Kepler::<2>::default(), EqualDrag { c, k, push: 0.2 });
-                forced(&kepler, &ForcedPlane::from(Forced::new(kepler, force.into())), scheme, name);
+                forced(&kepler, &Two::from(Forced::new(kepler, force.into())), scheme, name);
             }
         }
     }
@@ -202,7 +209,7 @@ fn parameters_that_a_splitting_excludes() {
     }
     let force = VelocityDrag { linear: [0.2, 0.2].into(), quadratic: 0.1 };
     let kepler = Kepler::<2>::default();
-    let lagrangian = ForcedPlane::from(Forced::new(kepler, force.into()));
+    let lagrangian = Two::from(Forced::new(kepler, force.into()));
     let problem = Problem::new(&lagrangian, 0.0, kepler.initial()).unwrap();
     let run = || problem.by(SplittingScheme::STRANG).steps(Steps::Count(10));
     let found = run().tangent(&[Variable::Parameter("linear[0]".into())], Until::Time(1.0)).unwrap_err();

@@ -1,8 +1,8 @@
 //! Derivatives with applied forces and their parameters.
 
 use crate::gradients::flows::{EqualDrag, LinearDrag};
-use crate::gradients::lagrangians::ForcedPlane;
 use crate::gradients::runs::Case;
+use crate::lagrangians::{ForcedOne, Two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates,
@@ -128,10 +128,10 @@ fn a_general_force() {
         }
     }
     fn line(system: OneCoordinate) {
-        run(&system, &Forced::new(system, Forces::from(Stirring { a: 0.4, b: 0.3 })));
+        run(&system, &ForcedOne::new(system, Stirring { a: 0.4, b: 0.3 }.into()));
     }
     fn plane(system: TwoCoordinates) {
-        run(&system, &ForcedPlane::from(Forced::new(system, Forces::from(Stirring { a: 0.4, b: 0.3 }))));
+        run(&system, &Two::from(Forced::new(system, Forces::from(Stirring { a: 0.4, b: 0.3 }))));
     }
     line(Pendulum::default().into());
     line(QuadraticInZ::default().into());
@@ -145,7 +145,7 @@ fn a_general_force() {
 fn drag() {
     let force = VelocityDrag { linear: [0.2, 0.1].into(), quadratic: 0.3 };
     let once = Forced::new(TwoCoordinates::from(DoublePendulum::default()), Forces::from(force));
-    let forced = ForcedPlane::from(once);
+    let forced = Two::from(once);
     let start = VelocityPoint::new([1.0, 0.4], [0.5, -0.7], 0.2);
     let case = Case {
         lagrangian: &forced,
@@ -157,7 +157,7 @@ fn drag() {
         method: GaussCollocation { stages: 8 },
     };
     case.compare("drag", 3e-13, 1e-8);
-    let nested = ForcedPlane::from(Forced::new(once, Forces::from(Stirring { a: 0.4, b: 0.3 })));
+    let nested = Two::from(Forced::new(once, Forces::from(Stirring { a: 0.4, b: 0.3 })));
     assert_eq!(
         Parametric::<2>::parameter_names(&nested)[4..],
         ["gamma", "linear[0]", "linear[1]", "quadratic", "a", "b"]

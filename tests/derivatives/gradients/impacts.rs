@@ -1,7 +1,7 @@
 //! Derivatives of runs with impacts.
 
-use crate::gradients::lagrangians::{SwitchingLine, SwitchingPlane};
 use crate::gradients::runs::{Case, weyl};
+use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts, Surface};
@@ -52,12 +52,12 @@ impl Surface<2> for Ground {
     }
 }
 
-fn ball(field: f64, gamma: f64, law: Impact) -> SwitchingLine {
+fn ball(field: f64, gamma: f64, law: Impact) -> SwitchingOne {
     Impacts::new(UniformField { field: [field], gamma }, Floor, law).into()
 }
 
 /// The derivatives of q and v in variables, forward and by the adjoint, with the end.
-fn both(system: &SwitchingLine, steps: Steps, t: f64, variables: &[Variable]) -> ([f64; 2], Vec<[[f64; 2]; 2]>) {
+fn both(system: &SwitchingOne, steps: Steps, t: f64, variables: &[Variable]) -> ([f64; 2], Vec<[[f64; 2]; 2]>) {
     let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 8 }).steps(steps);
     let tangent = run().tangent(variables, Until::Time(t)).unwrap();
@@ -148,7 +148,7 @@ fn random_impacts() {
         };
         let ground = Ground { slope: 0.3 * (u[1] - 0.5), velocity: 0.1 * (u[2] - 0.5) };
         let system = Impacts::new(UniformField { field: [0.2 * u[3], -1.0], gamma: -0.2 * u[4] }, ground, law);
-        let system = SwitchingPlane::from(system);
+        let system = SwitchingTwo::from(system);
         let start = VelocityPoint::new([u[5], 0.8 + 0.3 * u[6]], [u[7] - 0.5, 0.3 * (u[8] - 0.5)], 0.1);
         let case = Case {
             lagrangian: &system,
@@ -212,7 +212,7 @@ fn grazing_impacts() {
     for exponent in 2..=16 {
         let height = 0.5 - 10.0_f64.powi(-exponent);
         let system = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Ceiling(height), Impact::Elastic);
-        let system = SwitchingLine::from(system);
+        let system = SwitchingOne::from(system);
         let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
         let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.3));
         match run().tangent(&[Variable::Velocity(0)], Until::Time(1.7)) {

@@ -1,6 +1,6 @@
 //! Input that cannot be differentiated.
 
-use crate::gradients::lagrangians::{SmoothLine, SwitchingLine};
+use crate::lagrangians::{One, SwitchingOne};
 use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::rules;
@@ -58,7 +58,7 @@ impl Parametric<1> for Slope {}
 
 #[test]
 fn switching_functions() {
-    let system = SwitchingLine::from(Slope);
+    let system = SwitchingOne::from(Slope);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let found =
         problem.by(rules::Method::Midpoint).steps(Steps::Size(0.1)).tangent(&[Variable::Action], Until::Time(2.0));
@@ -92,7 +92,7 @@ impl Parametric<1> for Falling {}
 /// below 0, where a fall from 1 arrives after a time of 1.4.
 #[test]
 fn runs_that_end_early() {
-    let system = SmoothLine::from(Falling);
+    let system = One::from(Falling);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let found = run().gradient(&Constant(1.0), Until::Time(2.0)).unwrap();

@@ -1,8 +1,8 @@
 //! Derivatives of runs across kinks, named times, resets of any kind, and jumps.
 
 use crate::gradients::impacts::Floor;
-use crate::gradients::lagrangians::{SwitchingLine, SwitchingPlane};
 use crate::gradients::runs::Case;
+use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts, Surface};
 use contact_geom::systems::UniformField;
@@ -88,7 +88,7 @@ parametric!(Kinked, 1, a, k);
 /// differences.
 #[test]
 fn a_kink() {
-    let system = SwitchingLine::from(Kinked { a: 0.4, k: 1.5 });
+    let system = SwitchingOne::from(Kinked { a: 0.4, k: 1.5 });
     for (stages, steps) in [(6, 4), (8, 3), (5, 10)] {
         let start = VelocityPoint::new([0.0], [1.0], 0.0);
         let case = Case {
@@ -122,7 +122,7 @@ parametric!(Pushed, 1, push);
 /// Steps end at named times, which stay where they are when the times of the run move.
 #[test]
 fn named_times() {
-    let system = SwitchingLine::from(Breaks::new(Pushed { push: 1.5 }, vec![0.7, 1.35]).unwrap());
+    let system = SwitchingOne::from(Breaks::new(Pushed { push: 1.5 }, vec![0.7, 1.35]).unwrap());
     for steps in [3, 4, 7] {
         let start = VelocityPoint::new([0.3], [0.2], 0.0);
         let case = Case {
@@ -165,7 +165,7 @@ parametric!(Bouncing, 1, g, e);
 
 #[test]
 fn resets_by_differences() {
-    let system = SwitchingLine::from(Bouncing { g: 1.0, e: 0.9 });
+    let system = SwitchingOne::from(Bouncing { g: 1.0, e: 0.9 });
     for steps in [2, 5] {
         let start = VelocityPoint::new([1.0], [0.1], 0.2);
         let case = Case {
@@ -199,7 +199,7 @@ impl Surface<2> for Wall {
 fn two_impacts_at_one_instant() {
     let free = UniformField { field: [0.0, 0.0], gamma: 0.0 };
     let system = Impacts::new(Impacts::new(free, Floor, Impact::Elastic), Wall, Impact::Elastic);
-    let system = SwitchingPlane::from(system);
+    let system = SwitchingTwo::from(system);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0, 1.0], [-1.0, -1.0], 0.0)).unwrap();
     let variables: Vec<_> = Variable::all(&problem).into_iter().take(4).collect();
     for h in [0.3, 1.0, 2.0] {
@@ -237,7 +237,7 @@ fn refraction_and_reflection() {
     let variables = [Variable::Position(0), Variable::Velocity(0), Variable::Parameter("height".into())];
     let root = 0.6_f64.sqrt();
     for (height, expected) in [(0.2, [root, 1.0 / root + root, -1.0 / root]), (0.8, [-1.0, -2.0, 0.0])] {
-        let system = SwitchingLine::from(Step { height });
+        let system = SwitchingOne::from(Step { height });
         let problem = Problem::new(&system, 0.0, VelocityPoint::new([-1.0], [1.0], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
         let tangent = run.tangent(&variables, Until::Time(2.0)).unwrap();
@@ -282,7 +282,7 @@ fn jumps_across_surfaces() {
     let jumps = [(0.2, 1.0, 2), (0.0, 1.2, 2), (0.0, 0.8, 2), (0.2, 1.2, 2), (3.0, 1.0, 1), (3.0, 1.2, 1)];
     for (height, mass, switches) in jumps {
         for (curvature, velocity) in [(0.0, 0.0), (0.0, 0.1), (1.0, 0.0), (1.0, 0.1)] {
-            let system = SwitchingPlane::from(Region { height, mass, radius: 0.8, curvature, velocity });
+            let system = SwitchingTwo::from(Region { height, mass, radius: 0.8, curvature, velocity });
             let start = VelocityPoint::new([-1.5, 0.2], [1.3, 0.1], 0.0);
             let method = GaussCollocation { stages: 6 };
             let case = Case { lagrangian: &system, t0: 0.0, start, from_momentum: false, t_end: 3.0, steps: 5, method };
@@ -298,7 +298,7 @@ fn jumps_across_surfaces() {
 #[test]
 fn accumulating_impacts() {
     let system = Impacts::new(UniformField { field: [-1.0], gamma: 0.0 }, Floor, Impact::Restitution(0.5));
-    let system = SwitchingLine::from(system);
+    let system = SwitchingOne::from(system);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
     let found = run.gradient_of(|end| (end.q[0], EndCovector::zero()), Until::Time(6.0)).unwrap();

@@ -1,6 +1,7 @@
 //! The linear oscillator `q'' = -omega^2 q + gamma q'`, whose motion is known.
 
-use crate::second_derivatives::systems::{Line, Oscillator};
+use crate::lagrangians::One;
+use crate::second_derivatives::systems::Oscillator;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Dual, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::Variable;
@@ -34,7 +35,7 @@ fn second_derivatives(x: [f64; 5]) -> [[[f64; 5]; 5]; 2] {
 #[test]
 fn a_linear_oscillator() {
     let (x, t) = ([0.8, -0.3, 1.3, -0.2], 7.0);
-    let oscillator = Line::from(Oscillator { omega: x[2], gamma: x[3] });
+    let oscillator = One::from(Oscillator { omega: x[2], gamma: x[3] });
     let problem = Problem::new(&oscillator, 0.0, VelocityPoint::new([x[0]], [x[1]], 0.1)).unwrap();
     let parameter = |name: &str| Variable::Parameter(name.into());
     let variables =

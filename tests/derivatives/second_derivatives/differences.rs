@@ -1,6 +1,7 @@
 //! Second derivatives against differences of first ones, forward and by the adjoint; and their symmetry.
 
-use crate::second_derivatives::systems::{General, Line, Plane};
+use crate::lagrangians::{One, Two};
+use crate::second_derivatives::systems::General;
 use contact_geom::nalgebra::{DVector, SVector};
 use contact_geom::numbers::max_or_nan;
 use contact_geom::systems::{Kepler, Pendulum, System};
@@ -162,7 +163,7 @@ fn gradient<const N: usize>(of: &Gradient<N>) -> DVector<f64> {
 /// The pendulum `v^2/2 - 1 + cos q + gamma z` over one period and a half.
 #[test]
 fn the_pendulum_of_the_issue() {
-    let pendulum = Line::from(Pendulum { gamma: -0.01 });
+    let pendulum = One::from(Pendulum { gamma: -0.01 });
     for (from_momentum, stages, steps) in [(false, 8, 40), (true, 12, 20), (false, 2, 60)] {
         let start = VelocityPoint::new([1.0], [1.0], 0.0);
         let (t0, t_end, distance) = (0.0, 10.0, 1.0 / 32.0);
@@ -177,7 +178,7 @@ fn kepler_with_drag() {
     let kepler = Kepler::<2>::default();
     let (t0, t_end, distance) = (0.0, 3.0, 1.0 / 64.0);
     let case = Case {
-        lagrangian: &Plane::from(kepler),
+        lagrangian: &Two::from(kepler),
         t0,
         start: kepler.initial(),
         from_momentum: false,
@@ -189,7 +190,7 @@ fn kepler_with_drag() {
     case.compare("Kepler", 1e-8);
     // A stronger drag leads to the centre.
     let force = VelocityDrag { linear: SVector::from([0.02, 0.05]), quadratic: 0.1 };
-    let forced = Forced { lagrangian: kepler, force };
+    let forced = Two::from(Forced::new(kepler, force.into()));
     let start = VelocityPoint::new([1.0, 0.1], [0.2, 0.9], 0.3);
     for from_momentum in [false, true] {
         let distance = 1.0 / 128.0;
@@ -201,7 +202,7 @@ fn kepler_with_drag() {
 /// All terms of the equations; forward and backward in time.
 #[test]
 fn a_general_lagrangian() {
-    let general = Plane::from(General { m: 1.3, k: 0.7 });
+    let general = Two::from(General { m: 1.3, k: 0.7 });
     for (from_momentum, stages, span) in [(false, 1, 0.8), (true, 4, 0.8), (false, 9, -0.8)] {
         let (t0, start) = (0.2, VelocityPoint::new([0.3, -0.4], [0.5, 0.2], 0.6));
         let (t_end, distance) = (t0 + span, 1.0 / 32.0);

@@ -1,6 +1,7 @@
 //! Runs and directions without second derivatives.
 
-use crate::second_derivatives::systems::{Falling, Line};
+use crate::gradients::invalid_input::Falling;
+use crate::lagrangians::One;
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::systems::{Pendulum, System};
 use contact_geom::{Scalar, VelocityPoint};
@@ -19,7 +20,7 @@ impl<const N: usize> Loss<N> for Constant {
 #[test]
 fn integrators_without_second_derivatives() {
     let pendulum = Pendulum::default();
-    let (pendulum, start) = (Line::from(pendulum), pendulum.initial());
+    let (pendulum, start) = (One::from(pendulum), pendulum.initial());
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let variables = Variable::all(&problem);
     let (steps, until) = (Steps::Size(0.1), Until::Time(1.0));
@@ -33,7 +34,7 @@ fn integrators_without_second_derivatives() {
 #[test]
 fn directions_and_losses() {
     let pendulum = Pendulum::default();
-    let (pendulum, start) = (Line::from(pendulum), pendulum.initial());
+    let (pendulum, start) = (One::from(pendulum), pendulum.initial());
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let (variables, until) = ([Variable::Position(0), Variable::Action], Until::Time(1.0));
@@ -59,7 +60,7 @@ fn directions_and_losses() {
 /// after a time of 1.4.
 #[test]
 fn runs_that_end_early() {
-    let falling = Line::from(Falling);
+    let falling = One::from(Falling);
     let problem = Problem::new(&falling, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1));
     let (variables, until) = ([Variable::Position(0)], Until::Time(2.0));

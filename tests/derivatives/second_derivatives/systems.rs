@@ -1,27 +1,7 @@
-//! The systems of these tests.
+//! The systems of these tests beside the catalogue.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum};
-use contact_geom::{Lagrangian, Parametric, Scalar, lagrangian_enum};
-
-lagrangian_enum! {
-    /// The Lagrangians of these tests with one coordinate, as one type.
-    pub enum Line<1> {
-        Pendulum(Pendulum),
-        Oscillator(Oscillator),
-        Falling(Falling),
-    }
-}
-lagrangian_enum!(parametric Line<1> { Pendulum, Oscillator, Falling });
-
-lagrangian_enum! {
-    /// The Lagrangians of these tests with two coordinates and without forces, as one type.
-    pub enum Plane<2> {
-        Kepler(Kepler<2>),
-        General(General),
-    }
-}
-lagrangian_enum!(parametric Plane<2> { Kepler, General });
+use contact_geom::{Lagrangian, Parametric, Scalar};
 
 /// A linear oscillator with the frequency omega: `L = v^2/2 - omega^2 q^2/2 + gamma z`.
 #[derive(Clone, Copy, Debug)]
@@ -60,17 +40,6 @@ impl Parametric<1> for Oscillator {
         Self::formula([theta[0], theta[1]], q[0], v[0], z)
     }
 }
-
-/// A fall where the square root of the height is defined.
-pub struct Falling;
-
-impl Lagrangian<1> for Falling {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
-        v[0] * v[0] * 0.5 - q[0] + q[0].sqrt() * 1e-3
-    }
-}
-
-impl Parametric<1> for Falling {}
 
 /// A Lagrangian whose second derivatives have all terms: it depends on the time, with a mass that depends on position,
 /// velocity and a parameter, and with terms of second order in z.
