@@ -7,7 +7,7 @@ use contact_geom::{Force, ForceStructure, Lagrangian, Scalar, Structure, Velocit
 pub const G: f64 = 9.81;
 
 /// A body in a constant field: `v.v/2 - g q0`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Fall;
 
 impl<const N: usize> Lagrangian<N> for Fall {
@@ -20,7 +20,7 @@ impl<const N: usize> Lagrangian<N> for Fall {
 }
 
 /// `-c v - k |v| v`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Drag {
     pub c: f64,
     pub k: f64,
@@ -37,6 +37,7 @@ impl<const N: usize> Force<N> for Drag {
 }
 
 /// The Lagrangian `v^2/2 - g/(2k) (e^(2kq) - 1) + 2 k v z`, whose Herglotz equation is `v' = -g + k v^2`.
+#[derive(Clone, Copy, Debug)]
 pub struct DragInLagrangian {
     pub k: f64,
 }
@@ -49,6 +50,7 @@ impl Lagrangian<1> for DragInLagrangian {
 }
 
 /// A force that is nonlinear in t, q, v and z.
+#[derive(Clone, Copy, Debug)]
 pub struct AnyForce;
 
 impl<const N: usize> Force<N> for AnyForce {
@@ -61,7 +63,7 @@ impl<const N: usize> Force<N> for AnyForce {
 }
 
 /// A force `f(t, q)` that is no gradient.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Swirl;
 
 impl<const N: usize> Force<N> for Swirl {
@@ -77,7 +79,7 @@ impl<const N: usize> Force<N> for Swirl {
 }
 
 /// A force of the positions that declares nothing.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Undeclared<F>(pub F);
 
 impl<const N: usize, F: Force<N>> Force<N> for Undeclared<F> {

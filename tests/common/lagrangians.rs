@@ -1,9 +1,10 @@
 //! Lagrangians that several test files share and that are no systems of the catalogue.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure};
+use contact_geom::{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint};
 
 /// A Lagrangian with another structure than it declares itself, and without closed derivatives.
+#[derive(Clone, Copy, Debug)]
 pub struct WithStructure<L>(pub L, pub Structure);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithStructure<L> {
@@ -15,9 +16,28 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithStructure<L> {
     }
 }
 
+/// A Lagrangian with another structure than it declares itself, and with its closed gradient, whose rounding is part of
+/// the test.
+#[derive(Clone, Copy, Debug)]
+pub struct WithGradientAndStructure<L>(pub L, pub Structure);
+
+impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for WithGradientAndStructure<L> {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
+        self.0.closed_gradient(t, x)
+    }
+    fn structure(&self) -> Structure {
+        self.1
+    }
+}
+
 /// Bratu's problem `q'' = -lambda e^q` with linear drag: without drag two solutions with `q(0) = q(1) = 0` for
 /// `lambda < 3.513830719`, and none for larger lambda.
-#[derive(Clone)]
+#[derive(Clone, Copy, Debug)]
 pub struct Bratu {
     pub lambda: f64,
     pub drag: f64,

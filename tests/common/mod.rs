@@ -1,6 +1,7 @@
 //! Helpers that several test files share: random points, the samples of a step, an independent integrator, slopes and
 //! Lagrangians.
 
+pub mod draws;
 pub mod forces;
 pub mod gauss;
 pub mod lagrangians;

@@ -1,47 +1,139 @@
 //! The Lagrangians of these tests as one type for each number of coordinates, so that each integrator is compiled once.
+//! Those with switching functions are types of their own: they have further code in each step, which others do not need.
+//! Kepler's problem is not among them: its time transformation would be compiled for all.
 
-use super::accuracy::Line;
-use super::claims::Bump;
-use super::coarse::{Kinked, Massless, Runaway, Shifted};
-use super::resolution::{Linear, Pole, Pulse, Stretched, Units};
-use super::rest::{Hill, Pushed, Resting};
-use super::round_off::Slow;
-use super::unresolved::Plane;
-use super::velocity::{Charge, Oscillators};
-use crate::common::lagrangians::WithStructure;
+use crate::boundary_paths::conjugate_points::Uncoupled;
+use crate::boundary_paths::end_conditions;
+use crate::boundary_paths::forces::Rolling;
+use crate::common::forces::{DragInLagrangian, Fall};
+use crate::common::lagrangians::{Bratu, WithGradientAndStructure, WithStructure};
+use crate::ensembles::systems::{self, Bowl, HenonHeiles, Spring};
+use crate::integrators::accuracy::Bench;
+use crate::integrators::event_roots::{Ceiling, Cubic};
+use crate::integrators::events::{About, Driven, EndsAtZero, Well};
+use crate::integrators::forces::splittings::{Free, Massive};
+use crate::integrators::gauss::{Ends, InField};
+use crate::integrators::gauss_stress::{IllConditioned, Masses};
+use crate::integrators::runs::ManyVelocities;
+use crate::invalid_input::discrete::runs::Silent;
+use crate::invalid_input::known_issues;
+use crate::invalid_input::numbers::{Claiming, Everything};
+use crate::invalid_input::refusals::GrowingDrag;
+use crate::invalid_input::sentences::input::{FalselyQuadratic, Odd, Unstated};
+use crate::invalid_input::sentences::steps::{Branching, QuadraticAtFirst, Switching};
+use crate::motions::accuracy::Line;
+use crate::motions::claims::Bump;
+use crate::motions::coarse::{Kinked, Massless, Runaway, Shifted};
+use crate::motions::resolution::{Linear, Pole, Pulse, Stretched, Units};
+use crate::motions::rest::{Hill, Pushed, Resting};
+use crate::motions::round_off::Slow;
+use crate::motions::unresolved::Plane;
+use crate::motions::velocity::{Charge, Oscillators};
+use crate::path_branches::Crossed;
+use crate::resets::Floor;
+use crate::resets::breaks;
+use crate::resets::campaign::{Flight, Slope};
+use crate::resets::impacts::{self, High, Piston};
+use crate::resets::runs::Walls;
 use contact_geom::lagrangian_enum;
-use contact_geom::systems::{OneCoordinate, TwoCoordinates};
+use contact_geom::switching::{Breaks, Impacts};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, TwoCoordinates, UniformField};
 
 lagrangian_enum! {
-    /// The Lagrangians with one coordinate.
+    /// One coordinate.
+    #[derive(Clone, Copy, Debug)]
     pub enum One<1> {
         Catalogue(OneCoordinate),
-        Line(Line),
+        OtherStructure(WithStructure<OneCoordinate>),
+        GradientAndOtherStructure(WithGradientAndStructure<OneCoordinate>),
+        UniformField(UniformField<1>),
+        Fall(Fall),
+        FallOfOtherStructure(WithStructure<Fall>),
+        DragInLagrangian(DragInLagrangian),
+        Bratu(Bratu),
+        About(About),
+        Bench(Bench),
+        Bowl(Bowl),
+        Branching(Branching),
         Bump(Bump),
-        Runaway(Runaway),
+        Claiming(Claiming),
+        Cubic(Cubic),
+        Driven(Driven),
+        EndsAtZero(EndsAtZero),
+        Everything(Everything),
+        FalselyQuadratic(FalselyQuadratic),
+        GrowingDrag(GrowingDrag),
+        Hill(Hill),
+        InField(InField),
         Kinked(Kinked),
-        Shifted(Shifted),
+        Line(Line),
+        Linear(Linear),
+        ManyVelocities(ManyVelocities),
+        NarrowPulse(known_issues::Pulse),
+        Odd(Odd),
         Pole(Pole),
         Pulse(Pulse),
-        Linear(Linear),
-        Resting(Resting),
-        General(WithStructure<Resting>),
-        Hill(Hill),
         Pushed(Pushed),
+        QuadraticAtFirst(QuadraticAtFirst),
+        Resting(Resting),
+        RestingOfOtherStructure(WithStructure<Resting>),
+        Runaway(Runaway),
+        Shifted(Shifted),
+        Silent(Silent),
         Slow(Slow),
+        Spring(Spring),
+        TwoSprings(systems::Branching),
+        Unstated(Unstated),
+        Well(Well),
     }
 }
 
 lagrangian_enum! {
-    /// The Lagrangians with two coordinates, without those that have a time transformation.
+    /// Two coordinates.
+    #[derive(Clone, Copy, Debug)]
     pub enum Two<2> {
         Catalogue(TwoCoordinates),
-        Massless(Massless),
-        Stretched(Stretched),
-        Units(Units),
-        Plane(Plane),
+        KeplerWithoutTransformation(WithGradientAndStructure<Kepler<2>>),
+        Fall(Fall),
         Charge(Charge),
+        Crossed(Crossed),
+        Driven(end_conditions::Driven),
+        Ends(WithStructure<Ends>),
+        Free(Free),
+        HenonHeiles(HenonHeiles),
+        IllConditioned(IllConditioned),
+        Masses(Masses),
+        Massive(Massive),
+        Massless(Massless),
         Oscillators(Oscillators),
+        Plane(Plane),
+        Rolling(Rolling),
+        Stretched(Stretched),
+        Uncoupled(Uncoupled),
+        Units(Units),
+    }
+}
+
+lagrangian_enum! {
+    /// One coordinate, with switching functions or breaks.
+    pub enum SwitchingOne<1> {
+        Ball(Impacts<UniformField<1>, Floor>),
+        BeforePiston(Impacts<UniformField<1>, Piston>),
+        Pendulum(Impacts<Pendulum, Floor>),
+        High(Impacts<High, Floor>),
+        Pushed(Breaks<breaks::Pushed>),
+        Ceiling(Ceiling),
+        Switching(Switching),
+    }
+}
+
+lagrangian_enum! {
+    /// Two coordinates, with switching functions.
+    pub enum SwitchingTwo<2> {
+        Ball(Impacts<UniformField<2>, Floor>),
+        Flight(Impacts<Flight, Slope>),
+        Resting(impacts::Resting),
+        Walls(Walls),
     }
 }
 

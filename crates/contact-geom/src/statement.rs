@@ -18,7 +18,7 @@ macro_rules! statements {
         /// forces, impacts or graphs of flows, which the paper does not treat, in the sections `forces`, `impacts` and
         /// `legendrian`.
         ///
-        /// The number is that of its rows in `statements.csv`; its tests are in `tests/paper`. Most statements are
+        /// The number is that of its rows in `statements.csv`; its tests are in `tests/motions/paper`. Most statements are
         /// evaluated by the function `residual` in the module `statements` of a library.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Statement {

@@ -1,0 +1,108 @@
+//! Invalid input to discrete-herglotz. A start that is not finite is refused, and the states of a motion are finite;
+//! formulas return a number that is not finite for such input, or refuse it.
+
+mod boundary;
+mod derivatives;
+mod ensembles;
+mod hamiltonians;
+mod integrators;
+mod lagrangians;
+mod observers;
+pub mod runs;
+mod steppers;
+
+use crate::invalid_input::numbers::places;
+use crate::invalid_input::{Exceptions, InputTest};
+use contact_geom::PhasePoint;
+
+pub const EXCEPTIONS: Exceptions = &[
+    ("ContactIncrement::*", "arithmetic: a result that is not finite follows from input that is not"),
+    ("ContactPiece::*", "the implementor's; the flows of the pieces are tested with their steppers"),
+    ("PieceList::*", "calls its pieces"),
+    ("PointFlow::*", "the implementor's"),
+    ("Polynomial::coefficients", "the implementor's"),
+    ("TypeTwo::*", "the implementor's; those of Euler are tested with the steps"),
+    ("TypeThree::*", "the implementor's; those of Euler are tested with the steps"),
+    ("Progress::new", "takes no number"),
+    ("BracketSeries::degree", "takes no number"),
+    ("BracketSeries::terms", "takes no number"),
+    ("BracketTerm::degree", "takes no number"),
+    ("BracketTerm::part", "takes no number"),
+    ("Method::name", "takes no number"),
+    ("Interrupt::when", "takes no number"),
+    ("Problem::with_interrupt", "takes no number"),
+    ("Ensemble::with_interrupt", "takes no number"),
+    ("jumps_between", "compares signs along a curve; every run with switching functions calls it"),
+    ("Method::order", "takes no number"),
+    ("Method::symmetric", "takes no number"),
+    ("Method::implicit_in_z", "takes no number"),
+    ("Method::exact_rate", "takes no number"),
+    ("Method::check", "takes no number"),
+    ("Method::applicable", "takes no number"),
+    ("Method::visit_rules", "takes no number"),
+    ("RuleVisitor::*", "the implementor's"),
+    ("SplittingScheme::*", "tables: take no number"),
+    ("AnyIntegrator::all", "takes no number"),
+    ("AnyIntegrator::order", "takes no number; the test of check calls it for any number of stages"),
+    ("DiscreteLagrangian::is_explicit", "takes no number"),
+    ("DiscreteLagrangian::constant_rate", "takes no number"),
+    ("DiscreteLagrangian::order", "takes no number"),
+    ("DiscreteLagrangian::has_forces", "takes no number"),
+    ("EnergyDrift::first", "takes no number"),
+    ("exact_sum", "arithmetic: a result that is not finite follows from input that is not"),
+    ("Drift::*", "arithmetic: a result that is not finite follows from input that is not"),
+    ("Rule::is_symmetric", "takes no number"),
+    ("ActionFlow::*", "the implementor's; that of Riccati is tested with its callers"),
+    ("Resets::new", "takes no number"),
+    ("StepView::resets", "takes no number; tests/motions/resets"),
+    ("Stepper::resets", "takes no number; tests/motions/resets"),
+    ("Stepper::pieces", "takes no number; tests/motions/resets"),
+    ("Stepper::has_changed_energy", "takes no number; tests/motions/resets"),
+    ("Ensemble::gradient", "the members' runs and gradients; tests/derivatives/gradients/ensembles"),
+    ("Ensemble::gradient_of", "tests/derivatives/gradients/ensembles"),
+    ("Ensemble::gradient_at", "tests/derivatives/gradients/ensembles"),
+    ("Ensemble::tangent_at", "tests/derivatives/gradients/ensembles"),
+    ("BatchGradient::*", "takes no number"),
+    ("LyapunovExponents::*", "takes no number"),
+    ("Run::lyapunov_exponents", "takes no number"),
+    ("Run::lyapunov_exponents_within", "tests/derivatives/gradients/lyapunov"),
+    ("Integrator::step_jacobian", "tests/derivatives/discrete_tangents"),
+    ("DiscretizationMethod::step_jacobian", "tests/derivatives/discrete_tangents"),
+    ("Integrator::step_formula", "takes no number"),
+    ("DiscretizationMethod::step_formula", "takes no number"),
+    ("Stepper::solved_stages", "takes no number"),
+    ("SolvedStages::*", "takes no number"),
+    ("Stepper::solved_parts", "takes no number"),
+    ("SolvedPart::*", "takes no number"),
+    ("StateDerivative::dot", "arithmetic: a NaN stays one"),
+    ("EndState::event_time", "tests/derivatives/gradients/impacts"),
+    ("EndCovector::zero", "takes no number"),
+    ("EndState::differentiate", "arithmetic: a derivative that is not finite follows from input that is not"),
+    ("Loss::value", "the implementor's"),
+    ("Run::tangent", "tests/derivatives/gradients/invalid_input; the second derivatives here include it"),
+    ("Run::tangent_at", "tests/derivatives/gradients/invalid_input"),
+    ("Run::record", "tests/derivatives/gradients/invalid_input"),
+    ("Run::gradient*", "tests/derivatives/gradients/invalid_input"),
+    ("RecordedRun::*", "tests/derivatives/gradients/invalid_input"),
+    ("Observer::*", "the implementor's; observers with odd requests are in the test of Run::observe"),
+];
+
+pub const TESTS: &[&[InputTest]] = &[
+    boundary::TESTS,
+    derivatives::TESTS,
+    ensembles::TESTS,
+    hamiltonians::TESTS,
+    integrators::TESTS,
+    lagrangians::TESTS,
+    observers::TESTS,
+    runs::TESTS,
+    steppers::TESTS,
+];
+
+/// Times and states to start from, some of them not finite.
+fn starts() -> Vec<(f64, PhasePoint<1>)> {
+    places().into_iter().map(|(t, x)| (t, x.into())).collect()
+}
+
+/// Steps that are accepted.
+const STEPS: [f64; 8] = [1e-300, 1e-12, 0.1, 1e3, 1e300, -1e-12, -0.1, -1e3];

@@ -1,0 +1,67 @@
+//! Invalid input to contact-geom. Its formulas are pointwise: a NaN is returned or refused, never lost.
+
+mod forms;
+mod hamiltonian_systems;
+mod hamiltonians;
+mod lagrangians;
+mod scalars;
+mod switching;
+
+use crate::invalid_input::{Exceptions, InputTest};
+
+pub const EXCEPTIONS: Exceptions = &[
+    ("Lagrangian::closed_*", "the implementor's, and nothing by default"),
+    ("Lagrangian::switching_functions", "the implementor's, and none by default"),
+    ("Lagrangian::structure", "the implementor's, and takes no number"),
+    ("ContactHamiltonian::*", "the implementor's"),
+    ("HamiltonianStructure::of_lagrangian", "takes no number"),
+    ("Lagrangian::hamiltonian_*", "those of OfHamiltonian, whose Hamiltonian is tested"),
+    ("OfHamiltonian::hamiltonian", "takes no number"),
+    ("ParametricHamiltonian::*", "the implementor's; tests/hamiltonians/hamiltonians/derivatives"),
+    ("OneParameterGroup::act", "the implementor's; that of Symmetry is tested with its callers"),
+    ("SystemVisitor::*", "the implementor's"),
+    ("System::*", "the implementor's: constants and samples"),
+    ("ClosedFlow::*", "the implementor's"),
+    ("systems::*", "walk the catalogue, and take no number"),
+    ("Bodies::new", "stores its arguments; every start checks them"),
+    ("Bodies::masses", "takes no number"),
+    ("Chain::free", "takes no number"),
+    ("Duffing::forced", "takes no number"),
+    ("Lienard::initial", "takes no number"),
+    ("VanDerPol::initial", "takes no number"),
+    ("Containers::initial", "takes no number"),
+    ("HeatedOscillator::initial", "takes no number"),
+    ("Piston::initial", "takes no number"),
+    ("SpinOrbit::initial", "takes no number"),
+    ("SpinOrbit::coefficient", "takes the number of a harmonic"),
+    ("Gas::ideal", "takes no number"),
+    ("Gas::van_der_waals", "stores its arguments; every start checks them"),
+    ("VectorField::is_autonomous", "the implementor's, and takes no number"),
+    ("Hints::of_any", "takes no number"),
+    ("Structure::has_constant_rate", "takes no number"),
+    ("Structure::is_affine_in_z", "takes no number"),
+    ("Forced::new", "stores its arguments; every start checks them"),
+    ("Scalar::piecewise", "the caller's function; tables are tested"),
+    ("Statement::*", "takes no number but its own; its test tries all"),
+    ("ChartVector::from_fn", "the caller's function"),
+    (
+        "Parametric::*",
+        "the implementor's; those of the catalogue are compared with differences in tests/derivatives/gradients",
+    ),
+    ("ParametricForce::*", "the implementor's; tests/derivatives/gradients/forces"),
+    ("Surface::parameter*", "the implementor's, and none by default; tests/derivatives/gradients/impacts"),
+    ("Surface::value_at", "the implementor's; tests/derivatives/gradients/impacts"),
+    ("Surface::with_parameters", "the implementor's; tests/derivatives/gradients/impacts"),
+    ("Impact::parameter_name", "takes no number"),
+    ("nearest_name", "takes no number"),
+    ("$name::new", "stores its arguments; check() and every start check them"),
+];
+
+pub const TESTS: &[&[InputTest]] = &[
+    forms::TESTS,
+    hamiltonian_systems::TESTS,
+    hamiltonians::TESTS,
+    lagrangians::TESTS,
+    scalars::TESTS,
+    switching::TESTS,
+];
