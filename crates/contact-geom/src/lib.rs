@@ -28,6 +28,7 @@
 mod dynamics;
 mod error;
 mod forms;
+pub mod groups;
 mod number;
 mod statement;
 pub mod statements;

@@ -31,6 +31,7 @@ pub mod boundary;
 pub mod ensemble;
 mod error;
 pub mod gauss;
+pub mod groups;
 pub mod hamiltonian;
 mod integration;
 mod numbers;
