@@ -28,6 +28,7 @@
 //! The project's `NOTATION.md` lists the symbols and their names in code.
 
 pub mod boundary;
+pub mod constraints;
 pub mod ensemble;
 mod error;
 pub mod gauss;
