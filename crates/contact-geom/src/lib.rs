@@ -28,6 +28,7 @@
 mod dynamics;
 mod error;
 mod forms;
+pub mod groups;
 mod number;
 mod statement;
 pub mod statements;
@@ -42,6 +43,14 @@ pub mod hamiltonian {
     };
 }
 
+/// Constraints: holonomic `c(q) = 0`, and linear in the velocities, `omega(q) v = 0`.
+pub mod constraints {
+    pub use crate::dynamics::constraint::{
+        ConstrainedMotion, Constraint, ConstraintDerivatives, Distribution, DistributionDerivatives, Redundancy,
+        constrained_motion,
+    };
+}
+
 /// Vector spaces of dual parts, and maxima that propagate NaN.
 pub mod numbers {
     pub use crate::number::{
@@ -51,6 +60,7 @@ pub mod numbers {
 
 /// Tools for the other crates of this project: derivatives by dual numbers, seeds, small linear systems, rounding.
 pub mod support {
+    pub use crate::dynamics::constraint::{independent_rows, least_norm, restricted};
     pub use crate::dynamics::nearest_name::nearest_name;
     pub use crate::dynamics::{
         derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, rounding_at_state,

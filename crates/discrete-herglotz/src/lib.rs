@@ -28,9 +28,11 @@
 //! The project's `NOTATION.md` lists the symbols and their names in code.
 
 pub mod boundary;
+pub mod constraints;
 pub mod ensemble;
 mod error;
 pub mod gauss;
+pub mod groups;
 pub mod hamiltonian;
 mod integration;
 mod numbers;

@@ -54,6 +54,7 @@
 mod bad_numbers;
 mod contact;
 mod error;
+pub mod groups;
 mod map;
 mod numerics;
 pub mod principle;

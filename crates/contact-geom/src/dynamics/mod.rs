@@ -4,6 +4,7 @@
 mod action;
 pub(crate) mod blocks;
 mod breaks;
+pub(crate) mod constraint;
 pub(crate) mod contact_hamiltonian;
 mod control;
 mod derivatives;

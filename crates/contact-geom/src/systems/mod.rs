@@ -8,6 +8,7 @@ mod bodies;
 mod chain;
 mod charged_particle;
 mod closed_form;
+pub mod constrained;
 mod coupled_in_z;
 mod coupled_plane;
 mod double_pendulum;

@@ -1,0 +1,313 @@
+//! RATTLE with a linear drag, and its compositions.
+
+use super::start::inverse_mass;
+use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
+use crate::splitting::separable::SeparableForm;
+use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
+use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
+use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+
+/// RATTLE between two halves of a linear drag, `D_(h/2) o RATTLE_h o D_(h/2)`, and its symmetric compositions of order
+/// up to 10, for `L = v.Mv/2 - V(t, q) + gamma z` on `c(q) = 0`, with the current state.
+///
+/// D is the flow of `-gamma z`, `p -> e^(gamma h/2) p`, `z -> e^(gamma h/2) z`. RATTLE with the action is, with
+/// `G = c_q`,
+///
+/// `p_h = p0 - h/2 V_q(q0) + G(q0)^T Y`, `q1 = q0 + h M^-1 p_h`, `c(q1) = 0`,
+/// `p1 = p_h - h/2 V_q(q1) + G(q1)^T Y'`, `G(q1) M^-1 p1 = 0`,
+/// `z1 = z0 + h p_h.M^-1 p_h/2 - h (V(q0) + V(q1))/2`.
+///
+/// Both are conformally contact on `T*N x R`, hence also the step, with `sigma_d = e^(gamma h)` exactly. A step
+/// evaluates one new force, and solves for the M multipliers alone.
+///
+/// Reference: Hairer, Lubich and Wanner, Geometric Numerical Integration, section VII.1.4, for RATTLE.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
+/// use discrete_herglotz::{SplittingScheme, Stepper, constraints::{ConstrainedStart, DragRattle}};
+/// let pendulum = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };
+/// let start = ConstrainedStart::new(VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0));
+/// let mut motion = DragRattle::new(&pendulum, &pendulum, &SplittingScheme::KAHAN_LI_8, 0.1, &start)?;
+/// motion.advance(100)?;
+/// println!("{:?}, tension {}", motion.state(), motion.multipliers()?[0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct DragRattle<L, C, const N: usize, const M: usize> {
+    form: SeparableForm<L, N>,
+    constraint: C,
+    inverse: SMatrix<f64, N, N>,
+    gamma: f64,
+    redundancy: Redundancy,
+    substeps: Vec<f64>,
+    h: f64,
+    t0: f64,
+    taken: usize,
+    state: PhasePoint<N>,
+    sigma: f64,
+    impulse: SVector<f64, M>,
+    evaluations: u64,
+}
+
+/// One step: its final state, and the impulses of the constraints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RattleStep<const N: usize, const M: usize, T = f64> {
+    /// The state `(q, p, z)` at the end.
+    pub end: PhasePoint<N, T>,
+    /// The sum of the impulses `Y + Y'` of all substeps. It vanishes on dependent constraints that were left out.
+    pub impulse: SVector<T, M>,
+}
+
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> DragRattle<L, C, N, M> {
+    /// The motion with steps of the length h from a start, composed by a scheme.
+    ///
+    /// # Errors
+    /// [`ConstraintError`]: a start off the constraints, dependent constraints; and of the Lagrangian: it does not
+    /// claim to be `separable` with a constant rate `L_z`, or is not; a scheme of Runge-Kutta-Nystrom type.
+    pub fn new(
+        lagrangian: L,
+        constraint: C,
+        scheme: &SplittingScheme,
+        h: f64,
+        start: &ConstrainedStart<N>,
+    ) -> Result<Self, ConstraintError> {
+        let Some(substeps) = scheme.substeps() else {
+            let hypothesis = "a composition of symmetric steps, not a Nyström splitting";
+            return Err(InputError::Hypothesis { hypothesis }.into());
+        };
+        let at = start.at;
+        let form = SeparableForm::read(lagrangian, h, start.t, &PhasePoint { q: at.q, p: at.v, z: at.z })?;
+        if !form.lagrangian.structure().has_constant_rate() {
+            let hypothesis = "a drag L_z that is constant";
+            return Err(InputError::Hypothesis { hypothesis }.into());
+        }
+        let at = start.resolved(&form.lagrangian, &constraint)?;
+        let gamma = form.lagrangian.rate(start.t, &at);
+        let p = form.lagrangian.gradient(start.t, &at).y;
+        let inverse = inverse_mass(&form.lagrangian, start.t, &at)?;
+        let motion = DragRattle {
+            form,
+            constraint,
+            inverse,
+            gamma,
+            redundancy: start.redundancy,
+            substeps,
+            h,
+            t0: start.t,
+            taken: 0,
+            state: PhasePoint { q: at.q, p, z: at.z },
+            sigma: 1.0,
+            impulse: SVector::zeros(),
+            evaluations: 0,
+        };
+        // The first step is tried, so that input that cannot be advanced is refused.
+        motion.step(start.t, &motion.state)?;
+        Ok(motion)
+    }
+
+    /// The step from a state on the constraint, over any scalar: on dual numbers it is the step with its derivatives
+    /// along vectors that are tangent to `c(q) = 0`.
+    ///
+    /// # Errors
+    /// [`StepError`]: the multipliers are not found, the constraints are dependent, or a value is not finite.
+    pub fn step<T: Scalar>(&self, t: f64, from: &PhasePoint<N, T>) -> Result<RattleStep<N, M, T>, StepError> {
+        let mut step = RattleStep { end: *from, impulse: SVector::from_fn(|_, _| T::zero()) };
+        let mut time = t;
+        for g in &self.substeps {
+            let h = g * self.h;
+            self.drag(0.5 * h, &mut step.end);
+            self.rattle(time, h, &mut step)?;
+            self.drag(0.5 * h, &mut step.end);
+            time += h;
+        }
+        Ok(step)
+    }
+
+    /// The flow of the drag.
+    fn drag<T: Scalar>(&self, h: f64, x: &mut PhasePoint<N, T>) {
+        let damping = (self.gamma * h).exp_m1();
+        x.p = x.p.map(|p| p + p * damping);
+        x.z += x.z * damping;
+    }
+
+    /// `-V` and `-V_q` at a position.
+    fn kick<T: Scalar>(&self, t: f64, q: &SVector<T, N>) -> (T, SVector<T, N>) {
+        let rest = VelocityPoint { q: *q, v: SVector::from_fn(|_, _| T::zero()), z: T::zero() };
+        self.form.lagrangian.with_force(T::from(t), &rest)
+    }
+
+    /// RATTLE with the action.
+    fn rattle<T: Scalar>(&self, t: f64, h: f64, step: &mut RattleStep<N, M, T>) -> Result<(), StepError> {
+        let PhasePoint { q: q0, mut p, mut z } = step.end;
+        let (value, force) = self.kick(t, &q0);
+        let half = T::from(0.5 * h);
+        p += force * half;
+        z += value * half;
+        let (_, g0) = self.constraint.with_jacobian(&q0);
+        let kept = match self.redundancy {
+            Redundancy::Refuse => [true; M],
+            Redundancy::LeastNorm => independent_rows(&g0.map(|e| e.re())),
+        };
+        // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
+        // method.
+        let responses = self.inverse * g0.map(|e| e.re()).transpose();
+        let mut corrections = Corrections::new();
+        let (mut q, mut c, mut g);
+        loop {
+            q = q0 + times(&self.inverse, &p) * T::from(h);
+            (c, g) = self.constraint.with_jacobian(&q);
+            let matrix = inverted(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
+            mask(&mut c, &kept);
+            let impulse = times(&matrix, &c);
+            let push = g0.transpose() * impulse;
+            p -= push;
+            step.impulse -= impulse;
+            let moved = times(&self.inverse, &push) * T::from(h);
+            if corrections.after(extent(&moved), extent(&q))? == Progress::Ended {
+                q -= moved;
+                break;
+            }
+        }
+        let v = times(&self.inverse, &p);
+        z += p.dot(&v) * half;
+        (_, g) = self.constraint.with_jacobian(&q);
+        let (value, force) = self.kick(t + h, &q);
+        p += force * half;
+        z += value * half;
+        let real = g.map(|e| e.re());
+        let matrix = inverted(restricted(real * self.inverse * real.transpose(), &kept))?;
+        // The second pass completes the derivatives of dual numbers, the third removes round-off.
+        for _ in 0..3 {
+            let mut normal = g * times(&self.inverse, &p);
+            mask(&mut normal, &kept);
+            let impulse = times(&matrix, &normal);
+            p -= g.transpose() * impulse;
+            step.impulse -= impulse;
+        }
+        if self.redundancy == Redundancy::LeastNorm {
+            self.check_dependent(&q)?;
+        }
+        step.end = PhasePoint { q, p, z };
+        let size = extent(&q) + extent(&p) + z.extent();
+        if size.is_finite() { Ok(()) } else { Err(StepError::NonFinite) }
+    }
+
+    /// Checks that the constraints that were left out hold as well.
+    fn check_dependent<T: Scalar>(&self, q: &SVector<T, N>) -> Result<(), StepError> {
+        let q = q.map(|x| x.re());
+        let (c, g) = self.constraint.with_jacobian(&q);
+        let residual = c.amax();
+        let bound = 1e-10 * g.amax() * (1.0 + q.amax());
+        if residual <= bound { Ok(()) } else { Err(StepError::NotConverged { residual, iterations: 0 }) }
+    }
+
+    /// The velocity and the action with the position of the current state.
+    pub fn velocity_point(&self) -> VelocityPoint<N> {
+        VelocityPoint { q: self.state.q, v: self.inverse * self.state.p, z: self.state.z }
+    }
+
+    /// The acceleration and the multipliers of the motion at the current state; the constraint force is `G^T lambda`.
+    /// They are computed from the constrained Herglotz equations at the state, so that they have the accuracy of the
+    /// state. Where the constraints are redundant, the multipliers are those of least norm.
+    ///
+    /// # Errors
+    /// [`GeometryError::Singular`] where the constraints are dependent.
+    pub fn constrained_motion(&self) -> Result<ConstrainedMotion<N, M>, GeometryError> {
+        let x = self.velocity_point();
+        constrained_motion(&self.form.lagrangian, &self.constraint, self.time(), &x, self.redundancy)
+    }
+
+    /// The multipliers alone; see [`constrained_motion`](Self::constrained_motion).
+    ///
+    /// # Errors
+    /// Those of [`constrained_motion`](Self::constrained_motion).
+    pub fn multipliers(&self) -> Result<SVector<f64, M>, GeometryError> {
+        Ok(self.constrained_motion()?.multipliers)
+    }
+
+    /// The impulse of the constraints in the last step, the sum over its substeps: `G^T impulse / h` is a mean of the
+    /// constraint force, of order 2 without a composition. Where the constraints are redundant, the impulse of least
+    /// norm for the Jacobian at the end of the step.
+    ///
+    /// # Errors
+    /// [`GeometryError::Singular`] where the constraints are dependent.
+    pub fn impulse(&self) -> Result<SVector<f64, M>, GeometryError> {
+        if self.redundancy == Redundancy::Refuse {
+            return Ok(self.impulse);
+        }
+        let g = self.constraint.with_jacobian(&self.state.q).1;
+        least_norm(&g, &independent_rows(&g), &self.impulse)
+            .map_err(|e| e.of("c_q c_q^T", "choose a state at which the rank of c_q is that near it"))
+    }
+}
+
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Stepper<N> for DragRattle<L, C, N, M> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
+        for taken in 0..steps {
+            let step = self.step(self.time(), &self.state).map_err(|cause| StepFailure { taken, cause })?;
+            (self.state, self.impulse) = (step.end, step.impulse);
+            self.sigma = (self.gamma * self.h).exp();
+            self.taken += 1;
+            self.evaluations += 2 * self.substeps.len() as u64;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.state
+    }
+
+    fn time(&self) -> f64 {
+        self.t0 + self.taken as f64 * self.h
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn has_constant_rate(&self) -> bool {
+        true
+    }
+}
+
+/// The product of a real matrix with a vector of any numbers.
+pub(super) fn times<T: Scalar, const N: usize>(matrix: &SMatrix<f64, N, N>, x: &SVector<T, N>) -> SVector<T, N> {
+    SVector::from_fn(|i, _| {
+        let mut sum = T::zero();
+        for j in 0..N {
+            // Entries that vanish, as those of a diagonal mass matrix, add nothing.
+            if matrix[(i, j)] != 0.0 {
+                sum += x[j] * matrix[(i, j)];
+            }
+        }
+        sum
+    })
+}
+
+/// The largest value or differential.
+pub(super) fn extent<T: Scalar, const N: usize>(x: &SVector<T, N>) -> f64 {
+    x.iter().fold(0.0, |largest, x| f64::max(largest, x.extent()))
+}
+
+/// Sets the entries of dependent constraints to 0.
+fn mask<T: Scalar, const M: usize>(x: &mut SVector<T, M>, kept: &[bool; M]) {
+    for a in 0..M {
+        if !kept[a] {
+            x[a] = T::zero();
+        }
+    }
+}
+
+/// The inverse of a small matrix.
+fn inverted<const M: usize>(matrix: SMatrix<f64, M, M>) -> Result<SMatrix<f64, M, M>, StepError> {
+    let mut inverse = SMatrix::<f64, M, M>::identity();
+    for mut column in inverse.column_iter_mut() {
+        solve(&mut matrix.clone_owned(), &mut column).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+    }
+    Ok(inverse)
+}

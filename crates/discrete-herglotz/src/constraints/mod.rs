@@ -1,0 +1,77 @@
+//! Motions under constraints: holonomic, `c(q) = 0`, and linear in the velocities, `omega(q) v = 0`.
+//!
+//! - [`DragRattle`]: RATTLE between two halves of a linear drag, for separable Lagrangians; conformally contact with the
+//!   factor `e^(gamma h)`, explicit but for the multipliers, composed to order 10.
+//! - [`ContactLobatto`]: the partitioned Lobatto IIIA-IIIB method of order 2s - 2 on the symplectified motion, for any
+//!   Lagrangian; conformally contact.
+//! - [`Nonholonomic`]: the discrete Lagrange-d'Alembert-Herglotz equations of any symmetric discrete Lagrangian, of
+//!   order 2, and their compositions.
+
+mod drag_rattle;
+mod error;
+mod linear_system;
+mod lobatto;
+mod lobatto_tables;
+mod nonholonomic;
+mod start;
+
+pub use drag_rattle::{DragRattle, RattleStep};
+pub use error::ConstraintError;
+pub use lobatto::{ContactLobatto, LobattoStep};
+pub use nonholonomic::Nonholonomic;
+pub use start::{ConstrainedStart, OffConstraint};
+
+use crate::StepError;
+
+/// The bound on the iterations of a step. Newton's method needs less than ten.
+const MAX_ITERATIONS: u32 = 50;
+
+/// The test of an iteration that is continued until its corrections are round-off.
+#[derive(Clone, Copy, Debug)]
+struct Corrections {
+    before: f64,
+    taken: u32,
+}
+
+/// What a correction shows about an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// It continues.
+    Continues,
+    /// It continues, but slowly: its matrix is to be evaluated again.
+    Slow,
+    /// The correction was round-off: it was the last one.
+    Ended,
+}
+
+impl Corrections {
+    fn new() -> Self {
+        Corrections { before: f64::INFINITY, taken: 0 }
+    }
+
+    /// The progress after a correction of this size of quantities of the given scale.
+    fn after(&mut self, size: f64, scale: f64) -> Result<Progress, StepError> {
+        self.taken += 1;
+        if !(size.is_finite() && scale.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        // A correction that stops decreasing below this is the round-off of the equations.
+        const SETTLED: f64 = 1e-9;
+        if size <= f64::EPSILON * scale || (size >= 0.5 * self.before && size <= SETTLED * scale) {
+            return Ok(Progress::Ended);
+        }
+        if self.taken >= MAX_ITERATIONS {
+            return Err(StepError::NotConverged { residual: size, iterations: self.taken });
+        }
+        let slow = size > 0.1 * self.before;
+        self.before = size;
+        Ok(if slow { Progress::Slow } else { Progress::Continues })
+    }
+}
+
+/// The scale to which corrections of velocities are compared: their size, or for smaller ones that which moves a
+/// position by a millionth of it in a step, since the round-off of velocities that are computed from positions is that of
+/// the positions, divided by h.
+fn velocity_scale(velocity: f64, position: f64, h: f64) -> f64 {
+    velocity.max(1e-6 * position / h.abs()).max(f64::MIN_POSITIVE)
+}

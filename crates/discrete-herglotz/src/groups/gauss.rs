@@ -1,0 +1,180 @@
+//! Contact Gauss collocation on Lie groups.
+
+use super::stages::{Given, Stages, Table};
+use super::{GroupIntegrator, GroupState, GroupStep};
+use crate::gauss::MAX_STAGES;
+use crate::gauss::tables::coefficients::Coefficients;
+use contact_geom::Scalar;
+use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup};
+use contact_geom::nalgebra::SVector;
+use std::f64::consts::PI;
+
+/// Contact Gauss collocation with s stages, of order 2s, for a regular Lagrangian `l(t, g, xi, z)` on a Lie group.
+///
+/// Its discrete Lagrangian is the critical value S of collocation from 0 to `xi1 = log(g0^-1 g1)` in the chart
+/// `xi -> g0 exp(xi)`. With the momentum p1 of that chart at xi1 and `f = exp(xi1)`, the two discrete Legendre
+/// transformations are
+///
+/// `Pi1 = dexp_xi1^-T p1`, `sigma_d Pi0 = Ad_(f^-1)^T Pi1 - d_c S`,
+///
+/// where `d_c S = h sum_j b_j R_j Ad_(exp -Xi_j)^T l_g` is the derivative of S in the centre g0 of the chart. The flow
+/// is conformally contact, and momenta of symmetries scale by `sigma_d`, up to round-off. For a constant rate gamma the
+/// factor `e^(gamma t)` is integrated exactly: `sigma_d = e^(gamma h)`.
+#[derive(Clone, Debug)]
+pub struct GroupGauss<L> {
+    lagrangian: L,
+    table: Table,
+    h: f64,
+    /// The factors `rho_k/rho_1` at the nodes and `sigma_d - 1`, for a constant rate.
+    constant: Option<([f64; MAX_STAGES], f64)>,
+}
+
+/// The largest number of sweeps of the fixed-point iteration.
+const SWEEPS: u32 = 200;
+
+/// Sweeps without progress, close to the solution, until the iteration has reached round-off.
+const STAGNANT: u32 = 3;
+
+impl<L> GroupGauss<L> {
+    /// The method with `stages` from 1 to 16 and the step h.
+    ///
+    /// # Errors
+    /// [`GroupError::Stages`], [`GroupError::Step`].
+    pub fn new<G: LieGroup<N>, const N: usize>(lagrangian: L, stages: usize, h: f64) -> Result<Self, GroupError>
+    where
+        L: GroupLagrangian<G, N>,
+    {
+        if stages == 0 || stages > MAX_STAGES {
+            return Err(GroupError::Stages { found: stages });
+        }
+        if !(h.is_finite() && h != 0.0) {
+            return Err(GroupError::Step { h });
+        }
+        let exact = Coefficients::of(stages);
+        let (b, c) = (exact.b.map(|x| x.0), exact.c.map(|x| x.0));
+        let table = Table { s: stages, a: exact.a.map(|row| row.map(|x| x.0)), b, c, end: exact.ends[1] };
+        let constant = lagrangian.constant_rate().map(|gamma| {
+            let rho = c.map(|c| (gamma * h * (1.0 - c)).exp());
+            (rho, (gamma * h).exp_m1())
+        });
+        Ok(GroupGauss { lagrangian, table, h, constant })
+    }
+
+    /// The Lagrangian.
+    pub fn lagrangian(&self) -> &L {
+        &self.lagrangian
+    }
+
+    /// The number of stages s; the order is 2s.
+    pub fn stages(&self) -> usize {
+        self.table.s
+    }
+}
+
+/// The largest component in size, differentials included.
+fn extent<T: Scalar, const N: usize>(x: &SVector<T, N>) -> f64 {
+    x.iter().fold(0.0, |size, x| {
+        let extent = x.extent();
+        if extent <= size { size } else { extent }
+    })
+}
+
+impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G, N> for GroupGauss<L> {
+    fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// Solves the stage equations by fixed-point iteration to round-off, from a constant body velocity.
+    fn step<T: Scalar>(
+        &self,
+        t: f64,
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError> {
+        let angle = |xi: &SVector<T, N>| G::angle(&xi.map(|x| x.re()));
+        let beyond = |angle: f64| GroupError::BeyondChart { h: self.h, angle, largest: PI * self.h.abs() / angle };
+        let first = angle(&(*velocity * T::from(self.h)));
+        if first >= PI {
+            return Err(beyond(first));
+        }
+        let given = Given {
+            lagrangian: &self.lagrangian,
+            table: &self.table,
+            constant: self.constant,
+            t,
+            h: self.h,
+            g0: from.g,
+            momentum: from.momentum,
+            z0: from.z,
+        };
+        let mut stages = Stages::<G, N, T>::guess(velocity);
+        if let Some((rho, sigma_minus_one)) = self.constant {
+            (stages.rho, stages.sigma_minus_one) = (rho.map(T::from), T::from(sigma_minus_one));
+        }
+        let (mut smallest, mut stagnant) = (f64::INFINITY, 0);
+        for iterations in 1..=SWEEPS {
+            let change = stages.sweep(&given)?;
+            let size = stages.v[..self.table.s].iter().fold(f64::MIN_POSITIVE, |size, v| size.max(extent(v)));
+            if !change.is_finite() {
+                return Err(GroupError::NotConverged { iterations, change });
+            }
+            // The iteration is at round-off once its changes are negligible, or small and no longer decreasing.
+            stagnant = if change < 0.9 * smallest { 0 } else { stagnant + 1 };
+            if change < smallest {
+                smallest = change;
+            }
+            let negligible = change <= 0.0625 * f64::EPSILON * size;
+            if negligible || (change <= 64.0 * f64::EPSILON * size && stagnant >= STAGNANT) {
+                return self.end(&given, stages);
+            }
+            if iterations == SWEEPS {
+                return Err(GroupError::NotConverged { iterations, change });
+            }
+        }
+        Err(GroupError::NotConverged { iterations: SWEEPS, change: smallest })
+    }
+
+    fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError> {
+        let mut xi = SVector::<f64, N>::zeros();
+        let mut change = f64::INFINITY;
+        for _ in 0..50 {
+            let residual = from.momentum - self.lagrangian.partials(t, &from.g, &xi, from.z).momentum;
+            let step = self
+                .lagrangian
+                .solve_mass(t, &from.g, &xi, from.z, &residual)
+                .map_err(|singular| GroupError::Singular { pivot: singular.pivot })?;
+            xi += step;
+            change = extent(&step);
+            // The velocity is a guess; Newton's method is quadratic.
+            if change <= 1e-8 * extent(&xi) {
+                return Ok(xi);
+            }
+        }
+        Err(GroupError::NotConverged { iterations: 50, change })
+    }
+}
+
+impl<L> GroupGauss<L> {
+    /// The step from the solved stages.
+    fn end<G: LieGroup<N>, const N: usize, T: Scalar>(
+        &self,
+        given: &Given<'_, L, G::Element<T>, N, T>,
+        stages: Stages<G, N, T>,
+    ) -> Result<GroupStep<N, T>, GroupError> {
+        let sigma = stages.sigma_minus_one.re() + 1.0;
+        if sigma <= 0.0 || stages.rho[..self.table.s].iter().any(|rho| rho.re() <= 0.0) {
+            return Err(GroupError::SigmaVanished { sigma });
+        }
+        let angle = G::angle(&stages.increment.map(|x| x.re()));
+        if angle >= PI {
+            return Err(GroupError::BeyondChart { h: self.h, angle, largest: PI * self.h.abs() / angle });
+        }
+        Ok(GroupStep {
+            increment: stages.increment,
+            impulse: stages.impulse,
+            sigma_minus_one: stages.sigma_minus_one,
+            action: stages.action(given),
+            velocity: stages.end_velocity(&self.table),
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! States on T\*G x R, and steps.
+
+use contact_geom::Scalar;
+use contact_geom::groups::{GroupError, LieGroup};
+use contact_geom::nalgebra::SVector;
+
+/// A point `(g, Pi, z)` of T\*G x R, with the body momentum Pi.
+#[derive(Debug)]
+pub struct GroupState<G: LieGroup<N>, const N: usize, T: Scalar = f64> {
+    /// The configuration.
+    pub g: G::Element<T>,
+    /// The body momentum `Pi = l_xi`.
+    pub momentum: SVector<T, N>,
+    /// The action.
+    pub z: T,
+}
+
+// Derived implementations would require those of G, which has no values.
+impl<G: LieGroup<N>, const N: usize, T: Scalar> Clone for GroupState<G, N, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<G: LieGroup<N>, const N: usize, T: Scalar> Copy for GroupState<G, N, T> {}
+
+impl<G: LieGroup<N>, const N: usize, T: Scalar> PartialEq for GroupState<G, N, T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.g == other.g && self.momentum == other.momentum && self.z == other.z
+    }
+}
+
+impl<G: LieGroup<N>, const N: usize, T: Scalar> GroupState<G, N, T> {
+    /// The spatial momentum `Ad_(g^-1)^T Pi`.
+    pub fn spatial_momentum(&self) -> SVector<T, N> {
+        G::coadjoint(&G::inverse(&self.g), &self.momentum)
+    }
+
+    /// The state after a step.
+    pub fn after(&self, step: &GroupStep<N, T>) -> Self {
+        let f = G::exp(&step.increment);
+        let momentum = self.momentum + self.momentum * step.sigma_minus_one + step.impulse;
+        GroupState { g: G::compose(&self.g, &f), momentum: G::coadjoint(&f, &momentum), z: self.z + step.action }
+    }
+}
+
+impl<G: LieGroup<N>, const N: usize> GroupState<G, N> {
+    /// Checks that the state is finite and its configuration is an element of the group.
+    ///
+    /// # Errors
+    /// [`GroupError::NonFinite`], [`GroupError::NonUnitQuaternion`].
+    pub fn check(&self) -> Result<(), GroupError> {
+        G::check(&self.g)?;
+        if let Some(&value) = self.momentum.iter().find(|x| !x.is_finite()) {
+            return Err(GroupError::NonFinite { what: "an entry of the momentum", value });
+        }
+        if self.z.is_finite() { Ok(()) } else { Err(GroupError::NonFinite { what: "the action z", value: self.z }) }
+    }
+}
+
+/// What a step does to a state: `g1 = g0 exp(increment)`, `Pi1 = Ad_f^T (sigma_d Pi0 + impulse)` with
+/// `f = exp(increment)`, `z1 = z0 + action`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupStep<const N: usize, T = f64> {
+    /// `xi1 = log(g0^-1 g1)`.
+    pub increment: SVector<T, N>,
+    /// The impulse `d_c S` of the forces, at g0 in the body; 0 if the Lagrangian is left-invariant.
+    pub impulse: SVector<T, N>,
+    /// `sigma_d - 1`.
+    pub sigma_minus_one: T,
+    /// `z1 - z0`, the value of the discrete Lagrangian.
+    pub action: T,
+    /// The body velocity at the end of the step, by extrapolation.
+    pub velocity: SVector<T, N>,
+}
+
+/// An integrator of a Lagrangian on a Lie group, with a step of its own.
+pub trait GroupIntegrator<G: LieGroup<N>, const N: usize> {
+    /// The step h.
+    fn step_size(&self) -> f64;
+
+    /// A step from a state at time t. The velocity is a guess of the body velocity there, which an explicit method does
+    /// not use.
+    ///
+    /// # Errors
+    /// Those of the method.
+    fn step<T: Scalar>(
+        &self,
+        t: f64,
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError>;
+
+    /// A guess of the body velocity at a state.
+    ///
+    /// # Errors
+    /// [`GroupError::Singular`], [`GroupError::NotConverged`] where the momentum belongs to no velocity.
+    fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError>;
+}
