@@ -2,8 +2,10 @@
 //! formulas return a number that is not finite for such input, or refuse it.
 
 mod boundary;
+mod constraints;
 mod derivatives;
 mod ensembles;
+mod groups;
 mod hamiltonians;
 mod integrators;
 mod lagrangians;
@@ -23,6 +25,15 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Polynomial::coefficients", "the implementor's"),
     ("TypeTwo::*", "the implementor's; those of Euler are tested with the steps"),
     ("TypeThree::*", "the implementor's; those of Euler are tested with the steps"),
+    ("GroupGauss::lagrangian", "takes no number"),
+    ("GroupGauss::stages", "takes no number"),
+    ("GroupIntegrator::step_size", "takes no number"),
+    ("GroupIntegrator::velocity", "is tested with the first step of a motion"),
+    ("GroupMotion::initial_time", "takes no number"),
+    ("GroupMotion::t", "takes no number"),
+    ("GroupState::after", "arithmetic: a result that is not finite follows from input that is not"),
+    ("GroupState::spatial_momentum", "arithmetic: a result that is not finite follows from input that is not"),
+    ("RigidBodySplitting::body", "takes no number"),
     ("Progress::new", "takes no number"),
     ("BracketSeries::degree", "takes no number"),
     ("BracketSeries::terms", "takes no number"),
@@ -89,8 +100,10 @@ pub const EXCEPTIONS: Exceptions = &[
 
 pub const TESTS: &[&[InputTest]] = &[
     boundary::TESTS,
+    constraints::TESTS,
     derivatives::TESTS,
     ensembles::TESTS,
+    groups::TESTS,
     hamiltonians::TESTS,
     integrators::TESTS,
     lagrangians::TESTS,

@@ -1,6 +1,8 @@
 //! Invalid input to contact-geom. Its formulas are pointwise: a NaN is returned or refused, never lost.
 
+mod constraints;
 mod forms;
+mod groups;
 mod hamiltonian_systems;
 mod hamiltonians;
 mod lagrangians;
@@ -19,6 +21,22 @@ pub const EXCEPTIONS: Exceptions = &[
     ("OfHamiltonian::hamiltonian", "takes no number"),
     ("ParametricHamiltonian::*", "the implementor's; tests/hamiltonians/hamiltonians/derivatives"),
     ("OneParameterGroup::act", "the implementor's; that of Symmetry is tested with its callers"),
+    ("Constraint::value", "the implementor's"),
+    ("Distribution::omega", "the implementor's"),
+    ("GroupLagrangian::constant_rate", "the implementor's, and takes no number"),
+    ("GroupLagrangian::value", "the implementor's; that of RigidBody is tested by its partials"),
+    ("GroupPotential::value", "the implementor's; that of UniformGravity is tested with its gradient"),
+    ("Inertia::axes", "takes no number"),
+    ("Inertia::matrix", "takes no number"),
+    ("Inertia::moments", "takes no number"),
+    ("LieGroup::advance", "its sums are tested with GroupMotion::advance"),
+    ("LieGroup::angle", "a norm"),
+    ("LieGroup::identity", "takes no number"),
+    ("LieGroup::lift", "takes the caller's function"),
+    ("LieGroup::null", "takes no number"),
+    ("RigidBody::gamma", "takes no number"),
+    ("RigidBody::mass", "takes no number"),
+    ("RigidBody::potential", "takes no number"),
     ("SystemVisitor::*", "the implementor's"),
     ("System::*", "the implementor's: constants and samples"),
     ("ClosedFlow::*", "the implementor's"),
@@ -58,7 +76,9 @@ pub const EXCEPTIONS: Exceptions = &[
 ];
 
 pub const TESTS: &[&[InputTest]] = &[
+    constraints::TESTS,
     forms::TESTS,
+    groups::TESTS,
     hamiltonian_systems::TESTS,
     hamiltonians::TESTS,
     lagrangians::TESTS,

@@ -52,6 +52,9 @@ impl Inertia {
             }
             (eigen.eigenvalues, axes)
         };
+        if let Some(&value) = moments.iter().find(|x| !x.is_finite()) {
+            return Err(GroupError::NonFinite { what: "a principal moment of inertia", value });
+        }
         let mut sorted = [moments[0], moments[1], moments[2]];
         sorted.sort_by(f64::total_cmp);
         if sorted[0] <= 0.0 {

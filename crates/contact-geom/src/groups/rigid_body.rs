@@ -69,7 +69,7 @@ impl<V, const N: usize> RigidBody<V, N> {
         let dynamic = dynamic_matrix(&mass);
         let smallest = SymmetricEigen::new(dynamic.clone()).eigenvalues.min();
         let not_positive = GroupError::NotPositive { what: "mass matrix", smallest };
-        if smallest <= 0.0 {
+        if smallest.is_nan() || smallest <= 0.0 {
             return Err(not_positive);
         }
         let inverse = dynamic.try_inverse().ok_or(not_positive)?;

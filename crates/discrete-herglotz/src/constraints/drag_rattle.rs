@@ -6,6 +6,7 @@ use crate::splitting::separable::SeparableForm;
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
 use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
@@ -197,8 +198,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
     fn check_dependent<T: Scalar>(&self, q: &SVector<T, N>) -> Result<(), StepError> {
         let q = q.map(|x| x.re());
         let (c, g) = self.constraint.with_jacobian(&q);
-        let residual = c.amax();
-        let bound = 1e-10 * g.amax() * (1.0 + q.amax());
+        let residual = c.max_abs_or_nan();
+        let bound = 1e-10 * g.max_abs_or_nan() * (1.0 + q.max_abs_or_nan());
         if residual <= bound { Ok(()) } else { Err(StepError::NotConverged { residual, iterations: 0 }) }
     }
 
@@ -291,7 +292,7 @@ pub(super) fn times<T: Scalar, const N: usize>(matrix: &SMatrix<f64, N, N>, x: &
 
 /// The largest value or differential.
 pub(super) fn extent<T: Scalar, const N: usize>(x: &SVector<T, N>) -> f64 {
-    x.iter().fold(0.0, |largest, x| f64::max(largest, x.extent()))
+    x.iter().fold(0.0, |largest, x| f64::max_or_nan(largest, x.extent()))
 }
 
 /// Sets the entries of dependent constraints to 0.

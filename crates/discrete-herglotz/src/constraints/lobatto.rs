@@ -7,6 +7,7 @@ use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_s
 use crate::{InputError, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::support::independent_rows;
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
@@ -412,7 +413,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         }
         if self.redundancy == Redundancy::LeastNorm {
             let residual = extent(&end.c.map(|c| T::from(c.re())));
-            if residual > 1e-10 * real.amax() * (1.0 + extent(&end.q)) {
+            if residual > 1e-10 * real.max_abs_or_nan() * (1.0 + extent(&end.q)) {
                 return Err(StepError::NotConverged { residual, iterations: 0 });
             }
         }

@@ -3,6 +3,7 @@
 use super::{ConstraintError, Corrections, Progress};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::support::{independent_rows, linear::solve, restricted};
 use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, VelocityPoint};
 
@@ -68,7 +69,7 @@ impl<const N: usize> ConstrainedStart<N> {
             }
         }
         match self.off_constraint {
-            OffConstraint::Refuse if step.amax() > round_off(&x.q) => {
+            OffConstraint::Refuse if exceeds(&step, round_off(&x.q)) => {
                 return Err(ConstraintError::OffConstraint { distance: step.norm(), index, value });
             }
             OffConstraint::Refuse => {}
@@ -81,7 +82,7 @@ impl<const N: usize> ConstrainedStart<N> {
         let largest =
             c.iter().enumerate().fold((0, 0.0), |m, (a, c)| if c.abs() > f64::abs(m.1) { (a, *c) } else { m });
         // Dependent constraints that contradict the others are not reached by the projection.
-        if largest.1.abs() > 1e-9 * (g.amax() * (1.0 + x.q.amax())) {
+        if exceeds(&c, 1e-9 * (g.max_abs_or_nan() * (1.0 + x.q.max_abs_or_nan()))) {
             return Err(ConstraintError::OffConstraint { distance: f64::INFINITY, index: largest.0, value: largest.1 });
         }
         x.v = tangent_velocity(&g, &inverse_mass(lagrangian, self.t, &x)?, &kept, x.v, self.off_constraint)?;
@@ -109,7 +110,7 @@ pub(super) fn tangent_velocity<const N: usize, const M: usize>(
 ) -> Result<SVector<f64, N>, ConstraintError> {
     let step = correction(g, inverse, kept, &(g * v))?;
     match off {
-        OffConstraint::Refuse if step.amax() > round_off(&v) => {
+        OffConstraint::Refuse if exceeds(&step, round_off(&v)) => {
             Err(ConstraintError::OffVelocity { distance: step.norm() })
         }
         OffConstraint::Refuse => Ok(v),
@@ -120,9 +121,15 @@ pub(super) fn tangent_velocity<const N: usize, const M: usize>(
     }
 }
 
+/// Whether an entry is larger than a bound, or one of them is not a number.
+fn exceeds<const K: usize>(x: &SVector<f64, K>, bound: f64) -> bool {
+    let size = x.max_abs_or_nan();
+    size.is_nan() || bound.is_nan() || size > bound
+}
+
 /// The size of corrections that count as round-off of a start.
 fn round_off<const N: usize>(x: &SVector<f64, N>) -> f64 {
-    64.0 * f64::EPSILON * x.amax()
+    64.0 * f64::EPSILON * x.max_abs_or_nan()
 }
 
 /// The inverse of `W = L_vv` at a point.
@@ -164,7 +171,7 @@ fn projected<const N: usize, const M: usize>(
         let (c, g) = constraint.with_jacobian(&q);
         let step = correction(&g, inverse, kept, &c)?;
         q -= step;
-        match corrections.after(step.amax(), q.amax()) {
+        match corrections.after(step.max_abs_or_nan(), q.max_abs_or_nan()) {
             Ok(Progress::Ended) => return Ok(q),
             Ok(_) => {}
             Err(_) => return Err(ConstraintError::NotProjected { distance: step.norm() }),
@@ -183,12 +190,12 @@ fn check_redundant<const N: usize, const M: usize>(
     let generic = SVector::<f64, N>::from_fn(|i, _| 1.0 + ((i + 1) as f64 * std::f64::consts::SQRT_2).fract());
     let g = constraint.with_jacobian(q).1;
     let tangent = generic - correction(&g, inverse, kept, &(g * generic))?;
-    let size = 1e-2 * (1.0 + q.amax()) / (1.0 + tangent.amax());
+    let size = 1e-2 * (1.0 + q.max_abs_or_nan()) / (1.0 + tangent.max_abs_or_nan());
     let near = projected(constraint, inverse, kept, q + tangent * size)?;
     let (c, g) = constraint.with_jacobian(&near);
     let rank = kept.iter().filter(|kept| **kept).count();
     // A constraint that is only tangent there has a value of the order of the square of the distance.
-    let scale = g.amax() * (1.0 + near.amax());
+    let scale = g.max_abs_or_nan() * (1.0 + near.max_abs_or_nan());
     let violated = (0..M).find(|a| c[*a].abs() > 1e-10 * scale);
     let violated = violated.or_else(|| {
         let there = independent_rows(&g);

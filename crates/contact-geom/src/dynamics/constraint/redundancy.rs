@@ -1,5 +1,6 @@
 //! Dependent constraints: independent rows of a Jacobian, and multipliers of least norm.
 
+use crate::numbers::max_abs_or_nan;
 use crate::support::linear::{SingularMatrix, solve};
 use nalgebra::{SMatrix, SVector};
 
@@ -23,7 +24,11 @@ pub enum Redundancy {
 /// pivoting, relative to the norms of the rows).
 pub fn independent_rows<const N: usize, const M: usize>(matrix: &SMatrix<f64, M, N>) -> [bool; M] {
     let norms: [f64; M] = std::array::from_fn(|a| matrix.row(a).norm());
-    let largest = norms.iter().copied().fold(0.0, f64::max);
+    if !norms.iter().all(|norm| norm.is_finite()) {
+        // Nothing is said about a matrix that is not finite: no row is left out, so that what is computed with it is not finite.
+        return [true; M];
+    }
+    let largest = max_abs_or_nan(norms);
     let mut rest = *matrix;
     let mut independent = [false; M];
     for _ in 0..M.min(N) {

@@ -1,0 +1,97 @@
+//! Invalid input to motions on Lie groups: starts and steps that are not finite are refused, and a step that fails leaves
+//! the state before it.
+
+use crate::invalid_input::InputTest;
+use crate::invalid_input::numbers::{EXTREME, Report};
+use contact_geom::groups::{GroupError, Inertia, LieGroup, RigidBody, Rotation, Rotations, UniformGravity};
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::SplittingScheme;
+use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupMotion, GroupState, RigidBodySplitting};
+
+pub const TESTS: &[InputTest] = &[
+    InputTest {
+        entries: &[
+            "GroupIntegrator::step",
+            "GroupMotion::advance",
+            "GroupMotion::log_factor",
+            "GroupMotion::new",
+            "GroupMotion::spatial_momentum",
+            "GroupMotion::state",
+            "GroupState::check",
+        ],
+        run: starts,
+    },
+    InputTest { entries: &["GroupGauss::new", "RigidBodySplitting::new"], run: methods },
+];
+
+fn body(gamma: f64) -> Result<RigidBody<UniformGravity, 3>, GroupError> {
+    let gravity = UniformGravity { weight: [0.0, 0.0, -9.81], centre: [0.0, 0.5, 0.0] };
+    RigidBody::rotating(&Inertia::principal([1.0, 0.5, 1.0])?, gravity, gamma)
+}
+
+/// A start from a quaternion, a momentum and an action.
+fn start(c: [f64; 8]) -> GroupState<Rotations, 3> {
+    let g = Rotation { w: c[0], u: SVector::from([c[1], c[2], c[3]]) };
+    GroupState { g, momentum: SVector::from([c[4], c[5], c[6]]), z: c[7] }
+}
+
+const GOOD: [f64; 8] = [1.0, 0.0, 0.0, 0.0, 0.3, 2.0, -0.4, 0.1];
+
+/// Ten steps: all numbers of the motion at their end.
+fn advanced(
+    t: f64,
+    from: GroupState<Rotations, 3>,
+    method: &impl GroupIntegrator<Rotations, 3>,
+) -> Result<Vec<f64>, GroupError> {
+    let mut motion = GroupMotion::<Rotations, 3>::new(t, from)?;
+    motion.advance(method, 10)?;
+    let end = motion.state();
+    end.check()?;
+    let momenta = end.momentum.iter().chain(motion.spatial_momentum().iter());
+    Ok(momenta.copied().chain(end.g.quaternion()).chain([end.z, motion.t(), motion.log_factor()]).collect())
+}
+
+fn starts(report: &mut Report) {
+    let method = body(-0.1).and_then(|body| GroupGauss::new::<Rotations, 3>(body, 3, 0.05));
+    let splitting = body(-0.1).and_then(|body| RigidBodySplitting::new(body, SplittingScheme::STRANG, 0.05));
+    let (Ok(method), Ok(splitting)) = (method, splitting) else {
+        return report.check(false, || "good methods are refused".into());
+    };
+    for value in EXTREME {
+        for i in 0..8 {
+            let c: [f64; 8] = std::array::from_fn(|j| if i == j { value } else { GOOD[j] });
+            report.entry_point(&c.to_vec(), start(c).check());
+            report.entry_point(&c.to_vec(), advanced(0.0, start(c), &method));
+            report.entry_point(&c.to_vec(), advanced(0.0, start(c), &splitting));
+        }
+        report.entry_point(&value, advanced(value, start(GOOD), &method));
+    }
+    // A body that turns by more than the chart has in a step: refused, at the start of the step.
+    let fast = start([1.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0]);
+    let Ok(mut motion) = GroupMotion::<Rotations, 3>::new(0.0, fast) else {
+        return report.check(false, || "a good start is refused".into());
+    };
+    let failed = motion.advance(&method, 1);
+    report.check(failed.is_err() && motion.state() == fast && motion.t() == 0.0, || format!("{failed:?}"));
+}
+
+fn methods(report: &mut Report) {
+    for value in EXTREME {
+        let gauss = body(-0.1).and_then(|body| GroupGauss::new::<Rotations, 3>(body, 2, value));
+        report.entry_point(&value, gauss.and_then(|method| advanced(0.0, start(GOOD), &method)));
+        let splitting = body(-0.1).and_then(|body| RigidBodySplitting::new(body, SplittingScheme::STRANG, value));
+        report.entry_point(&value, splitting.and_then(|method| advanced(0.0, start(GOOD), &method)));
+        let drag = body(value).and_then(|body| GroupGauss::new::<Rotations, 3>(body, 2, 0.05));
+        report.entry_point(&value, drag.and_then(|method| advanced(0.0, start(GOOD), &method)));
+    }
+    for stages in [0, 17, usize::MAX] {
+        let refused = body(-0.1).and_then(|body| GroupGauss::new::<Rotations, 3>(body, stages, 0.1));
+        report.check(matches!(refused, Err(GroupError::Stages { .. })), || format!("{stages} stages"));
+    }
+    let unsymmetric = Inertia::principal([1.0, 2.0, 2.5]).and_then(|inertia| {
+        let gravity = UniformGravity { weight: [0.0, 0.0, -1.0], centre: [0.0, 0.5, 0.0] };
+        RigidBodySplitting::new(RigidBody::rotating(&inertia, gravity, 0.0)?, SplittingScheme::BLANES_MOAN_6, 0.1)
+    });
+    let named = matches!(unsymmetric, Err(GroupError::NeedsComposition { .. }));
+    report.check(named, || "a Nyström scheme for a body without symmetry".into());
+}
