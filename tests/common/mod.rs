@@ -7,10 +7,6 @@ pub mod gauss;
 pub mod lagrangians;
 pub mod oracle;
 
-use contact_geom::systems::{
-    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, QuadraticInZ, SystemVisitor,
-    TwoCoordinates,
-};
 use contact_geom::{
     ChartVector, DiscretePoint, PhasePoint, VelocityPoint,
     numbers::{MaxAbsOrNan, MaxOrNan},
@@ -77,15 +73,4 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
 pub fn relative_distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
     ChartVector::from(a).minus(b.into()).max_abs_or_nan()
         / ChartVector::from(a).max_abs_or_nan().max_or_nan(ChartVector::from(b).max_abs_or_nan())
-}
-
-/// Visits one system of each kind of structure, for tests of integrators, which take long to compile: linear,
-/// separable, time dependent, nonlinear in z, with a mass matrix that depends on q, and on q, v and z.
-pub fn visit_kinds(visitor: &mut impl SystemVisitor) {
-    visitor.visit(&OneCoordinate::from(HarmonicOscillator::default()));
-    visitor.visit(&Kepler::<2>::default());
-    visitor.visit(&OneCoordinate::from(Duffing::forced()));
-    visitor.visit(&OneCoordinate::from(QuadraticInZ::default()));
-    visitor.visit(&TwoCoordinates::from(DoublePendulum::default()));
-    visitor.visit(&TwoCoordinates::from(CoupledPlane::default()));
 }

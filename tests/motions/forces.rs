@@ -4,6 +4,7 @@ use crate::boundary_paths::forces::{Mixing, Quadratic, Wall};
 use crate::common::forces::{AnyForce, Drag, Swirl, Undeclared};
 use crate::integrators::forces::splittings::{FalseForce, SwirlAndDrag};
 use crate::lagrangians::{One, Two};
+use crate::paper::forces::Central;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Force, ForceStructure, Forced, Scalar, VelocityPoint, statements};
 
@@ -37,6 +38,7 @@ forces! {
     /// The forces.
     Applied {
         Any(AnyForce),
+        Central(Central),
         OfStatements(statements::AnyForce),
         Drag(Drag),
         False(FalseForce),

@@ -1,6 +1,6 @@
 //! The Lagrangians of these tests as one type for each number of coordinates, so that each integrator is compiled once.
 //! Those with switching functions are types of their own: they have further code in each step, which others do not need.
-//! Kepler's problem is not among them: its time transformation would be compiled for all.
+//! Kepler's problem is among them without its time transformation, which would be compiled for all.
 
 use crate::boundary_paths::conjugate_points::Uncoupled;
 use crate::boundary_paths::end_conditions;
@@ -35,9 +35,12 @@ use crate::resets::breaks;
 use crate::resets::campaign::{Flight, Slope};
 use crate::resets::impacts::{self, High, Piston};
 use crate::resets::runs::Walls;
-use contact_geom::lagrangian_enum;
 use contact_geom::switching::{Breaks, Impacts};
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, TwoCoordinates, UniformField};
+use contact_geom::systems::{
+    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
+    TwoCoordinates, UniformField,
+};
+use contact_geom::{Lagrangian, lagrangian_enum};
 
 lagrangian_enum! {
     /// One coordinate.
@@ -93,7 +96,8 @@ lagrangian_enum! {
     #[derive(Clone, Copy, Debug)]
     pub enum Two<2> {
         Catalogue(TwoCoordinates),
-        KeplerWithoutTransformation(WithGradientAndStructure<Kepler<2>>),
+        Kepler(WithGradientAndStructure<Kepler<2>>),
+        KeplerOfOtherStructure(WithStructure<Kepler<2>>),
         Fall(Fall),
         Charge(Charge),
         Crossed(Crossed),
@@ -142,7 +146,28 @@ pub fn one(system: impl Into<OneCoordinate>) -> One {
     One::Catalogue(system.into())
 }
 
+/// Kepler's problem, without its time transformation.
+pub fn kepler(kepler: Kepler<2>) -> Two {
+    Two::Kepler(WithGradientAndStructure(kepler, kepler.structure()))
+}
+
 /// A system of the catalogue with two coordinates.
 pub fn two(system: impl Into<TwoCoordinates>) -> Two {
     Two::Catalogue(system.into())
+}
+
+/// A check of a system and of its Lagrangian.
+pub trait KindVisitor {
+    fn visit<const N: usize, S: System<N>, L: Lagrangian<N> + Copy>(&mut self, system: &S, lagrangian: L);
+}
+
+/// Visits one system of each kind of structure, for tests of integrators, which take long to compile: linear,
+/// separable, time dependent, nonlinear in z, with a mass matrix that depends on q, and on q, v and z.
+pub fn visit_kinds(visitor: &mut impl KindVisitor) {
+    visitor.visit(&HarmonicOscillator::default(), one(HarmonicOscillator::default()));
+    visitor.visit(&Kepler::default(), kepler(Kepler::default()));
+    visitor.visit(&Duffing::forced(), one(Duffing::forced()));
+    visitor.visit(&QuadraticInZ::default(), one(QuadraticInZ::default()));
+    visitor.visit(&DoublePendulum::default(), two(DoublePendulum::default()));
+    visitor.visit(&CoupledPlane::default(), two(CoupledPlane::default()));
 }

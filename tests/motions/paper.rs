@@ -2,7 +2,7 @@
 //! derivatives, the table of methods, and steps.
 
 mod derivatives;
-mod forces;
+pub mod forces;
 mod legendrian;
 mod methods;
 mod section_2;

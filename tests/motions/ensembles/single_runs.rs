@@ -1,10 +1,10 @@
 //! Members of an ensemble are the same as single runs.
 
-use super::systems::{Branching, HenonHeiles, kepler, pendulum};
+use super::systems::{Branching, HenonHeiles, pendulum};
 use super::{numbers, pendulum_start, unit};
-use crate::lagrangians::{One, one};
+use crate::lagrangians::{One, kepler, one};
 use contact_geom::numbers::MaxOrNan;
-use contact_geom::systems::{Duffing, HarmonicOscillator};
+use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler};
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{Ending, Member};
 use discrete_herglotz::{
@@ -57,7 +57,7 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
 #[test]
 fn by_splittings_members_are_single_runs_to_the_last_bit() {
     let [oscillator, pendulum] = [one(HarmonicOscillator { gamma: -0.1 }), pendulum(-0.01)];
-    let [kepler, henon_heiles] = [kepler(), HenonHeiles.into()];
+    let [kepler, henon_heiles] = [kepler(Kepler::default()), HenonHeiles.into()];
     for scheme in SplittingScheme::ALL {
         let (by, name) = (scheme, scheme.name());
         // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not
@@ -84,7 +84,7 @@ fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
 #[test]
 fn by_collocation_members_are_single_runs_but_for_rounding() {
     let [oscillator, pendulum] = [one(HarmonicOscillator { gamma: -0.1 }), pendulum(-0.01)];
-    let [kepler, henon_heiles] = [kepler(), HenonHeiles.into()];
+    let [kepler, henon_heiles] = [kepler(Kepler::default()), HenonHeiles.into()];
     for stages in 1..=16 {
         let by = GaussCollocation { stages };
         let systems = [

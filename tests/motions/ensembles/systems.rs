@@ -1,20 +1,13 @@
 //! The Lagrangians of these tests beside the catalogue.
 
-use crate::common::lagrangians::WithGradientAndStructure;
-use crate::lagrangians::{One, Two, one};
+use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum};
+use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, Scalar, Structure};
 
 /// A pendulum with a coefficient of the drag.
 pub fn pendulum(gamma: f64) -> One {
     one(Pendulum { gamma })
-}
-
-/// Kepler's problem with drag, without its time transformation.
-pub fn kepler() -> Two {
-    let kepler = Kepler::default();
-    WithGradientAndStructure(kepler, kepler.structure()).into()
 }
 
 /// `v^2/2 + sqrt(1 - q^2) - z/10`: not defined beyond one.

@@ -231,7 +231,7 @@ fn routes_agree() {
         let (all, nonlinear) = ([Linear, Condensed, ConstantMass, General], [Condensed, ConstantMass, General]);
         of::<1, _, One>(&OneCoordinate::from(HarmonicOscillator::default()), s, 0.1, &all);
         of::<1, _, One>(&OneCoordinate::from(Pendulum::default()), s, 0.1, &nonlinear);
-        of::<3, _, WithStructure<_>>(&Kepler::<3>::default(), s, 0.05, &nonlinear);
+        of::<2, _, Two>(&Kepler::<2>::default(), s, 0.05, &nonlinear);
     }
 }
 

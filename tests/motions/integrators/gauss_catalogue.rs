@@ -1,8 +1,9 @@
-//! Contact Gauss collocation on every system of the catalogue: its fast steps are those of Newton's method, its flow is
+//! Contact Gauss collocation on the systems of the catalogue: its fast steps are those of Newton's method, its flow is
 //! conformally contact, and its curves meet the states.
 
 use crate::common::gauss::GaussSteppers;
-use crate::common::{TOLERANCE, around, bounded, on_some, relative_distance, step_from, visit_kinds};
+use crate::common::{TOLERANCE, around, bounded, on_some, relative_distance, step_from};
+use crate::lagrangians::{KindVisitor, visit_kinds};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Statement, VelocityPoint, legendre,
@@ -14,13 +15,24 @@ use discrete_herglotz::{
     theory::{derived_jet, statements},
 };
 
-/// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, which
+/// Whether systems of the catalogue with a number of coordinates are compared. Each type takes long to compile, and those
+/// with three, Kepler's problem in space and a free chain, have the formulas of others with two and four.
+const fn is_compared(coordinates: usize) -> bool {
+    coordinates != 3
+}
+
+/// The stepper agrees with Newton's steps at random points of each system, and so does its `sigma_d`: to 1e-12, which
 /// is round-off times its growth in five steps of these motions.
 #[test]
 fn the_stepper_takes_the_steps_of_newton() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            if const { !is_compared(N) } {
+                let known = ["kepler_spatial", "chain_free"].contains(&system.name());
+                assert!(known, "{} has three coordinates: compare another of its formula", system.name());
+                return;
+            }
             for s in [1, 2, 3, 5, 8, 16] {
                 let cases = if s * N > 24 { 4 } else { 12 };
                 on_some(cases, &format!("{} with {s} stages", system.name()), 2 * N + 3, |u| {
@@ -57,13 +69,16 @@ fn the_stepper_takes_the_steps_of_newton() {
     visit_catalogue(&mut Visitor);
 }
 
-/// Statement 24, `Phi* eta = sigma_d eta`, on every system: the differential of the action, through the stages, is `p1
+/// Statement 24, `Phi* eta = sigma_d eta`, on each system: the differential of the action, through the stages, is `p1
 /// dq1 - sigma_d p0 dq0 + (sigma_d - 1) dz0`, with the `p0`, `p1` and `sigma_d` of the step; to 1e-12.
 #[test]
 fn the_flow_is_conformal_on_every_system() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            if const { !is_compared(N) } {
+                return;
+            }
             for s in [1, 2, 3, 5, 8, 16] {
                 on_some(
                     if s * N > 24 { 2 } else { 8 },
@@ -97,13 +112,13 @@ fn the_flow_is_conformal_on_every_system() {
 #[test]
 fn the_forms_are_conformal() {
     struct Visitor;
-    impl SystemVisitor for Visitor {
-        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+    impl KindVisitor for Visitor {
+        fn visit<const N: usize, S: System<N>, L: Lagrangian<N> + Copy>(&mut self, system: &S, lagrangian: L) {
             for s in [2, 3] {
                 on_some(8, &format!("{} with {s} stages", system.name()), 2 * N + 3, |u| {
                     let (t, x) = system.sample(&u[1..]);
                     let h = step_from(u[0]);
-                    let gauss = Gauss::new(system, s, h).map_err(|e| e.to_string())?;
+                    let gauss = Gauss::new(lagrangian, s, h).map_err(|e| e.to_string())?;
                     let point = around(&x, h);
                     for (statement, bound) in [
                         (Statement::DiscreteContactForms, TOLERANCE),
@@ -123,13 +138,16 @@ fn the_forms_are_conformal() {
     visit_kinds(&mut Visitor);
 }
 
-/// The curve of each step meets the states at its ends, on every system: to 100 eps, the rounding of sums of sixteen
+/// The curve of each step meets the states at its ends, on each system: to 100 eps, the rounding of sums of sixteen
 /// terms. Its velocity belongs to its momentum at the stages; in the middle, which is a stage for odd s, to round-off.
 #[test]
 fn curves_meet_the_states() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            if const { !is_compared(N) } {
+                return;
+            }
             for s in [1, 2, 3, 8, 13, 16] {
                 let (t0, x) = (system.initial_time(), system.initial());
                 let start = legendre(system, t0, &x);

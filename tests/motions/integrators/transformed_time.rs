@@ -8,7 +8,8 @@ use contact_geom::{
     Hints, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre, numbers::MaxOrNan,
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, Until,
+    AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, TransformedGauss,
+    Until,
     gauss::{Gauss, TransformedStepper},
 };
 
@@ -321,6 +322,8 @@ fn invalid_time_transformations_are_refused() {
     let driven = Transformed { rate: 1.0, autonomous: false };
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
+    // Not by `AnyIntegrator`, which is compiled with every integrator.
+    let by = TransformedGauss::new(4);
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
         let system = Transformed { rate, autonomous };
         Problem::new(&system, 0.0, start).unwrap().by(by).steps(steps).plan(Until::Time(2.0)).err()

@@ -1,7 +1,7 @@
 //! The limits that `KNOWN_ISSUES.md` lists, each asserted; a limit that no longer holds is removed from both.
 
 use crate::common::gauss::GaussSteppers;
-use crate::lagrangians::{One, one};
+use crate::lagrangians::{One, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
@@ -149,7 +149,7 @@ fn quadrature_rules_have_a_rational_rate() {
 fn chaos_outgrows_any_accuracy() {
     // A limit of every integrator: over 40 Lyapunov times a change in the last place grows to the size of the motion.
     let run = |q: f64| {
-        let pendulum = DoublePendulum { gamma: 0.0, ..DoublePendulum::default() };
+        let pendulum = two(DoublePendulum { gamma: 0.0, ..DoublePendulum::default() });
         let start = VelocityPoint::new([q, 2.0], [0.0, 0.0], 0.0);
         let problem = Problem::new(&pendulum, 0.0, start).unwrap();
         let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(6000));

@@ -1,10 +1,12 @@
 //! Forces and impacts, which the paper does not treat: energy, contact defects and momenta. Statements 42 to 47.
 
-use crate::common::{TOLERANCE, on_some, step_from, visit_kinds};
+use crate::common::{TOLERANCE, on_some, step_from};
+use crate::forces::{Applied, forced_two};
+use crate::lagrangians::{self, KindVisitor, visit_kinds};
 use crate::paper::table::{Row, at_points_of_every_system};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, System, SystemVisitor};
-use contact_geom::{Force, Forced, Scalar, Statement, VelocityPoint, legendre, statements::AnyForce};
+use contact_geom::systems::{Kepler, System};
+use contact_geom::{Force, Forced, Lagrangian, Scalar, Statement, VelocityPoint, legendre, statements::AnyForce};
 use discrete_herglotz::gauss::VirtualWork;
 use discrete_herglotz::theory::statements::forced_residual;
 
@@ -33,12 +35,12 @@ fn statements_at_points_of_every_system() {
 #[test]
 fn statements_with_forces() {
     struct Visitor<'a>(&'a Row, usize);
-    impl SystemVisitor for Visitor<'_> {
-        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+    impl KindVisitor for Visitor<'_> {
+        fn visit<const N: usize, S: System<N>, L: Lagrangian<N> + Copy>(&mut self, system: &S, lagrangian: L) {
             let row = self.0;
             let name = format!("statement {} on {}", row.statement, system.name());
             let symmetries = system.symmetries();
-            let forced = Forced { lagrangian: system, force: AnyForce(0.37) };
+            let forced = Forced { lagrangian, force: Applied::from(AnyForce(0.37)) };
             on_some(48, &name, 2 * N + 3, |u| {
                 let (t, x) = system.sample(&u[1..]);
                 let residual = forced_residual(row.statement, &forced, &symmetries, step_from(u[0]), t, &x);
@@ -57,7 +59,8 @@ fn statements_with_forces() {
 }
 
 /// A force towards the origin that depends on everything: it has no moment.
-struct Central;
+#[derive(Clone, Copy, Debug)]
+pub struct Central;
 
 impl<const N: usize> Force<N> for Central {
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
@@ -70,7 +73,7 @@ impl<const N: usize> Force<N> for Central {
 #[test]
 fn a_force_without_moment_leaves_the_decay() {
     let kepler = Kepler::<2>::default();
-    let forced = Forced { lagrangian: &kepler, force: Central };
+    let forced = forced_two(lagrangians::kepler(kepler), Central);
     on_some(48, "angular momentum", 7, |u| {
         let (t, x) = kepler.sample(&u[1..]);
         let from = legendre(&forced, t, &x);

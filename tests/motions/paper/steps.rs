@@ -1,6 +1,7 @@
 //! Steps and runs: against steps by derivatives of the value, backward against forward, small steps and large systems.
 
 use crate::common::{around, on_random, step_from};
+use crate::lagrangians::one;
 use crate::paper::table::discretise;
 use contact_geom::systems::{Chain, OneCoordinate, Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
@@ -116,7 +117,7 @@ fn a_large_chain() {
 /// A run records the requested rows, and can be stopped and continued.
 #[test]
 fn records() {
-    let pendulum = OneCoordinate::from(Pendulum::default());
+    let pendulum = one(Pendulum::default());
     let problem = Problem::new(&pendulum, 2.0, PhasePoint::new([1.0], [0.5], 0.2)).unwrap();
     let by_rule = AnyIntegrator::Discrete(Method::LeftMidpoint);
     let counter = |at: &StepView<'_, 1>| match at.k {

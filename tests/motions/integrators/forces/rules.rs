@@ -2,8 +2,8 @@
 
 use crate::common::forces::{AnyForce, Swirl};
 use crate::common::{relative_distance, slope};
-use crate::forces::Applied;
-use crate::lagrangians::{one, two};
+use crate::forces::{Applied, forced_two};
+use crate::lagrangians::{kepler, one, two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledPlane, Kepler, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
@@ -109,10 +109,10 @@ fn steps_are_those_of_the_values() {
     for method in Method::RULES.iter().filter(|method| **method != Method::Rectangle) {
         assert_steps(&method.discretise(&forced, 0.05, 0.3, &start).unwrap(), 0.3, start, x.v);
     }
-    let kepler = Forced { lagrangian: Kepler::<2>::default(), force: Applied::from(Swirl) };
+    let orbit = forced_two(kepler(Kepler::default()), Swirl);
     let x = Kepler::<2>::default().initial();
-    let start = legendre(&kepler, 0.0, &x);
-    assert_steps(&Strang::new(&kepler, 0.05, 0.3, &start).unwrap(), 0.3, start, x.v);
+    let start = legendre(&orbit, 0.0, &x);
+    assert_steps(&Strang::new(&orbit, 0.05, 0.3, &start).unwrap(), 0.3, start, x.v);
     let nonlinear = Forced { lagrangian: one(QuadraticInZ { c: 1.0 }), force: Applied::from(Swirl) };
     let start = PhasePoint::new([0.4], [0.9], 0.2);
     assert_steps(&ActionStrang::new(&nonlinear, 0.05, 0.3, &start).unwrap(), 0.3, start, [0.9].into());
@@ -121,7 +121,7 @@ fn steps_are_those_of_the_values() {
 /// What takes no force says so.
 #[test]
 fn what_takes_no_force_refuses_it() {
-    let forced = Forced { lagrangian: Kepler::<2>::default(), force: Applied::from(Swirl) };
+    let forced = forced_two(kepler(Kepler::default()), Swirl);
     let refused = |found: Option<InputError>| assert!(matches!(found, Some(InputError::Forced { .. })), "{found:?}");
     refused(Gauss::new::<2>(&forced, 2, 0.1).err());
 }

@@ -3,7 +3,7 @@
 use crate::common::forces::{AnyForce, Drag, Fall, G, Swirl};
 use crate::common::{relative_distance, slope};
 use crate::forces::Applied;
-use crate::lagrangians::{One, Two, one};
+use crate::lagrangians::{One, Two, kepler, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
@@ -59,7 +59,7 @@ fn assert_order<const N: usize>(
 fn schemes_keep_their_orders() {
     let pendulum = || one(Pendulum { gamma: -0.2 });
     let x = VelocityPoint::new([1.0], [1.5], 0.1);
-    let kepler = Kepler::<2> { gamma: -0.1, mu: 1.0 };
+    let kepler = kepler(Kepler { gamma: -0.1, mu: 1.0 });
     let orbit = VelocityPoint::new([1.0, 0.2], [-0.1, 0.9], 0.1);
     for (scheme, counts) in [
         (SplittingScheme::STRANG, &[32, 48, 64, 96][..]),

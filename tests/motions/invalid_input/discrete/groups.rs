@@ -3,7 +3,7 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
-use contact_geom::groups::{GroupError, Inertia, LieGroup, RigidBody, Rotation, Rotations, UniformGravity};
+use contact_geom::groups::{GroupError, Inertia, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
 use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupMotion, GroupState, RigidBodySplitting};
