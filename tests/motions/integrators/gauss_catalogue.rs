@@ -69,10 +69,10 @@ fn the_stepper_takes_the_steps_of_newton() {
     visit_catalogue(&mut Visitor);
 }
 
-/// Statement 24, `Phi* eta = sigma_d eta`, on each system: the differential of the action, through the stages, is `p1
+/// Statement 24, `Phi* eta = sigma_d eta`, on each system that is compared: the differential of the action, through the stages, is `p1
 /// dq1 - sigma_d p0 dq0 + (sigma_d - 1) dz0`, with the `p0`, `p1` and `sigma_d` of the step; to 1e-12.
 #[test]
-fn the_flow_is_conformal_on_every_system() {
+fn the_flow_is_conformal() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
