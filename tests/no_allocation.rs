@@ -1,6 +1,6 @@
 //! A step of a small system allocates no memory, with any method, with closed and with derived derivatives; nor do the
-//! steps of contact Gauss collocation, the exact discrete Lagrangian with its derivatives, a correction of a path, and
-//! a step of an ensemble.
+//! steps of contact Gauss collocation, the exact discrete Lagrangian with its derivatives, a correction of a path,
+//! a step of an ensemble, and steps on groups and under constraints.
 
 // In a test a missing value is a failure.
 #![allow(clippy::unwrap_used)]
@@ -14,7 +14,9 @@ mod counting_allocator;
 #[path = "common/gauss.rs"]
 mod gauss_steppers;
 
+use contact_geom::groups::{Inertia, LieGroup, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
+use contact_geom::systems::constrained::{KnifeEdge, RigidPendulum};
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{
     ContactHamiltonian, Lagrangian, OfHamiltonian, Parametric, PhasePoint, Scalar, VelocityPoint, lagrangian_enum,
@@ -24,8 +26,10 @@ use counting_allocator::{allocations, peak};
 use discrete_herglotz::{
     DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, StepperOptions, Steps, Until,
     boundary::{BoundaryPath, End},
+    constraints::{ConstrainedStart, ContactLobatto, DragRattle, Nonholonomic},
     gauss::{Gauss, GaussRoute, GaussStepper},
-    rules::{Flow, LeftMidpoint, Method},
+    groups::{GroupGauss, GroupMotion, GroupState, RigidBodySplitting},
+    rules::{Flow, LeftMidpoint, Method, Midpoint},
     sensitivity::{EndState, Loss},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
@@ -266,4 +270,38 @@ fn gradients_have_bounded_memory() {
     assert!(more <= few + 16 * 16, "{few} and {more} allocations");
     let (few, many) = (peak(|| gradient(40_000)), peak(|| gradient(160_000)));
     assert!(many <= few + few / 4, "{few} and {many} bytes");
+}
+
+/// Steps on a Lie group and under constraints; the first one may allocate its workspace.
+#[test]
+fn groups_and_constraints() {
+    let gravity = UniformGravity { weight: [0.0, 0.0, -9.81], centre: [0.0, 0.5, 0.0] };
+    let body = RigidBody::rotating(&Inertia::principal([1.0, 0.5, 1.0]).unwrap(), gravity, -0.1).unwrap();
+    let start = GroupState { g: Rotations::identity(), momentum: SVector::from([0.3, 2.0, -0.4]), z: 0.1 };
+    let gauss = GroupGauss::new(body, 4, 0.02).unwrap();
+    let splitting = RigidBodySplitting::new(body, SplittingScheme::BLANES_MOAN_6, 0.02).unwrap();
+    let mut motion = GroupMotion::<Rotations, 3>::new(0.0, start).unwrap();
+    let mut outcome = Ok(());
+    let count = allocations(|| outcome = motion.advance(&gauss, 100).and_then(|()| motion.advance(&splitting, 100)));
+    assert_eq!((outcome, count), (Ok(()), 0));
+
+    let pendulum = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };
+    let start = ConstrainedStart::new(VelocityPoint::new([1.0, 0.0], [0.0, 0.5], 0.0));
+    let mut rattle = DragRattle::new(pendulum, pendulum, &SplittingScheme::SUZUKI_4, 0.01, &start).unwrap();
+    let mut lobatto = ContactLobatto::new(pendulum, pendulum, 3, 0.01, &start).unwrap();
+    let edge = KnifeEdge { slope: 0.3, gamma: -0.1 };
+    let start = ConstrainedStart::new(VelocityPoint::new([0.0; 3], [0.5, 0.0, 0.7], 0.0));
+    let rule = |h| Midpoint::new(edge, h);
+    let mut blade = Nonholonomic::new(edge, edge, rule, &SplittingScheme::STRANG, 0.01, &start).unwrap();
+    let steppers: [(&str, &mut dyn FnMut() -> bool); 3] = [
+        ("RATTLE", &mut || rattle.advance(100).is_ok()),
+        ("Lobatto", &mut || lobatto.advance(100).is_ok()),
+        ("nonholonomic", &mut || blade.advance(100).is_ok()),
+    ];
+    for (name, advance) in steppers {
+        assert!(advance(), "{name}");
+        let mut advanced = false;
+        let count = allocations(|| advanced = advance());
+        assert_eq!((advanced, count), (true, 0), "{name}");
+    }
 }

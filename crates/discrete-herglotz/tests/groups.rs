@@ -7,7 +7,8 @@
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
 use contact_geom::groups::{
-    GroupError, GroupLagrangian, Inertia, LieGroup, RigidBody, Rotation, Rotations, UniformGravity,
+    GroupError, GroupLagrangian, Inertia, LieGroup, Pair, PlaneRotation, PlaneRotations, Product, RigidBody,
+    RigidMotion, RigidMotions, Rotation, Rotations, Translations, UniformGravity,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
@@ -142,29 +143,28 @@ fn start() -> GroupState<Rotations, 3> {
 
 /// The largest component of `Phi* eta - sigma eta` relative to that of `Phi* eta`, and sigma, at a state: the step is
 /// evaluated on dual numbers along body coordinates `(eta, dPi, dz)`, `g = g0 exp(eta)`.
-fn conformality(
-    method: &impl GroupIntegrator<Rotations, 3>,
+fn conformality<G: LieGroup<N>, const N: usize>(
+    method: &impl GroupIntegrator<G, N>,
     t: f64,
-    from: &GroupState<Rotations, 3>,
-    h_velocity: &SVector<f64, 3>,
+    from: &GroupState<G, N>,
+    h_velocity: &SVector<f64, N>,
 ) -> (f64, f64) {
-    type D = Dual<f64, ChartVector<3>>;
-    let mut eta = SVector::<D, 3>::zeros();
-    let mut momentum = from.momentum.map(D::constant);
-    for i in 0..3 {
+    type D<const N: usize> = Dual<f64, ChartVector<N>>;
+    let mut eta = SVector::<D<N>, N>::zeros();
+    let mut momentum = from.momentum.map(D::<N>::constant);
+    for i in 0..N {
         eta[i].d.x[i] = 1.0;
         momentum[i].d.y[i] = 1.0;
     }
-    let mut z = D::constant(from.z);
+    let mut z = D::<N>::constant(from.z);
     z.d.z = 1.0;
-    let lift = |g: &Rotation| Rotations::lift(g, D::constant);
-    let seeded: GroupState<Rotations, 3, D> =
-        GroupState { g: Rotations::compose(&lift(&from.g), &Rotations::exp(&eta)), momentum, z };
-    let end = seeded.after(&method.step(t, &seeded, &h_velocity.map(D::constant)).unwrap());
-    let plain = Rotations::lift(&end.g, |x: D| x.re);
-    let moved = Rotations::log(&Rotations::compose(&Rotations::inverse(&lift(&plain)), &end.g));
+    let lift = |g: &G::Element<f64>| G::lift(g, D::<N>::constant);
+    let seeded: GroupState<G, N, D<N>> = GroupState { g: G::compose(&lift(&from.g), &G::exp(&eta)), momentum, z };
+    let end = seeded.after(&method.step(t, &seeded, &h_velocity.map(D::<N>::constant)).unwrap());
+    let plain = G::lift(&end.g, |x: D<N>| x.re);
+    let moved = G::log(&G::compose(&G::inverse(&lift(&plain)), &end.g));
     let mut pullback = end.z.d;
-    for i in 0..3 {
+    for i in 0..N {
         pullback = pullback.minus(moved[i].d.scale(end.momentum[i].re));
     }
     let sigma = pullback.z;
@@ -285,6 +285,87 @@ fn splittings_are_contact_and_have_their_order() {
     }
     let refused = RigidBodySplitting::new(tilted(0.0), nystrom, 0.1);
     assert!(matches!(refused, Err(GroupError::NeedsComposition { scheme: "blanes_moan_6" })));
+}
+
+/// A body in space whose potential depends on its height and its attitude; nonlinear in z.
+struct Falling;
+
+impl GroupLagrangian<RigidMotions, 6> for Falling {
+    fn value<T: Scalar>(&self, t: T, g: &RigidMotion<T>, xi: &SVector<T, 6>, z: T) -> T {
+        let up = g.attitude.apply_inverse(&SVector::from([T::zero(), T::zero(), T::one()]));
+        let turn = xi[0] * xi[0] + xi[1] * xi[1] * 2.0 + xi[2] * xi[2] * 2.5;
+        let along = xi[3] * xi[3] + xi[4] * xi[4] + xi[5] * xi[5] * 1.5;
+        let height = g.position[2];
+        (turn + along) * 0.5 + xi[0] * xi[4] * 0.2
+            - height * (up[0] * 0.4 + 1.1)
+            - height * height * 0.3
+            - z * (z * 0.1 + 0.3)
+            + t.sin() * up[1] * 0.2
+    }
+}
+
+/// A bead on a wheel that turns, the group SO(2) x R: the moment of inertia depends on the place of the bead.
+struct Wheel;
+type TurnAndPlace = Product<PlaneRotations, Translations<1>, 1, 1>;
+
+impl GroupLagrangian<TurnAndPlace, 2> for Wheel {
+    fn value<T: Scalar>(&self, _t: T, g: &Pair<PlaneRotation<T>, SVector<T, 1>>, xi: &SVector<T, 2>, z: T) -> T {
+        let x = g.b[0];
+        (xi[0] * xi[0] * (x * x + 1.0) + xi[1] * xi[1]) * 0.5 + g.a.cos * x * 0.7 - x * x * 0.4 - z * (z * 0.05 + 0.2)
+    }
+}
+
+/// Steps on a group are conformally contact, and of order 2s.
+fn contact_and_of_order_2s<G: LieGroup<N>, const N: usize>(
+    name: &str,
+    lagrangian: &impl GroupLagrangian<G, N>,
+    start: GroupState<G, N>,
+) {
+    for stages in [1, 2, 3] {
+        for h in [0.3, -0.2] {
+            let method = GroupGauss::new(lagrangian, stages, h).unwrap();
+            let velocity = method.velocity(0.2, &start).unwrap();
+            let (defect, _) = conformality(&method, 0.2, &start, &velocity);
+            assert!(defect < 128.0 * EPS, "{name}, {stages} stages, h = {h}: {defect:e}");
+        }
+    }
+    let end = |stages: usize, steps: usize| {
+        let mut motion = GroupMotion::new(0.2, start).unwrap();
+        motion.advance(&GroupGauss::new(lagrangian, stages, 1.0 / steps as f64).unwrap(), steps).unwrap();
+        motion.state()
+    };
+    let reference = end(8, 10);
+    for (stages, counts) in [(1, [32, 48, 72]), (2, [8, 12, 18])] {
+        let errors = counts.map(|n| {
+            let found = end(stages, n);
+            let turn = G::log(&G::compose(&G::inverse(&reference.g), &found.g));
+            turn.norm() + (found.momentum - reference.momentum).norm() + (found.z - reference.z).abs()
+        });
+        for i in 0..2 {
+            let slope = (errors[i] / errors[i + 1]).ln() / 1.5f64.ln();
+            assert!((slope - 2.0 * stages as f64).abs() < 0.15, "{name}, {stages} stages: {slope}, {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn bodies_in_space_and_products_of_groups() {
+    let g = RigidMotions::exp(&SVector::from([0.4, -1.1, 0.8, 0.3, 0.2, -0.5]));
+    let momentum = SVector::from([0.7, -0.6, 0.9, 0.4, -0.3, 0.5]);
+    let start = GroupState::<RigidMotions, 6> { g, momentum, z: 0.4 };
+    contact_and_of_order_2s("SE(3)", &Falling, start);
+    let g = TurnAndPlace::exp(&SVector::from([0.4, 0.7]));
+    contact_and_of_order_2s("SO(2) x R", &Wheel, GroupState { g, momentum: SVector::from([0.9, -0.4]), z: 0.4 });
+
+    // Horizontal translations of the body in space are symmetries: their momenta scale with the conformal factor.
+    let mut motion = GroupMotion::new(0.0, start).unwrap();
+    let before = *motion.spatial_momentum();
+    motion.advance(&GroupGauss::new(&Falling, 2, 0.1).unwrap(), 100).unwrap();
+    let factor = motion.log_factor().exp();
+    for k in [3, 4] {
+        let off = motion.spatial_momentum()[k] / (before[k] * factor) - 1.0;
+        assert!(off.abs() < 1e-13, "momentum {k}: {off:e}");
+    }
 }
 
 /// Invalid input is a typed error that names the remedy.

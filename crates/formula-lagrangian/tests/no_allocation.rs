@@ -46,7 +46,9 @@ fn nothing_is_allocated() {
     assert_eq!(count, 0);
     // The steps of integrators do not allocate either: they do not use nested dual numbers, whose registers are on the
     // heap.
-    let problem = Problem::new(&l, 0.0, x).unwrap();
+    let pendulum = Formula::parse("x'^2*(2 + sin(x))/2 + cos(x) - exp(-a*t)*z", &["x"], &[("a", 0.1)]).unwrap();
+    let pendulum: FormulaLagrangian<1> = pendulum.lagrangian().unwrap();
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.3], [0.7], 0.1)).unwrap();
     for stages in [1, 2, 8, 16] {
         let plan = problem.by(GaussCollocation { stages }).steps(Steps::Size(1e-3)).plan(Until::Time(1.0)).unwrap();
         let mut stepper = plan.stepper().unwrap();
