@@ -110,11 +110,6 @@ fn in_small_thread(run: fn()) {
 }
 
 #[test]
-fn forty_coordinates_fit_a_thread() {
-    all::<40>().into_iter().for_each(in_small_thread);
-}
-
-#[test]
 fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
     all::<128>().into_iter().for_each(in_small_thread);
 }

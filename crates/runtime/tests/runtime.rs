@@ -1,0 +1,9 @@
+//! Motions by formula: runs, ensembles, paths, fits, derivatives, and systems of any number of coordinates.
+
+#![allow(missing_docs)]
+
+mod fit;
+mod motions;
+mod path;
+mod sensitivity;
+mod sparse;
