@@ -73,7 +73,7 @@ impl<V, const N: usize> RigidBody<V, N> {
             return Err(not_positive);
         }
         let inverse = dynamic.try_inverse().ok_or(not_positive)?;
-        let inverse = SMatrix::from_fn(|i, j| 0.5 * (inverse[(i, j)] + inverse[(j, i)]));
+        let inverse = SMatrix::<f64, N, N>::from_fn(|i, j| 0.5 * (inverse[(i, j)] + inverse[(j, i)]));
         if let Some(&value) = inverse.iter().find(|x| !x.is_finite()) {
             // Products of its entries overflow.
             return Err(GroupError::NonFinite { what: "an entry of the inverse of the mass matrix", value });
