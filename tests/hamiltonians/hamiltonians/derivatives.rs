@@ -215,7 +215,7 @@ fn the_tangent_is_conformally_contact() {
 }
 
 /// The pendulum by its Hamiltonian, with `a = 1` and `b = gamma`, over ten periods: the derivatives of `(q, v, z)` in q0, v0
-/// and gamma that were computed with 30 digits, as for its Lagrangian in tests/gradients/pendulum.rs.
+/// and gamma that were computed with 30 digits, as for its Lagrangian in tests/derivatives/gradients/pendulum.rs.
 #[test]
 fn a_hamiltonian_has_the_derivatives_of_its_lagrangian() {
     const DERIVATIVES: [[f64; 3]; 3] = [
