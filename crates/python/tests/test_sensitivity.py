@@ -254,7 +254,6 @@ def test_invalid_input(what):
 @pytest.mark.parametrize(
     "given, named, message",
     [
-        ((), {}, "missing a required argument: 'L'"),
         (("x'^2/2", [1.0], [0.0], 1.0, 2), {}, "too many positional arguments"),
         (("x'^2/2", [1.0]), {"q0": [1.0]}, "multiple values for argument 'q0'"),
         (("x'^2/2", [1.0], [0.0], 1.0), {"accurracy": 1e-8}, "unexpected keyword argument 'accurracy'"),
@@ -263,3 +262,8 @@ def test_invalid_input(what):
 def test_calls_that_solve_does_not_take_are_refused_by_name(given, named, message):
     with pytest.raises(TypeError, match=message):
         hz.value_and_grad("x")(*given, **named)
+
+
+def test_a_call_without_a_system_says_what_is_missing():
+    with pytest.raises(ValueError, match="give either `L` or `H`"):
+        hz.value_and_grad("x")()

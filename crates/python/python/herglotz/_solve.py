@@ -177,6 +177,8 @@ def run(L, request, event_names, observed, halted=None):
 
 def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4, kind=(None,) * 3):
     """The system of an argument, and the start, which the catalogue may provide."""
+    if L is None and kind[0] is None:
+        raise ValueError("give either `L` or `H`")
     if isinstance(L, str) and L in CATALOGUE and kind[2] is None:
         entry = CATALOGUE[L]
         if q0 is None and v0 is None and p0 is None:
