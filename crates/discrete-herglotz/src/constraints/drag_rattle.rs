@@ -2,11 +2,12 @@
 
 use super::start::inverse_mass;
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
+use crate::numbers::extent::extent;
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
+use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
 use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
@@ -288,11 +289,6 @@ pub(super) fn times<T: Scalar, const N: usize>(matrix: &SMatrix<f64, N, N>, x: &
         }
         sum
     })
-}
-
-/// The largest value or differential.
-pub(super) fn extent<T: Scalar, const N: usize>(x: &SVector<T, N>) -> f64 {
-    x.iter().fold(0.0, |largest, x| f64::max_or_nan(largest, x.extent()))
 }
 
 /// Sets the entries of dependent constraints to 0.

@@ -1,9 +1,9 @@
 //! Contact Lobatto IIIA-IIIB methods under holonomic constraints.
 
-use super::drag_rattle::extent;
 use super::linear_system::LinearSystem;
 use super::lobatto_tables::{LobattoTables, STAGES};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
+use crate::numbers::extent::extent;
 use crate::{InputError, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};

@@ -4,6 +4,7 @@ use super::stages::{Given, Stages, Table};
 use super::{GroupIntegrator, GroupState, GroupStep};
 use crate::gauss::MAX_STAGES;
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::numbers::extent::extent;
 use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup};
 use contact_geom::nalgebra::SVector;
@@ -69,14 +70,6 @@ impl<L> GroupGauss<L> {
     pub fn stages(&self) -> usize {
         self.table.s
     }
-}
-
-/// The largest component in size, differentials included.
-fn extent<T: Scalar, const N: usize>(x: &SVector<T, N>) -> f64 {
-    x.iter().fold(0.0, |size, x| {
-        let extent = x.extent();
-        if extent <= size { size } else { extent }
-    })
 }
 
 impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G, N> for GroupGauss<L> {

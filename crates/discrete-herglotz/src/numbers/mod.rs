@@ -3,6 +3,7 @@
 pub(crate) mod compensated;
 pub(crate) mod compensated_batch;
 pub(crate) mod double_double;
+pub(crate) mod extent;
 pub(crate) mod instructions;
 pub(crate) mod lanes;
 pub(crate) mod pair;
