@@ -92,6 +92,11 @@ impl Samples {
         self.values().iter().all(|value| value.is_finite())
     }
 
+    /// Replaces the value at the end of the interval.
+    pub fn set_end(&mut self, value: f64) {
+        self.values[self.degree] = value;
+    }
+
     /// The largest absolute value among those that are finite.
     pub fn size(&self) -> f64 {
         self.values().iter().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)

@@ -18,8 +18,10 @@ const MAX_NEAR_VALUE: f64 = 0.01;
 /// The assumed number of steps of a run whose number of steps is not known.
 const DEFAULT_COUNT: f64 = 64.0;
 
-/// The largest time scale of the round-off of times, in steps: for long runs it stays far below a step.
-const MAX_SPAN_IN_STEPS: f64 = 4096.0;
+/// The time scale of the round-off of times, in steps. It does not depend on the length of the run: of two consecutive
+/// runs with the same steps, both decide alike whether the point between them is on a surface, so that its crossing is
+/// counted in exactly one.
+const ROUND_OFF_IN_STEPS: f64 = 64.0;
 
 /// The function of an event at the last point of evaluation.
 #[derive(Clone, Copy)]
@@ -68,20 +70,17 @@ struct Scan<'s> {
 pub(crate) struct TimeScales {
     /// The approximate step size, with the sign of the direction of the run.
     h: f64,
-    /// The time scale of the round-off of times, in addition to the time itself.
-    span: f64,
 }
 
 impl TimeScales {
     pub(crate) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
         let span = t_end - t0;
-        let h = h.unwrap_or(span / count.map_or(DEFAULT_COUNT, |count| count.max(1) as f64));
-        TimeScales { h, span: span.abs().min(MAX_SPAN_IN_STEPS * h.abs()) }
+        TimeScales { h: h.unwrap_or(span / count.map_or(DEFAULT_COUNT, |count| count.max(1) as f64)) }
     }
 
     /// The round-off of a time.
     pub(crate) fn rounding(self, t: f64) -> f64 {
-        RELATIVE_ROUND_OFF * (t.abs() + self.span)
+        RELATIVE_ROUND_OFF * (t.abs() + ROUND_OFF_IN_STEPS * self.h.abs())
     }
 }
 
@@ -114,6 +113,9 @@ impl<const N: usize> Event<'_, N> {
         let near = MAX_NEAR_VALUE * size;
         // The end may be on the surface if the value is below a hundredth of its size in the step.
         let departure = if value.abs() < near { self.departure_from(motion, (end.0, &end.1), value) } else { None };
+        // On the surface, the sign of the value is that of its round-off: a change to it does not count.
+        let at_end = if departure.is_some() { 0.0 } else { value };
+        samples.set_end(at_end);
         let keeps_sign = value * last_sign.sign > 0.0 && last_sign.zero.is_none() && departure.is_none();
         if keeps_sign && has_no_zero(&samples, near) {
             (last_sign.value, last_sign.departure) = (value, None);
@@ -127,11 +129,12 @@ impl<const N: usize> Event<'_, N> {
             if on_motion {
                 samples = Samples::new(degree, |j| match j {
                     0 => last_sign.value,
-                    _ if j == degree => value,
+                    _ if j == degree => at_end,
                     _ => self.on_motion(step, node(degree, j)),
                 });
             }
             let along = |fraction: f64| match on_motion {
+                _ if fraction == 1.0 => at_end,
                 true => self.on_motion(step, fraction),
                 false => self.on_interpolant(step, fraction).unwrap_or(f64::NAN),
             };
