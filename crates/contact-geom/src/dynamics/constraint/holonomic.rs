@@ -26,11 +26,21 @@ use num_traits::{One, Zero};
 pub trait Constraint<const N: usize, const M: usize> {
     /// The values `c(q)`.
     fn value<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, M>;
+
+    /// The number of constraints, where it is known at run time only: the first so many values are constraints, and the
+    /// others vanish for all positions. It is at most `M`, the default.
+    fn count(&self) -> usize {
+        M
+    }
 }
 
 impl<const N: usize, const M: usize, C: Constraint<N, M>> Constraint<N, M> for &C {
     fn value<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, M> {
         (**self).value(q)
+    }
+
+    fn count(&self) -> usize {
+        (**self).count()
     }
 }
 
