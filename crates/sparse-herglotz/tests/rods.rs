@@ -222,8 +222,8 @@ fn forces() {
         let weight = if i % 2 == 1 { 2.0 * G } else { 0.0 };
         assert!((found - weight).abs() <= 1e-12, "{found}");
     }
-    let mean = motion.impulses().iter().map(|y| y / 0.01);
-    assert!(largest(mean.zip(motion.multipliers().unwrap().to_vec()).map(|(a, b)| a - b)) <= 1e-11);
+    let mean: Vec<f64> = motion.impulses().iter().map(|y| y / 0.01).collect();
+    assert!(largest(mean.iter().zip(motion.multipliers().unwrap()).map(|(a, b)| a - b)) <= 1e-11);
     let timed = rods.system(0.0).unwrap().with_timed_drag(|_| -0.3);
     let q = rods.straight(0.4);
     let run = |system: &SparseSystem| {
