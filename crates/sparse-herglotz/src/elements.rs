@@ -173,7 +173,7 @@ fn has_index(unknown: usize, index: usize, unknowns: usize) -> bool {
 }
 
 /// Checks that the unknowns of an element exist and differ, and that its parameters are finite.
-fn check_element(
+pub(crate) fn check_element(
     list: usize,
     element: usize,
     unknowns: usize,

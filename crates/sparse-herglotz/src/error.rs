@@ -100,6 +100,66 @@ pub enum SparseError {
         /// The method.
         method: &'static str,
     },
+    /// A method for systems without constraints was applied to a system with constraints.
+    #[error("the system has constraints, which {method} does not take; use `SparseRattle`")]
+    Constrained {
+        /// The method.
+        method: &'static str,
+    },
+    /// A method for systems with constraints was applied to a system without them.
+    #[error("the system has no constraints; add some by `with_constraint`, or use `SparseSplitting`")]
+    Unconstrained,
+    /// The start is not on the constraint of an element.
+    #[error(
+        "element {element} of list {list} is off its constraint by the distance {distance:e}; give a start with \
+         c(q) = 0, or request the projection with `OffConstraint::Project`"
+    )]
+    OffConstraint {
+        /// The list of elements.
+        list: usize,
+        /// The element that is farthest from its constraint.
+        element: usize,
+        /// Its distance to first order, `|c|/|c_q|`.
+        distance: f64,
+    },
+    /// The initial velocity is not tangent to the constraint of an element.
+    #[error(
+        "the initial velocity of element {element} of list {list} leaves its constraint at the speed {speed:e}; give a \
+         velocity with c_q v = 0, or request the projection with `OffConstraint::Project`"
+    )]
+    OffVelocity {
+        /// The list of elements.
+        list: usize,
+        /// The element with the largest such speed.
+        element: usize,
+        /// The speed `|c_q v|/|c_q|`.
+        speed: f64,
+    },
+    /// The projection of the start onto the constraints does not converge.
+    #[error("the start could not be projected onto the constraints; give a start nearer to c(q) = 0")]
+    NotProjected,
+    /// The constraint of an element follows from others at the start.
+    #[error(
+        "the constraint of element {element} of list {list} depends on others at the start; remove constraints that \
+         follow from others, or start at another position"
+    )]
+    Dependent {
+        /// The list of elements.
+        list: usize,
+        /// An element with a dependent constraint.
+        element: usize,
+    },
+    /// A constraint or its derivative is not finite at the start.
+    #[error(
+        "the constraint of element {element} of list {list} is not finite at the start; choose a start inside the \
+         domain of the constraints"
+    )]
+    UndefinedConstraint {
+        /// The list of elements.
+        list: usize,
+        /// The first such element.
+        element: usize,
+    },
     /// An operation needs the action, which the state does not have.
     #[error("the Lagrangian depends on the action z, which the initial state lacks; give it, as in `z: Some(0.0)`")]
     NoAction,

@@ -22,6 +22,7 @@
 mod aligned;
 mod batch;
 mod blocks;
+mod constraints;
 mod derivatives;
 mod drag;
 mod elements;
@@ -45,6 +46,7 @@ mod stages;
 mod system;
 pub mod systems;
 
+pub use constraints::{Distance, DistanceToPoint, LocalConstraint, SparseRattle};
 pub use elements::{ElementData, FIXED};
 pub use error::SparseError;
 pub use implicit::{SparseGauss, SparseMidpoint};

@@ -83,6 +83,7 @@ impl<'a> SparseSplitting<'a> {
         }
         start.check(system)?;
         system.check_separable()?;
+        system.check_unconstrained("`SparseSplitting`")?;
         system.check_masses(MassSource::Diagonal)?;
         let mut table = StageTable::new(scheme, &system.drag, h, start.t);
         let friction = friction_of(system, &mut table)?;

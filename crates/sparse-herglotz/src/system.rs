@@ -1,6 +1,7 @@
 //! A system whose Lagrangian is a sum of local terms.
 
 use crate::blocks::{BLOCK_SIZE, MIN_PARALLEL_UNKNOWNS, block_count};
+use crate::constraints::{ConstraintElements, ConstraintList};
 use crate::derivatives::{EvaluationPoint, FirstDerivatives};
 use crate::drag::Drag;
 use crate::elements::{ElementData, Elements};
@@ -8,7 +9,7 @@ use crate::energies::{Energies, EnergyKind, sum_of_squares};
 use crate::kick::KickFactor;
 use crate::local_term_list::{LocalTermElements, LocalTermList};
 use crate::potential_list::{PotentialElements, PotentialList};
-use crate::{LocalLagrangian, Potential, SparseError};
+use crate::{LocalConstraint, LocalLagrangian, Potential, SparseError};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// The maximum number of unknowns: padded indices have 32 bits, and there is one fixed component at each end.
@@ -19,7 +20,9 @@ const MAX_UNKNOWNS: usize = u32::MAX as usize - 2;
 ///
 /// Its dimension is known at run time. Each potential is a [`Potential`] with its list of elements, each general term a
 /// [`LocalLagrangian`] with its own list. A system without general terms can be integrated by all integrators, one with
-/// general terms by [`SparseGauss`](crate::SparseGauss).
+/// general terms by [`SparseGauss`](crate::SparseGauss). The motion may be restricted by constraints `c_e(q_e) = 0` of
+/// elements, each a [`LocalConstraint`] with its list; such systems are integrated by
+/// [`SparseRattle`](crate::SparseRattle).
 ///
 /// ```
 /// use sparse_herglotz::{SparseSystem, Difference, FIXED, Potential};
@@ -48,6 +51,7 @@ pub struct SparseSystem {
     pub(crate) friction: Option<Vec<f64>>,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
     pub(crate) general_terms: Vec<Box<dyn LocalTermList>>,
+    pub(crate) constraints: Vec<Box<dyn ConstraintList>>,
 }
 
 /// Where the masses of a system come from.
@@ -93,6 +97,7 @@ impl SparseSystem {
             friction: None,
             potentials: Vec::new(),
             general_terms: Vec::new(),
+            constraints: Vec::new(),
         })
     }
 
@@ -174,9 +179,35 @@ impl SparseSystem {
         Ok(self)
     }
 
+    /// Adds a constraint `c(q; c_e) = 0` for each element of a list. Only [`SparseRattle`](crate::SparseRattle) takes
+    /// systems with constraints.
+    ///
+    /// ```
+    /// use sparse_herglotz::{Distance, FIXED, SparseSystem};
+    /// // A planar double pendulum: two rods of length 1, the first of them from the origin.
+    /// let rods = [([FIXED, FIXED, 0, 1], [1.0]), ([0, 1, 2, 3], [1.0])];
+    /// let pendulum = SparseSystem::new(4)?.with_mass(1.0).with_constraint(Distance, rods)?;
+    /// # Ok::<(), sparse_herglotz::SparseError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`with_potential`](Self::with_potential).
+    pub fn with_constraint<C, const K: usize, const P: usize>(
+        mut self,
+        constraint: C,
+        elements: impl IntoIterator<Item = impl Into<ElementData<K, P>>>,
+    ) -> Result<Self, SparseError>
+    where
+        C: LocalConstraint<K, P>,
+    {
+        let list = ConstraintElements::new(constraint, self.lists(), self.unknowns, elements)?;
+        self.constraints.push(Box::new(list));
+        Ok(self)
+    }
+
     /// The number of lists of elements so far.
     fn lists(&self) -> usize {
-        self.potentials.len() + self.general_terms.len()
+        self.potentials.len() + self.general_terms.len() + self.constraints.len()
     }
 
     /// The number of unknowns.
@@ -285,6 +316,11 @@ impl SparseSystem {
     /// Checks that there is no friction, for a method that takes none.
     pub(crate) fn check_frictionless(&self, method: &'static str) -> Result<(), SparseError> {
         if self.friction.is_none() { Ok(()) } else { Err(SparseError::Friction { method }) }
+    }
+
+    /// Checks that there are no constraints, for a method that takes none.
+    pub(crate) fn check_unconstrained(&self, method: &'static str) -> Result<(), SparseError> {
+        if self.constraints.is_empty() { Ok(()) } else { Err(SparseError::Constrained { method }) }
     }
 
     /// Checks that each unknown has a mass; 0 is accepted if general terms may contribute the mass.

@@ -9,8 +9,9 @@ mod counting_allocator;
 
 use counting_allocator::{allocations, held, peak};
 use discrete_herglotz::SplittingScheme;
-use sparse_herglotz::systems::{FputBond, OuterSolarSystem, SineGordon, fput_chain, lattice};
-use sparse_herglotz::{SparseError, SparseGauss, SparseMidpoint, SparseSplitting, State};
+use discrete_herglotz::constraints::OffConstraint;
+use sparse_herglotz::systems::{FputBond, OuterSolarSystem, RodChain, SineGordon, fput_chain, lattice};
+use sparse_herglotz::{SparseError, SparseGauss, SparseMidpoint, SparseRattle, SparseSplitting, State};
 
 #[test]
 fn steps() {
@@ -46,6 +47,22 @@ fn steps() {
         "{} factorisations in 50 steps",
         implicit.factorisations() - before
     );
+}
+
+/// Steps of RATTLE do not allocate, although they factorise a matrix.
+#[test]
+fn steps_of_rods() {
+    let rods = RodChain { links: 64, length: 1.0 / 64.0, mass: 1.0 / 64.0, gravity: 9.81 };
+    let (chain, q) = (rods.system(-0.1).unwrap(), rods.straight(0.5));
+    let v = vec![0.0; q.len()];
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
+    let mut motion = SparseRattle::new(&chain, &SplittingScheme::SUZUKI_4, 1e-3, start, OffConstraint::Refuse).unwrap();
+    motion.advance(2).unwrap();
+    let found = allocations(|| {
+        motion.advance(100).unwrap();
+        motion.multipliers().unwrap();
+    });
+    assert_eq!(found, 0);
 }
 
 /// A chain and its motion hold at most six vectors, including the initial state of the user.

@@ -12,5 +12,6 @@ mod flags;
 mod friction;
 mod gauss;
 mod matrix_free;
+mod rods;
 mod small_systems;
 mod theory;

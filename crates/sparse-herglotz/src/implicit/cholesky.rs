@@ -90,6 +90,11 @@ impl CholeskyFactors {
         ldlt.map(|_| ()).map_err(|_| StepError::Singular { pivot: 0.0 })
     }
 
+    /// Whether the last matrix was positive definite.
+    pub fn is_definite(&self) -> bool {
+        self.is_definite
+    }
+
     /// Solves with the last factors; `b` is overwritten with the solution.
     ///
     /// # Errors

@@ -89,6 +89,7 @@ impl<'a> SparseGauss<'a> {
         }
         start.check(system)?;
         system.check_frictionless("`SparseGauss`")?;
+        system.check_unconstrained("`SparseGauss`")?;
         let general = !system.general_terms.is_empty();
         if general && start.z.is_none() {
             return Err(SparseError::NoAction);

@@ -1,7 +1,7 @@
 //! The maximum norm of a vector.
 
 /// The largest absolute component; infinite if a component is NaN, so that no comparison with a bound succeeds.
-pub(super) fn max_norm(x: &[f64]) -> f64 {
+pub(crate) fn max_norm(x: &[f64]) -> f64 {
     let mut largest = 0.0f64;
     let mut sum = 0.0;
     for x in x {

@@ -103,6 +103,7 @@ impl<'a> SparseMidpoint<'a> {
         }
         start.check(system)?;
         system.check_separable()?;
+        system.check_unconstrained("`SparseMidpoint`")?;
         system.check_frictionless("`SparseMidpoint`")?;
         system.check_masses(MassSource::Diagonal)?;
         SparseSystem::check_number("gamma", system.rate(start.t))?;

@@ -17,6 +17,10 @@ mod stage_jacobian;
 mod tests;
 mod velocity_solver;
 
+pub(crate) use cholesky::CholeskyFactors;
 pub use gauss::SparseGauss;
+pub(crate) use lu::LuFactors;
+pub(crate) use max_norm::max_norm;
 pub use midpoint::SparseMidpoint;
+pub(crate) use newton_convergence::{NewtonConvergence, NewtonDecision};
 pub(crate) use pattern::{FullPattern, LowerPattern};

@@ -14,6 +14,7 @@ const STAGNATION_ROUND_OFFS: f64 = 8.0;
 /// The convergence history of one solution by Newton's method.
 pub(crate) struct NewtonConvergence {
     last: f64,
+    max_expected: f64,
 }
 
 /// The decision after a correction.
@@ -29,7 +30,13 @@ pub(crate) enum NewtonDecision {
 
 impl NewtonConvergence {
     pub fn new() -> Self {
-        NewtonConvergence { last: f64::INFINITY }
+        Self::expecting(MAX_EXPECTED_ITERATIONS)
+    }
+
+    /// The history of a solution for which new factors are computed if more than this number of further iterations is
+    /// expected.
+    pub fn expecting(max_expected: f64) -> Self {
+        NewtonConvergence { last: f64::INFINITY, max_expected }
     }
 
     /// Discards the last correction, since with new factors the rate of convergence changes.
@@ -54,7 +61,7 @@ impl NewtonConvergence {
             }
             // The number of further iterations at this rate.
             let remaining = (round_off / correction).ln() / rate.min(1.0).ln();
-            if remaining.is_nan() || remaining > MAX_EXPECTED_ITERATIONS {
+            if remaining.is_nan() || remaining > self.max_expected {
                 decision = NewtonDecision::Refactorise;
             }
         }

@@ -19,6 +19,7 @@ mod memory;
 mod path;
 mod peer;
 mod report;
+mod rods;
 mod seconds;
 mod solar;
 mod sparse_path;
@@ -50,6 +51,7 @@ const CASES: &[Case] = &[
     ("path", "steps", path::run),
     ("chain", "unknowns", chain::run),
     ("lattice", "unknowns", lattice::run),
+    ("rods", "links", rods::run),
     ("solar", "years", solar::run),
     ("ensembles", "members", ensembles::run),
 ];
