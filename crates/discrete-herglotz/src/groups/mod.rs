@@ -20,13 +20,19 @@
 //! # Ok::<(), contact_geom::groups::GroupError>(())
 //! ```
 
+mod accuracy;
+mod events;
 mod gauss;
 mod motion;
+mod run;
 mod splitting;
 mod stages;
 mod state;
 
+pub use accuracy::{GroupSteps, group_distance, group_steps};
+pub use events::GroupEvent;
 pub use gauss::GroupGauss;
 pub use motion::GroupMotion;
+pub use run::{GroupObserver, GroupRows, GroupRun, GroupStatus};
 pub use splitting::RigidBodySplitting;
 pub use state::{GroupIntegrator, GroupState, GroupStep};
