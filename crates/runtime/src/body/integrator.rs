@@ -5,7 +5,8 @@ use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupState, GroupStep, RigidBodySplitting};
-use discrete_herglotz::{AnyIntegrator, Method, SplittingScheme};
+use discrete_herglotz::rules::Method;
+use discrete_herglotz::{AnyIntegrator, SplittingScheme};
 
 /// The integrator where only an accuracy is given: explicit, of order 10, for any moments of inertia.
 pub(super) const DEFAULT: AnyIntegrator = AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10);

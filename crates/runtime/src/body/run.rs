@@ -50,6 +50,15 @@ pub struct BodyOutcome {
     pub error_estimate: Option<f64>,
 }
 
+impl BodyOutcome {
+    /// The [columns](Body::COLUMNS) of the state that was reached.
+    pub fn row(&self) -> [f64; 19] {
+        let ([w, x, y, z], [p1, p2, p3], [o1, o2, o3]) = (self.attitude, self.momentum, self.omega);
+        let ([m1, m2, m3], [tx, ty, tz]) = (self.spatial_momentum, self.tip);
+        [self.t, w, x, y, z, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, self.energy, self.z]
+    }
+}
+
 /// A state of a rigid body as a row of the columns.
 #[derive(Clone, Copy)]
 struct Rows {
