@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+#[path = "program/body.rs"]
+mod body;
 #[path = "program/ends.rs"]
 mod ends;
 #[path = "program/events.rs"]
