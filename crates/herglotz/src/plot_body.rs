@@ -44,12 +44,11 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
             curves.extend(pieces.into_iter().map(|piece| Curve::unnamed(line, piece.iter().filter_map(place))));
         }
         let name = |k: usize| format!("Pi{}/|Pi|", k + 1);
-        let square = Axis::Linear(-1.2, 1.2, 0.4);
         let sphere = Panel {
             x_label: name(i),
             y_label: name(j),
-            x: square,
-            y: square,
+            x: widened(Axis::Linear(-1.2, 1.2, 0.4)),
+            y: Axis::Linear(-1.2, 1.2, 0.4),
             legend: (0.0, 1.0),
             curves,
             marks: unit.first().and_then(place).into_iter().collect(),
@@ -70,7 +69,7 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
         let above = Panel {
             x_label: "tip_x".into(),
             y_label: "tip_y".into(),
-            x: fitted,
+            x: widened(fitted),
             y: fitted,
             legend: (0.0, 1.0),
             curves: vec![Curve::unnamed(Line::Dotted, outline), Curve::unnamed(Line::Solid, plane.iter().copied())],
@@ -80,6 +79,17 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
         Some(("path.svg", grid(&[above, height])))
     };
     polhode().into_iter().chain(path()).collect()
+}
+
+/// The axis by half as long, as panels are half as wide again as high, so that circles are round.
+fn widened(axis: Axis) -> Axis {
+    match axis {
+        Axis::Linear(low, high, step) => {
+            let out = |end: f64| (1.5 * end.abs() / step - 1e-9).ceil() * step * end.signum();
+            Axis::Linear(out(low), out(high), step)
+        }
+        other => other,
+    }
 }
 
 fn at(v: &[f64; 3], k: usize) -> f64 {
