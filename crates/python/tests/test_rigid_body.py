@@ -46,7 +46,7 @@ def test_the_heavy_top_is_that_of_the_literature():
         ({"inertia": (1, 1, 3)}, "`inertia`.*triangle inequality"),
         ({"inertia": (1, 1)}, "`inertia` has the shape"),
         ({"inertia": [[1, 0.5, 0], [0.4, 1, 0], [0, 0, 1]]}, "`inertia`.*symmetric"),
-        ({"omega": (1, np.nan, 0)}, r"`omega\[1\]` is nan"),
+        ({"omega": (1, np.nan, 0)}, r"`omega\[1\]` is NaN"),
         ({"omega": None}, "`omega` is not given"),
         ({"integrator": "gauss_2", "step": 0.1, "omega": (0, 150, 0)}, "`step`.*beyond the chart.*at most 2.0"),
         ({"integrator": "midpoint", "step": 0.1}, "`integrator`.*gauss_4"),

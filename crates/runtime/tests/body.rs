@@ -25,7 +25,7 @@ fn a_damped_free_body() {
         let request = BodyMotion { rows: Some(OutputTimes::Every(10)), ..motion(name, steps) };
         let (outcome, rows) = free().record(&request).unwrap();
         assert_eq!((outcome.status, outcome.steps, rows.len()), (GroupStatus::Completed, steps, steps / 10 + 1));
-        let exact = [0.328817081371932892, -0.494159614067396359, -0.231714161269102468];
+        let exact = [0.3288170813719329, -0.49415961406739636, -0.23171416126910247];
         for (x, exact) in outcome.momentum.iter().zip(exact) {
             assert!((x - exact).abs() < 1e-13, "{name}: {:?}", outcome.momentum);
         }

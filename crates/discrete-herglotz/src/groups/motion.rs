@@ -92,8 +92,11 @@ impl<G: LieGroup<N>, const N: usize> GroupMotion<G, N> {
     /// unchanged.
     ///
     /// # Errors
-    /// Those of the step.
+    /// [`GroupError::Step`], and those of the step.
     pub fn advance_by(&mut self, integrator: &impl GroupIntegrator<G, N>, h: f64) -> Result<(), GroupError> {
+        if !(h.is_finite() && h != 0.0) {
+            return Err(GroupError::Step { h });
+        }
         let from = self.state();
         let guess = match self.velocity {
             Some(velocity) => velocity,
@@ -203,6 +206,8 @@ impl GroupMotion<Rotations, 3> {
             return Err(GroupError::NonFinite { what: "a number of a saved motion", value });
         }
         Rotations::check(&g)?;
+        // The rest of a sum is far below it.
+        Rotations::check(&Rotation { w: g.w + g_rest.w, u: g.u + g_rest.u })?;
         let velocity = velocity.iter().all(|x| x.is_finite()).then_some(velocity);
         let count = count as u64;
         Ok(GroupMotion { t0, t, start, count, h, g, g_rest, spatial, spatial_rest, z, log_factor, velocity })

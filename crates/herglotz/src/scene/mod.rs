@@ -36,7 +36,7 @@ pub fn schema() -> serde_json::Value {
     /// A motion of a Lagrangian, of a lattice or of a rigid body with the requested output, or a path between two ends.
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
-    #[expect(dead_code, clippy::large_enum_variant, reason = "it stands for its variants, which are read one by one")]
+    #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
     enum AnyFile {
         System(file::File),
         Lattice(lattice::LatticeFile),
