@@ -12,9 +12,9 @@ use discrete_herglotz::{AnyIntegrator, SplittingScheme};
 pub(super) const DEFAULT: AnyIntegrator = AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10);
 
 /// Gauss collocation or a splitting of a rigid body, as one type, for which runs are compiled once.
+#[expect(clippy::large_enum_variant, reason = "a run has one")]
 pub(super) enum BodyIntegrator {
-    /// In a box, since its coefficients are many.
-    Gauss(Box<GroupGauss<RigidBody<UniformGravity, 3>>>),
+    Gauss(GroupGauss<RigidBody<UniformGravity, 3>>),
     Splitting(RigidBodySplitting<UniformGravity>),
 }
 
@@ -23,7 +23,7 @@ impl BodyIntegrator {
     pub fn new(body: RigidBody<UniformGravity, 3>, by: AnyIntegrator, h: f64) -> Result<Self, GroupError> {
         match by {
             AnyIntegrator::Gauss { stages } => {
-                GroupGauss::new::<Rotations, 3>(body, stages, h).map(|gauss| BodyIntegrator::Gauss(Box::new(gauss)))
+                GroupGauss::new::<Rotations, 3>(body, stages, h).map(BodyIntegrator::Gauss)
             }
             AnyIntegrator::Splitting(scheme) => RigidBodySplitting::new(body, scheme, h).map(BodyIntegrator::Splitting),
             _ => RigidBodySplitting::new(body, SplittingScheme::STRANG, h).map(BodyIntegrator::Splitting),
@@ -50,7 +50,7 @@ impl BodyIntegrator {
 impl GroupIntegrator<Rotations, 3> for BodyIntegrator {
     fn step_size(&self) -> f64 {
         match self {
-            BodyIntegrator::Gauss(gauss) => GroupIntegrator::<Rotations, 3>::step_size(gauss.as_ref()),
+            BodyIntegrator::Gauss(gauss) => GroupIntegrator::<Rotations, 3>::step_size(gauss),
             BodyIntegrator::Splitting(splitting) => splitting.step_size(),
         }
     }
