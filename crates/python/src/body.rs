@@ -16,6 +16,9 @@ type EventRequest = (String, String, bool);
 /// The body: inertia as three or nine numbers, mass, centre, gravity, gamma.
 type BodyRequest<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
+/// The accuracy; or the integrator, and the length or the number of its steps.
+type WayRequest<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<'py, PyAny>>, Option<usize>);
+
 /// Keeps the rows and the sign changes.
 struct Kept {
     rows: Vec<f64>,
@@ -90,7 +93,7 @@ pub fn run_rigid_body(
     start: (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>),
     t: Bound<'_, PyAny>,
     every: Option<usize>,
-    way: (Option<Bound<'_, PyAny>>, Option<String>, Option<Bound<'_, PyAny>>, Option<usize>),
+    way: WayRequest<'_>,
     events: Vec<EventRequest>,
 ) -> PyResult<BodyRecord> {
     let body = body_of(&body)?;
