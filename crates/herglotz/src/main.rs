@@ -5,6 +5,7 @@ mod failure;
 mod output;
 mod peer;
 mod plot;
+mod plot_body;
 mod plot_fit;
 
 use clap::Parser;

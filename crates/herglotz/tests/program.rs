@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+#[path = "program/body.rs"]
+mod body;
 #[path = "program/ends.rs"]
 mod ends;
 #[path = "program/events.rs"]
@@ -336,7 +338,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 26, "{names:?}");
+    assert_eq!(names.len(), 28, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
@@ -377,6 +379,17 @@ fn scenes_run() {
     }
     assert!(*column(&rows, "log_f").last().unwrap() < -3.0 * 20.0_f64.ln());
     assert!(column(&at.read("thrown/rows.csv"), "off").iter().all(|x| x.abs() < 1e-9));
+    // A damped free body in closed form, and a heavy top of the literature.
+    let last = |rows: &str, names: [&str; 3]| names.map(|name| *column(rows, name).last().unwrap());
+    let found = last(&at.read("free_body/rows.csv"), ["Pi1", "Pi2", "Pi3"]);
+    for (x, exact) in found.iter().zip([0.3288170813719329, -0.49415961406739636, -0.23171416126910247]) {
+        assert!((x - exact).abs() < 1e-12, "{found:?}");
+    }
+    let found = last(&at.read("heavy_top/rows.csv"), ["tip_x", "tip_y", "tip_z"]);
+    for (x, u) in found.iter().zip([-0.150416822746, 1.0 - 1.724165591637, -0.673022269560]) {
+        assert!((x - u).abs() < 1e-11, "{found:?}");
+    }
+    assert!(column(&at.read("heavy_top/events.csv"), "tip_z").iter().all(|x| (x + 0.4).abs() < 1e-12));
 }
 
 /// A comparison names the best integrator for each error, and shorter steps have smaller errors.

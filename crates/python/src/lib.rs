@@ -2,6 +2,7 @@
 //! check and document its functions.
 
 mod arrays;
+mod body;
 mod checks;
 mod condition;
 mod contact;
@@ -29,6 +30,8 @@ use pyo3::prelude::*;
 /// The extension module.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::body::{BodyRecord, run_rigid_body};
     #[pymodule_export]
     use crate::checks::{check, compare, geometry, hamiltonian_geometry};
     #[pymodule_export]

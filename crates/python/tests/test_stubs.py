@@ -30,6 +30,8 @@ def test_classes_have_what_their_stubs_have():
     sol = hz.solve("pendulum", t=1.0)
     made = {"Solution": sol, "Plan": sol.plan, "System": sol.system, "States": sol(0.5), "Event": hz.Event("theta")}
     made["SparseSolution"] = hz.bodies([1.0, 1.0], [[0.0, 0.0], [1.0, 0.0]], 0.0, 0.1, step=0.1)
+    made["RigidBodySolution"] = hz.rigid_body((1, 2, 3), omega=(1, 1, 1), t=1.0)
+    made["RigidBodyStates"] = made["RigidBodySolution"].end
     made["Ensemble"] = hz.ensemble("pendulum", [[1.0]], [[0.0]], 1.0)
     made["Geometry"] = hz.geometry("pendulum", 0.0, [1.0], [0.0])
     made["Contact"] = hz.is_contact(lambda q, p, z: (q, p, z), ([1.0], [0.0], 0.0))

@@ -3,7 +3,8 @@
 //! The libraries below this one are generic in the number of coordinates and in the Lagrangian. This crate has one type
 //! for all formulas in 1 to 16 coordinates, for which the generic code is compiled once. [`System`] is a formula with
 //! its integrators, [`Motion`] a request for one motion, [`Ensemble`] for many, and [`BoundaryProblem`] for a path
-//! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates.
+//! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates. [`Body`] is a
+//! rigid body about a fixed point.
 //!
 //! ```
 //! use herglotz_runtime::{Column, Motion, Start, System, StepControl, OutputTimes};
@@ -19,6 +20,7 @@
 //! # Ok::<(), herglotz_runtime::RuntimeError>(())
 //! ```
 
+mod body;
 mod catalogue;
 mod check;
 mod column;
@@ -42,6 +44,7 @@ mod sparse;
 mod symmetry;
 mod system;
 
+pub use body::{Body, BodyEvent, BodyMotion, BodyOutcome};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, NotContact, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
@@ -66,6 +69,7 @@ pub use system::System;
 pub use contact_geom::switching::Impact;
 pub use contact_geom::table::{Interpolation, Table, TableError};
 pub use contact_geom::{HamiltonianStructure, Statement, Structure};
+pub use discrete_herglotz::groups::GroupStatus;
 pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
     Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally, hamiltonian::ModifiedDefect,

@@ -2,6 +2,7 @@
 
 #![allow(missing_docs)]
 
+mod body;
 mod fit;
 mod motions;
 mod path;

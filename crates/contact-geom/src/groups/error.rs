@@ -113,4 +113,32 @@ pub enum GroupError {
         /// The conformal factor.
         sigma: f64,
     },
+    /// The times of the rows of a run are not within it, or not in its order.
+    #[error("row {index} is at t = {t}, but it must be between {from} and {to}, in the order of the motion")]
+    Times {
+        /// The number of the row, counted from 0.
+        index: usize,
+        /// Its time.
+        t: f64,
+        /// The time of the row before it, or the initial time.
+        from: f64,
+        /// The final time.
+        to: f64,
+    },
+    /// An accuracy is not positive, or is not reached.
+    #[error(
+        "the accuracy {requested:e} is not reached{}; it must be a positive number above round-off", if *steps > 0 {
+            format!(": {steps} steps reach {reached:e}, and more are not better")
+        } else {
+            String::new()
+        }
+    )]
+    Accuracy {
+        /// The accuracy that was requested.
+        requested: f64,
+        /// The smallest difference of two runs.
+        reached: f64,
+        /// The number of steps that reach it; 0 if there is none.
+        steps: usize,
+    },
 }

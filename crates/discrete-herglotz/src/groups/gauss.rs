@@ -30,6 +30,11 @@ pub struct GroupGauss<L> {
     constant: Option<([f64; MAX_STAGES], f64)>,
 }
 
+/// The factors `rho_k/rho_1` at the nodes of a step and `sigma_d - 1`, for a constant rate.
+fn constant_factors(gamma: f64, h: f64, table: &Table) -> ([f64; MAX_STAGES], f64) {
+    (table.c.map(|c| (gamma * h * (1.0 - c)).exp()), (gamma * h).exp_m1())
+}
+
 /// The largest number of sweeps of the fixed-point iteration.
 const SWEEPS: u32 = 200;
 
@@ -54,10 +59,7 @@ impl<L> GroupGauss<L> {
         let exact = Coefficients::of(stages);
         let (b, c) = (exact.b.map(|x| x.0), exact.c.map(|x| x.0));
         let table = Table { s: stages, a: exact.a.map(|row| row.map(|x| x.0)), b, c, end: exact.ends[1] };
-        let constant = lagrangian.constant_rate().map(|gamma| {
-            let rho = c.map(|c| (gamma * h * (1.0 - c)).exp());
-            (rho, (gamma * h).exp_m1())
-        });
+        let constant = lagrangian.constant_rate().map(|gamma| constant_factors(gamma, h, &table));
         Ok(GroupGauss { lagrangian, table, h, constant })
     }
 
@@ -78,30 +80,33 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
     }
 
     /// Solves the stage equations by fixed-point iteration to round-off, from a constant body velocity.
-    fn step<T: Scalar>(
+    fn step_by<T: Scalar>(
         &self,
+        h: f64,
         t: f64,
         from: &GroupState<G, N, T>,
         velocity: &SVector<T, N>,
     ) -> Result<GroupStep<N, T>, GroupError> {
-        let angle = |xi: &SVector<T, N>| G::angle(&xi.map(|x| x.re()));
-        let beyond = |angle: f64| GroupError::BeyondChart { h: self.h, angle, largest: PI * self.h.abs() / angle };
-        let first = angle(&(*velocity * T::from(self.h)));
-        if first >= PI {
-            return Err(beyond(first));
+        let angle = G::angle(&velocity.map(|x| x.re() * h));
+        if angle >= PI {
+            return Err(GroupError::BeyondChart { h, angle, largest: PI * h.abs() / angle });
         }
+        let constant = match self.lagrangian.constant_rate() {
+            Some(gamma) if h != self.h => Some(constant_factors(gamma, h, &self.table)),
+            _ => self.constant,
+        };
         let given = Given {
             lagrangian: &self.lagrangian,
             table: &self.table,
-            constant: self.constant,
+            constant,
             t,
-            h: self.h,
+            h,
             g0: from.g,
             momentum: from.momentum,
             z0: from.z,
         };
         let mut stages = Stages::<G, N, T>::guess(velocity);
-        if let Some((rho, sigma_minus_one)) = self.constant {
+        if let Some((rho, sigma_minus_one)) = constant {
             (stages.rho, stages.sigma_minus_one) = (rho.map(T::from), T::from(sigma_minus_one));
         }
         let (mut smallest, mut stagnant) = (f64::INFINITY, 0);
@@ -160,7 +165,7 @@ impl<L> GroupGauss<L> {
         }
         let angle = G::angle(&stages.increment.map(|x| x.re()));
         if angle >= PI {
-            return Err(GroupError::BeyondChart { h: self.h, angle, largest: PI * self.h.abs() / angle });
+            return Err(GroupError::BeyondChart { h: given.h, angle, largest: PI * given.h.abs() / angle });
         }
         Ok(GroupStep {
             increment: stages.increment,

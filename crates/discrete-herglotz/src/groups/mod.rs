@@ -20,15 +20,21 @@
 //! # Ok::<(), contact_geom::groups::GroupError>(())
 //! ```
 
+mod accuracy;
 mod boundary;
+mod events;
 mod gauss;
 mod motion;
+mod run;
 mod splitting;
 mod stages;
 mod state;
 
+pub use accuracy::{GroupSteps, group_distance, group_steps};
 pub use boundary::{GroupEnds, MotionBetween};
+pub use events::GroupEvent;
 pub use gauss::GroupGauss;
 pub use motion::GroupMotion;
+pub use run::{GroupObserver, GroupRows, GroupRun, GroupStatus};
 pub use splitting::RigidBodySplitting;
 pub use state::{GroupIntegrator, GroupState, GroupStep};

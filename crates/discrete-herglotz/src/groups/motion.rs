@@ -1,14 +1,14 @@
 //! Motions on a Lie group.
 
 use super::{GroupIntegrator, GroupState};
-use contact_geom::groups::{GroupError, LieGroup};
+use contact_geom::groups::{GroupError, LieGroup, Rotation, Rotations};
 use contact_geom::nalgebra::SVector;
 
 /// A motion that is advanced by steps. Configuration, spatial momentum and action are summed with compensation, so that
 /// the round-off of many steps does not add up: what a symmetry keeps in a step, it keeps over a run.
 ///
 /// The momentum is carried in space, `mu = Ad_(g^-1)^T Pi`; a step replaces it by `sigma_d mu` and the spatial impulse.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct GroupMotion<G: LieGroup<N>, const N: usize> {
     t0: f64,
     t: f64,
@@ -23,6 +23,26 @@ pub struct GroupMotion<G: LieGroup<N>, const N: usize> {
     z: [f64; 2],
     log_factor: [f64; 2],
     velocity: Option<SVector<f64, N>>,
+}
+
+// A derived implementation would require one of G, which has no values.
+impl<G: LieGroup<N>, const N: usize> Clone for GroupMotion<G, N> {
+    fn clone(&self) -> Self {
+        GroupMotion {
+            t0: self.t0,
+            t: self.t,
+            start: self.start,
+            count: self.count,
+            h: self.h,
+            g: self.g,
+            g_rest: self.g_rest,
+            spatial: self.spatial,
+            spatial_rest: self.spatial_rest,
+            z: self.z,
+            log_factor: self.log_factor,
+            velocity: self.velocity,
+        }
+    }
 }
 
 /// Adds a change to a sum `[value, rest]` with compensation.
@@ -62,37 +82,54 @@ impl<G: LieGroup<N>, const N: usize> GroupMotion<G, N> {
     /// # Errors
     /// Those of the step.
     pub fn advance(&mut self, integrator: &impl GroupIntegrator<G, N>, steps: usize) -> Result<(), GroupError> {
-        let h = integrator.step_size();
+        for _ in 0..steps {
+            self.advance_by(integrator, integrator.step_size())?;
+        }
+        Ok(())
+    }
+
+    /// Takes one step of any length, such as a shorter one to the time of an event. After a failure the motion is
+    /// unchanged.
+    ///
+    /// # Errors
+    /// [`GroupError::Step`], and those of the step.
+    pub fn advance_by(&mut self, integrator: &impl GroupIntegrator<G, N>, h: f64) -> Result<(), GroupError> {
+        if !(h.is_finite() && h != 0.0) {
+            return Err(GroupError::Step { h });
+        }
+        let from = self.state();
+        let guess = match self.velocity {
+            Some(velocity) => velocity,
+            None => integrator.velocity(self.t, &from)?,
+        };
+        let step = integrator.step_by(h, self.t, &from, &guess)?;
+        let finite = step.increment.iter().chain(step.impulse.iter()).all(|x| x.is_finite());
+        if !(finite && step.action.is_finite() && step.sigma_minus_one.is_finite()) {
+            return Err(GroupError::NonFinite { what: "the result of a step", value: f64::NAN });
+        }
+        let impulse = G::coadjoint(&G::inverse(&self.g), &step.impulse);
+        for i in 0..N {
+            let scaled = (self.spatial[i] + self.spatial_rest[i]) * step.sigma_minus_one;
+            add(&mut self.spatial[i], &mut self.spatial_rest[i], scaled);
+            add(&mut self.spatial[i], &mut self.spatial_rest[i], impulse[i]);
+        }
+        G::advance(&mut self.g, &mut self.g_rest, &step.increment);
+        let [z, rest] = &mut self.z;
+        add(z, rest, step.action);
+        let [factor, rest] = &mut self.log_factor;
+        add(factor, rest, step.sigma_minus_one.ln_1p());
+        self.velocity = Some(step.velocity);
         if h != self.h {
             (self.h, self.start, self.count) = (h, self.t, 0);
         }
-        for _ in 0..steps {
-            let from = self.state();
-            let guess = match self.velocity {
-                Some(velocity) => velocity,
-                None => integrator.velocity(self.t, &from)?,
-            };
-            let step = integrator.step(self.t, &from, &guess)?;
-            let finite = step.increment.iter().chain(step.impulse.iter()).all(|x| x.is_finite());
-            if !(finite && step.action.is_finite() && step.sigma_minus_one.is_finite()) {
-                return Err(GroupError::NonFinite { what: "the result of a step", value: f64::NAN });
-            }
-            let impulse = G::coadjoint(&G::inverse(&self.g), &step.impulse);
-            for i in 0..N {
-                let scaled = (self.spatial[i] + self.spatial_rest[i]) * step.sigma_minus_one;
-                add(&mut self.spatial[i], &mut self.spatial_rest[i], scaled);
-                add(&mut self.spatial[i], &mut self.spatial_rest[i], impulse[i]);
-            }
-            G::advance(&mut self.g, &mut self.g_rest, &step.increment);
-            let [z, rest] = &mut self.z;
-            add(z, rest, step.action);
-            let [factor, rest] = &mut self.log_factor;
-            add(factor, rest, step.sigma_minus_one.ln_1p());
-            self.velocity = Some(step.velocity);
-            self.count += 1;
-            self.t = self.start + self.count as f64 * h;
-        }
+        self.count += 1;
+        self.t = self.start + self.count as f64 * h;
         Ok(())
+    }
+
+    /// The body velocity at the present time as the last step extrapolates it; `None` before the first step.
+    pub(super) fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        self.velocity
     }
 
     /// The time.
@@ -118,5 +155,61 @@ impl<G: LieGroup<N>, const N: usize> GroupMotion<G, N> {
     /// The logarithm of the conformal factor from the start, `ln(sigma_1 ... sigma_k)`.
     pub fn log_factor(&self) -> f64 {
         self.log_factor[0]
+    }
+}
+
+/// The number of numbers of a saved motion on SO(3).
+const SAVED: usize = 26;
+
+impl GroupMotion<Rotations, 3> {
+    /// The motion as numbers, from which [`restore`](Self::restore) continues it to the last bit.
+    pub fn save(&self) -> [f64; SAVED] {
+        let mut numbers = [0.0; SAVED];
+        let [g, g_rest] = [self.g, self.g_rest].map(|g| g.quaternion());
+        // Exact for up to 2^53 steps.
+        let times = [self.t0, self.t, self.start, self.count as f64, self.h];
+        // NaN before the first step.
+        let velocity = self.velocity.unwrap_or(SVector::from([f64::NAN; 3]));
+        let all = times
+            .iter()
+            .chain(&g)
+            .chain(&g_rest)
+            .chain(&self.spatial)
+            .chain(&self.spatial_rest)
+            .chain(&self.z)
+            .chain(&self.log_factor)
+            .chain(&velocity);
+        for (to, x) in numbers.iter_mut().zip(all) {
+            *to = *x;
+        }
+        numbers
+    }
+
+    /// The motion that was saved.
+    ///
+    /// # Errors
+    /// [`GroupError::NonFinite`], [`GroupError::NonUnitQuaternion`] for other numbers than those of a motion.
+    pub fn restore(numbers: &[f64; SAVED]) -> Result<Self, GroupError> {
+        let mut all = numbers.iter().copied();
+        let mut next = || all.next().unwrap_or(f64::NAN);
+        let [t0, t, start, count, h] = std::array::from_fn(|_| next());
+        let mut rotation = || Rotation { w: next(), u: SVector::from(std::array::from_fn(|_| next())) };
+        let (g, g_rest) = (rotation(), rotation());
+        let mut vector = || SVector::from(std::array::from_fn(|_| next()));
+        let (spatial, spatial_rest): (SVector<f64, 3>, SVector<f64, 3>) = (vector(), vector());
+        let z = std::array::from_fn(|_| next());
+        let log_factor = std::array::from_fn(|_| next());
+        let velocity: SVector<f64, 3> = SVector::from(std::array::from_fn(|_| next()));
+        // The velocity is not known before the first step.
+        let known = numbers.len() - 3;
+        if let Some(&value) = numbers.iter().take(known).find(|x| !x.is_finite()) {
+            return Err(GroupError::NonFinite { what: "a number of a saved motion", value });
+        }
+        Rotations::check(&g)?;
+        // The rest of a sum is far below it.
+        Rotations::check(&Rotation { w: g.w + g_rest.w, u: g.u + g_rest.u })?;
+        let velocity = velocity.iter().all(|x| x.is_finite()).then_some(velocity);
+        let count = count as u64;
+        Ok(GroupMotion { t0, t, start, count, h, g, g_rest, spatial, spatial_rest, z, log_factor, velocity })
     }
 }

@@ -154,8 +154,9 @@ impl<V: GroupPotential<Rotations, 3>> GroupIntegrator<Rotations, 3> for RigidBod
         self.h
     }
 
-    fn step<T: Scalar>(
+    fn step_by<T: Scalar>(
         &self,
+        h: f64,
         _t: f64,
         from: &GroupState<Rotations, 3, T>,
         _velocity: &SVector<T, 3>,
@@ -165,17 +166,17 @@ impl<V: GroupPotential<Rotations, 3>> GroupIntegrator<Rotations, 3> for RigidBod
         let mut inner = Inner { f: Rotations::identity(), at_start: from.momentum, kicks: zero, z: T::zero(), s: 0.0 };
         for (i, kick) in self.kicks.iter().enumerate() {
             if *kick != 0.0 {
-                let weight = kick * self.h * (-gamma * inner.s).exp();
+                let weight = kick * h * (-gamma * inner.s).exp();
                 let (potential, gradient) = self.body.potential().with_gradient(&Rotations::compose(&from.g, &inner.f));
                 inner.kicks -= inner.f.apply(&gradient) * T::from(weight);
                 inner.z -= potential * weight;
             }
             if let Some(drift) = self.drifts.get(i) {
-                self.drift(&mut inner, drift * self.h);
+                self.drift(&mut inner, drift * h);
             }
         }
-        let sigma = (gamma * self.h).exp();
-        let sigma_minus_one = (gamma * self.h).exp_m1();
+        let sigma = (gamma * h).exp();
+        let sigma_minus_one = (gamma * h).exp_m1();
         let velocity = self.body.velocity(&(self.momentum(&inner) * T::from(sigma)));
         Ok(GroupStep {
             increment: Rotations::log(&inner.f),

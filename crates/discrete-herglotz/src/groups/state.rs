@@ -79,8 +79,21 @@ pub trait GroupIntegrator<G: LieGroup<N>, const N: usize> {
     /// The step h.
     fn step_size(&self) -> f64;
 
-    /// A step from a state at time t. The velocity is a guess of the body velocity there, which an explicit method does
-    /// not use.
+    /// A step of any length `h` from a state at time t: that of [`step_size`](Self::step_size), or a shorter one to a
+    /// time between two steps. The velocity is a guess of the body velocity at t, which an explicit method does not
+    /// use.
+    ///
+    /// # Errors
+    /// Those of the method.
+    fn step_by<T: Scalar>(
+        &self,
+        h: f64,
+        t: f64,
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError>;
+
+    /// A step of the length [`step_size`](Self::step_size).
     ///
     /// # Errors
     /// Those of the method.
@@ -89,7 +102,9 @@ pub trait GroupIntegrator<G: LieGroup<N>, const N: usize> {
         t: f64,
         from: &GroupState<G, N, T>,
         velocity: &SVector<T, N>,
-    ) -> Result<GroupStep<N, T>, GroupError>;
+    ) -> Result<GroupStep<N, T>, GroupError> {
+        self.step_by(self.step_size(), t, from, velocity)
+    }
 
     /// A guess of the body velocity at a state.
     ///

@@ -1,5 +1,6 @@
 //! The commands of the program, one file each.
 
+mod body;
 mod check;
 mod checkpoint;
 mod compare;

@@ -10,7 +10,7 @@ use herglotz::runtime::{
     AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RunMonitor, RuntimeError, Status, StepControl, Steps,
     velocity_name,
 };
-use herglotz::{EndsScene, LatticeScene, Scene};
+use herglotz::{BodyScene, EndsScene, LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -36,7 +36,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     checkpoint_every: u32,
     /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg; for a lattice
-    /// space-time.svg and sites.svg.
+    /// space-time.svg and sites.svg; for a rigid body polhode.svg and path.svg.
     #[arg(long)]
     pub(super) plot: bool,
     /// Print the result as JSON.
@@ -171,6 +171,9 @@ impl Run {
         let text = self.scene.text()?;
         if LatticeScene::is_one(&text) {
             return self.run_lattice(&text);
+        }
+        if BodyScene::is_one(&text) {
+            return self.run_body(&text);
         }
         if EndsScene::is_one(&text) {
             return self.run_ends(&text);

@@ -1,5 +1,6 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
+mod body;
 mod checked;
 mod csv_file;
 mod ends;
@@ -22,6 +23,7 @@ mod sweep;
 mod system;
 mod tables;
 
+pub use body::BodyScene;
 pub use ends::EndsScene;
 pub use error::SceneError;
 pub use lattice::LatticeScene;
@@ -31,14 +33,15 @@ pub use sweep::SweptQuantity;
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    /// A motion of a Lagrangian or of a lattice with the requested output, or a path between two ends.
+    /// A motion of a Lagrangian, of a lattice or of a rigid body with the requested output, or a path between two ends.
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
-    #[expect(dead_code, clippy::large_enum_variant, reason = "it stands for its variants, which are read one by one")]
+    #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
     enum AnyFile {
         System(file::File),
         Lattice(lattice::LatticeFile),
         Ends(ends::EndsFile),
+        Body(body::BodyFile),
     }
     schemars::schema_for!(AnyFile).to_value()
 }

@@ -112,6 +112,11 @@ impl Scene {
                            coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
+        if let Some(body) = file::span_of_table(text, "body") {
+            let message = "a rigid body works only with `herglotz run`; the other commands are for systems given by \
+                           formulas";
+            return Err(SceneError::at(text, body, message));
+        }
         if let Some(ends) = file::span_of_table(text, "ends") {
             let message = "a path between ends works only with `herglotz run`; the other commands are for motions \
                            from a start";

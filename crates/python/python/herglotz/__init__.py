@@ -31,6 +31,7 @@ __version__ = "0.1.0"
 
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
+    "_body": "RigidBodySolution RigidBodyStates rigid_body",
     "_sparse": "SparseSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
@@ -89,6 +90,8 @@ __all__ = [
     "Plan",
     "Resets",
     "Retraction",
+    "RigidBodySolution",
+    "RigidBodyStates",
     "Sensitivity",
     "Solution",
     "States",
@@ -110,6 +113,7 @@ __all__ = [
     "lattice",
     "path",
     "retract",
+    "rigid_body",
     "solve",
     "system",
     "table",

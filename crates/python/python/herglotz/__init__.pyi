@@ -299,9 +299,31 @@ class SparseSolution:
     def resume(self, t: ArrayLike | None = None) -> SparseSolution: ...
     def to_xarray(self) -> Any: ...
 
+class RigidBodyStates:
+    t: Vector
+    attitude: Vector
+    Pi: Vector
+    omega: Vector
+    M: Vector
+    tip: Vector
+    energy: Vector
+    z: Vector
+
+class RigidBodySolution(RigidBodyStates):
+    end: RigidBodyStates
+    events: list[RigidBodyStates]
+    status: str
+    success: bool
+    integrator: str
+    step_size: float
+    steps: int
+    error_estimate: float | None
+    @property
+    def t_end(self) -> float: ...
+
 class Interrupted(KeyboardInterrupt):
-    solution: Solution | SparseSolution | Ensemble
-    def __init__(self, solution: Solution | SparseSolution | Ensemble) -> None: ...
+    solution: Solution | SparseSolution | RigidBodySolution | Ensemble
+    def __init__(self, solution: Solution | SparseSolution | RigidBodySolution | Ensemble) -> None: ...
 
 class Ensemble:
     system: System
@@ -488,6 +510,24 @@ def bodies(
     every: int | None = None,
     conformal_factor: bool = False,
 ) -> SparseSolution: ...
+def rigid_body(
+    inertia: ArrayLike,
+    *,
+    mass: float = 0.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    gamma: float = 0.0,
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    omega: ArrayLike | None = None,
+    z0: float = 0.0,
+    t: ArrayLike | None = None,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    every: int | None = None,
+    events: str | Event | Sequence[str | Event] = (),
+) -> RigidBodySolution: ...
 def ensemble(
     L: Lagrangian,
     q0: ArrayLike,

@@ -6,7 +6,9 @@ use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::groups::{GroupError, Inertia, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
-use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupMotion, GroupState, RigidBodySplitting};
+use discrete_herglotz::groups::{
+    GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun, GroupState, RigidBodySplitting, group_steps,
+};
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
@@ -20,6 +22,16 @@ pub const TESTS: &[InputTest] = &[
             "GroupState::check",
         ],
         run: starts,
+    },
+    InputTest {
+        entries: &[
+            "GroupIntegrator::step_by",
+            "GroupMotion::advance_by",
+            "GroupMotion::restore",
+            "GroupRun::run",
+            "groups::group_steps",
+        ],
+        run: runs,
     },
     InputTest { entries: &["GroupGauss::new", "RigidBodySplitting::new"], run: methods },
 ];
@@ -94,4 +106,43 @@ fn methods(report: &mut Report) {
     });
     let named = matches!(unsymmetric, Err(GroupError::NeedsComposition { .. }));
     report.check(named, || "a Nyström scheme for a body without symmetry".into());
+}
+
+/// Steps of other lengths, times of rows, saved numbers, spans and accuracies.
+fn runs(report: &mut Report) {
+    let method = |h: f64| body(-0.1).and_then(|body| GroupGauss::new::<Rotations, 3>(body, 3, h));
+    let motion = GroupMotion::<Rotations, 3>::new(0.0, start(GOOD));
+    let (Ok(gauss), Ok(motion)) = (method(0.05), motion) else {
+        return report.check(false, || "good methods and starts are refused".into());
+    };
+    let numbers = |motion: &GroupMotion<Rotations, 3>| -> Result<Vec<f64>, GroupError> {
+        let end = motion.state();
+        end.check()?;
+        Ok(end.momentum.iter().copied().chain([end.z, motion.t()]).collect())
+    };
+    for value in EXTREME {
+        let mut moved = motion.clone();
+        let step = moved.advance_by(&gauss, value);
+        report.entry_point(&value, step.and_then(|()| numbers(&moved)));
+        let mut moved = motion.clone();
+        let run = GroupRun { rows: GroupRows::At(vec![value]), ..GroupRun::new(10) };
+        report.entry_point(&value, run.run(&mut moved, &gauss, &mut ()).and_then(|_| numbers(&moved)));
+        let steps = group_steps(&motion, value, 1e-3, 2, method);
+        report.entry_point(&value, steps.map(|steps| vec![steps.h, steps.error]));
+        let steps = group_steps(&motion, 0.5, value, 2, method);
+        report.entry_point(&value, steps.map(|steps| vec![steps.h, steps.error]));
+        // The last three numbers are a velocity, which need not be known.
+        for i in 0..23 {
+            let mut saved = motion.save();
+            saved[i] = value;
+            let restored = GroupMotion::<Rotations, 3>::restore(&saved);
+            report.entry_point(
+                &value,
+                restored.and_then(|mut moved| {
+                    moved.advance(&gauss, 2)?;
+                    numbers(&moved)
+                }),
+            );
+        }
+    }
 }

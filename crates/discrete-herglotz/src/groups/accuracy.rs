@@ -1,0 +1,77 @@
+//! The number of steps for an accuracy, by trial runs.
+
+use super::{GroupIntegrator, GroupMotion, GroupState};
+use contact_geom::groups::{GroupError, LieGroup};
+
+/// The steps that reach an accuracy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupSteps {
+    /// Their number.
+    pub steps: usize,
+    /// Their length.
+    pub h: f64,
+    /// The difference at the end from a run with half as many steps, by [`group_distance`]: a bound of the error, which
+    /// is smaller by about `2^order - 1`.
+    pub error: f64,
+}
+
+/// The largest number of steps of a trial run.
+const MOST: usize = 1 << 24;
+
+/// The distance of two states: the larger of the chart vector `log(g_a^-1 g_b)`, by its norm, and the difference of the
+/// spatial momenta relative to their size. NaN if a state is not finite.
+pub fn group_distance<G: LieGroup<N>, const N: usize>(a: &GroupState<G, N>, b: &GroupState<G, N>) -> f64 {
+    let turn = G::log(&G::compose(&G::inverse(&a.g), &b.g)).norm();
+    let (p, q) = (a.spatial_momentum(), b.spatial_momentum());
+    let size = if p.norm() > q.norm() { p.norm() } else { q.norm() };
+    let momentum = if size > 0.0 { (p - q).norm() / size } else { (p - q).norm() };
+    if turn > momentum || turn.is_nan() { turn } else { momentum }
+}
+
+/// The steps with which a motion over `span` reaches an accuracy at its end: their number is doubled from `steps` until
+/// two runs differ by at most `accuracy`. A step that fails is divided like one that is not accurate.
+///
+/// # Errors
+/// [`GroupError::Accuracy`] where it is below the round-off of the runs, or takes more than 2^24 steps; the last error
+/// of a step where no run succeeds.
+pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
+    start: &GroupMotion<G, N>,
+    span: f64,
+    accuracy: f64,
+    steps: usize,
+    integrator: impl Fn(f64) -> Result<I, GroupError>,
+) -> Result<GroupSteps, GroupError> {
+    if !(accuracy > 0.0 && accuracy.is_finite()) {
+        return Err(GroupError::Accuracy { requested: accuracy, reached: f64::NAN, steps: 0 });
+    }
+    let mut last: Result<GroupState<G, N>, GroupError> = Err(GroupError::Step { h: span });
+    let (mut smallest, mut stagnant, mut best) = (f64::INFINITY, 0, 0);
+    let mut count = steps.max(1);
+    while count <= MOST {
+        let h = span / count as f64;
+        let method = integrator(h)?;
+        let mut motion = start.clone();
+        let end = motion.advance(&method, count).map(|()| motion.state());
+        match (&last, &end) {
+            (Ok(coarse), Ok(fine)) => {
+                let error = group_distance(coarse, fine);
+                if error <= accuracy {
+                    return Ok(GroupSteps { steps: count, h, error });
+                }
+                stagnant = if error < 0.5 * smallest { 0 } else { stagnant + 1 };
+                if error < smallest {
+                    (smallest, best) = (error, count);
+                }
+                // At round-off more steps do not help.
+                if stagnant >= 3 && smallest < 1e-6 {
+                    return Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best });
+                }
+            }
+            (_, Err(error)) if count > MOST / 2 => return Err(*error),
+            _ => {}
+        }
+        last = end;
+        count = count.saturating_mul(2);
+    }
+    last.and(Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best }))
+}

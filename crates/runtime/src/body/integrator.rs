@@ -1,0 +1,77 @@
+//! The integrators of rigid bodies.
+
+use crate::RuntimeError;
+use contact_geom::Scalar;
+use contact_geom::groups::{GroupError, RigidBody, Rotations, UniformGravity};
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupState, GroupStep, RigidBodySplitting};
+use discrete_herglotz::rules::Method;
+use discrete_herglotz::{AnyIntegrator, SplittingScheme};
+
+/// The integrator where only an accuracy is given: explicit, of order 10, for any moments of inertia.
+pub(super) const DEFAULT: AnyIntegrator = AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10);
+
+/// Gauss collocation or a splitting of a rigid body, as one type, for which runs are compiled once.
+#[expect(clippy::large_enum_variant, reason = "a run has one")]
+pub(super) enum BodyIntegrator {
+    Gauss(GroupGauss<RigidBody<UniformGravity, 3>>),
+    Splitting(RigidBodySplitting<UniformGravity>),
+}
+
+impl BodyIntegrator {
+    /// The integrator of this name with the step h.
+    pub fn new(body: RigidBody<UniformGravity, 3>, by: AnyIntegrator, h: f64) -> Result<Self, GroupError> {
+        match by {
+            AnyIntegrator::Gauss { stages } => {
+                GroupGauss::new::<Rotations, 3>(body, stages, h).map(BodyIntegrator::Gauss)
+            }
+            AnyIntegrator::Splitting(scheme) => RigidBodySplitting::new(body, scheme, h).map(BodyIntegrator::Splitting),
+            _ => RigidBodySplitting::new(body, SplittingScheme::STRANG, h).map(BodyIntegrator::Splitting),
+        }
+    }
+
+    /// Refuses integrators that rigid bodies do not have.
+    pub fn check(by: AnyIntegrator) -> Result<(), RuntimeError> {
+        match by {
+            AnyIntegrator::Gauss { .. } | AnyIntegrator::Splitting(_) | AnyIntegrator::Discrete(Method::Strang) => {
+                Ok(())
+            }
+            other => Err(RuntimeError::argument(
+                "integrator",
+                format!(
+                    "is \"{other}\", but a rigid body is integrated by a Gauss method such as \"gauss_4\" or by a \
+                     splitting such as \"sofroniou_spaletta_10\""
+                ),
+            )),
+        }
+    }
+}
+
+impl GroupIntegrator<Rotations, 3> for BodyIntegrator {
+    fn step_size(&self) -> f64 {
+        match self {
+            BodyIntegrator::Gauss(gauss) => GroupIntegrator::<Rotations, 3>::step_size(gauss),
+            BodyIntegrator::Splitting(splitting) => splitting.step_size(),
+        }
+    }
+
+    fn step_by<T: Scalar>(
+        &self,
+        h: f64,
+        t: f64,
+        from: &GroupState<Rotations, 3, T>,
+        velocity: &SVector<T, 3>,
+    ) -> Result<GroupStep<3, T>, GroupError> {
+        match self {
+            BodyIntegrator::Gauss(gauss) => gauss.step_by(h, t, from, velocity),
+            BodyIntegrator::Splitting(splitting) => splitting.step_by(h, t, from, velocity),
+        }
+    }
+
+    fn velocity(&self, t: f64, from: &GroupState<Rotations, 3>) -> Result<SVector<f64, 3>, GroupError> {
+        match self {
+            BodyIntegrator::Gauss(gauss) => gauss.velocity(t, from),
+            BodyIntegrator::Splitting(splitting) => splitting.velocity(t, from),
+        }
+    }
+}
