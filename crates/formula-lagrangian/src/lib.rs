@@ -113,6 +113,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod constraints;
 mod degrees;
 mod derivatives;
 mod derived;
