@@ -1,6 +1,7 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
 mod checked;
+mod constraints;
 mod csv_file;
 mod ends;
 mod error;

@@ -58,6 +58,7 @@ pub(super) struct FitModel<'a> {
 
 impl<'a> FitModel<'a> {
     pub fn new(system: &'a System, request: &MotionFit, monitor: &'a mut dyn RunMonitor) -> Result<Self, RuntimeError> {
+        crate::kernel::refuse_constraints(system.formula(), "fits")?;
         let t0 = request.motion.start.t;
         let unknowns = request.unknowns.iter().map(|unknown| unknown_of(system, &unknown.name));
         let unknowns = unknowns.collect::<Result<Vec<_>, _>>()?;
