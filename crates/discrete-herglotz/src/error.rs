@@ -1,5 +1,6 @@
 //! Errors of the input and of the steps, and the status of a run.
 
+use crate::constraints::ConstraintError;
 use contact_geom::GeometryError;
 use thiserror::Error;
 
@@ -138,6 +139,9 @@ pub enum InputError {
     /// An error of the geometry: an invalid coordinate, slice or matrix.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
+    /// Invalid constraints, or a start that they do not admit.
+    #[error(transparent)]
+    Constraint(#[from] ConstraintError),
     /// The conformal factor is not positive at the start.
     #[error(
         "sigma_d = {sigma} at the start, but it must be positive (h L_z > -1 for rules explicit in z); take a \

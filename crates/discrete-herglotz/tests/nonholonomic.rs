@@ -8,6 +8,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};
 use contact_geom::{Energy, Lagrangian, PhasePoint, SmoothFunction, VelocityPoint, constraints::Distribution};
+use discrete_herglotz::InputError;
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, Nonholonomic, OffConstraint};
 use discrete_herglotz::{DiscreteLagrangian, SplittingScheme, Stepper, rules::Midpoint};
 
@@ -189,7 +190,7 @@ fn velocities_outside_of_the_distribution_are_refused() {
     let rule = |h| Midpoint::new(system, h);
     let off = Nonholonomic::new(system, system, rule, &SplittingScheme::STRANG, 0.1, &start).err();
     assert!(
-        matches!(off, Some(ConstraintError::OffVelocity { distance }) if (distance - 0.2).abs() < 1e-12),
+        matches!(off, Some(InputError::Constraint(ConstraintError::OffVelocity { distance })) if (distance - 0.2).abs() < 1e-12),
         "{off:?}"
     );
     let motion = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, 0.1, start.at);

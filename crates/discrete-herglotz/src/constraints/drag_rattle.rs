@@ -1,8 +1,9 @@
 //! RATTLE with a linear drag, and its compositions.
 
 use super::start::inverse_mass;
-use super::{ConstrainedStart, ConstraintError, Corrections, Progress};
+use super::{ConstrainedStart, Corrections, Progress};
 use crate::numbers::extent::extent;
+use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
@@ -65,7 +66,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
     /// The motion with steps of the length h from a start, composed by a scheme.
     ///
     /// # Errors
-    /// [`ConstraintError`]: a start off the constraints, dependent constraints; and of the Lagrangian: it does not
+    /// [`InputError`]: a start off the constraints, dependent constraints; and of the Lagrangian: it does not
     /// claim to be `separable` with a constant rate `L_z`, or is not; a scheme of Runge-Kutta-Nystrom type.
     pub fn new(
         lagrangian: L,
@@ -73,22 +74,33 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         scheme: &SplittingScheme,
         h: f64,
         start: &ConstrainedStart<N>,
-    ) -> Result<Self, ConstraintError> {
-        let Some(substeps) = scheme.substeps() else {
-            let hypothesis = "a composition of symmetric steps, not a Nyström splitting";
-            return Err(InputError::Hypothesis { hypothesis }.into());
-        };
+    ) -> Result<Self, InputError> {
+        let motion = Self::of(lagrangian, constraint, scheme, h, start)?;
+        // The first step is tried, so that input that cannot be advanced is refused.
+        motion.step(start.t, &motion.state).map_err(InputError::FirstStep)?;
+        Ok(motion)
+    }
+
+    /// The motion, without the trial of its first step.
+    pub(super) fn of(
+        lagrangian: L,
+        constraint: C,
+        scheme: &SplittingScheme,
+        h: f64,
+        start: &ConstrainedStart<N>,
+    ) -> Result<Self, InputError> {
+        let substeps = substeps(scheme)?;
         let at = start.at;
         let form = SeparableForm::read(lagrangian, h, start.t, &PhasePoint { q: at.q, p: at.v, z: at.z })?;
         if !form.lagrangian.structure().has_constant_rate() {
             let hypothesis = "a drag L_z that is constant";
-            return Err(InputError::Hypothesis { hypothesis }.into());
+            return Err(InputError::Hypothesis { hypothesis });
         }
-        let at = start.resolved(&form.lagrangian, &constraint)?;
+        let at = start.resolved_for(&form.lagrangian, &constraint, h)?;
         let gamma = form.lagrangian.rate(start.t, &at);
         let p = form.lagrangian.gradient(start.t, &at).y;
         let inverse = inverse_mass(&form.lagrangian, start.t, &at)?;
-        let motion = DragRattle {
+        Ok(DragRattle {
             form,
             constraint,
             inverse,
@@ -102,10 +114,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
             sigma: 1.0,
             impulse: SVector::zeros(),
             evaluations: 0,
-        };
-        // The first step is tried, so that input that cannot be advanced is refused.
-        motion.step(start.t, &motion.state)?;
-        Ok(motion)
+        })
     }
 
     /// The step from a state on the constraint, over any scalar: on dual numbers it is the step with its derivatives
@@ -147,10 +156,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         p += force * half;
         z += value * half;
         let (_, g0) = self.constraint.with_jacobian(&q0);
-        let kept = match self.redundancy {
-            Redundancy::Refuse => [true; M],
-            Redundancy::LeastNorm => independent_rows(&g0.map(|e| e.re())),
-        };
+        let kept = self.redundancy.imposed(self.constraint.count(), &g0.map(|e| e.re()));
         // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
         // method.
         let responses = self.inverse * g0.map(|e| e.re()).transpose();
@@ -275,6 +281,22 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
     fn has_constant_rate(&self) -> bool {
         true
     }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        Some(words_of(self))
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        restored_from(self, words)
+    }
+}
+
+saved!([L, C, const N: usize, const M: usize] DragRattle<L, C, N, M> { taken, state, sigma, impulse, evaluations });
+
+/// The substeps of a composition of symmetric steps.
+pub(super) fn substeps(scheme: &SplittingScheme) -> Result<Vec<f64>, InputError> {
+    let hypothesis = "a composition of symmetric steps, not a Nyström splitting";
+    scheme.substeps().ok_or(InputError::Hypothesis { hypothesis })
 }
 
 /// The product of a real matrix with a vector of any numbers.

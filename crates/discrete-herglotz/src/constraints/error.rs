@@ -1,10 +1,8 @@
 //! Errors of constrained problems.
 
-use crate::{InputError, StepError};
-use contact_geom::GeometryError;
 use thiserror::Error;
 
-/// Invalid input to a constrained motion, detected before the first step.
+/// Invalid constraints, or a start that they do not admit, detected before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ConstraintError {
@@ -70,19 +68,4 @@ pub enum ConstraintError {
         /// The number that was passed.
         found: usize,
     },
-    /// Other invalid input.
-    #[error(transparent)]
-    Input(#[from] InputError),
-}
-
-impl From<GeometryError> for ConstraintError {
-    fn from(error: GeometryError) -> Self {
-        ConstraintError::Input(error.into())
-    }
-}
-
-impl From<StepError> for ConstraintError {
-    fn from(cause: StepError) -> Self {
-        ConstraintError::Input(InputError::FirstStep(cause))
-    }
 }

@@ -3,12 +3,13 @@
 use super::linear_system::LinearSystem;
 use super::lobatto_tables::{LobattoTables, STAGES};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
+use crate::integration::check_unforced;
 use crate::numbers::extent::extent;
+use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::{InputError, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
-use contact_geom::support::independent_rows;
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// The contact Lobatto IIIA-IIIB method with s stages, of order `2s - 2`, for any regular Lagrangian on `c(q) = 0`,
@@ -133,7 +134,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     /// The motion with s stages and steps of the length h from a start.
     ///
     /// # Errors
-    /// [`ConstraintError`]: a start off the constraints, dependent constraints, a number of stages that is not from 2
+    /// [`InputError`]: a start off the constraints, dependent constraints, a number of stages that is not from 2
     /// to 8, a step that is 0 or not finite, an applied force, a Lagrangian that is singular at the start, a first step
     /// that fails.
     pub fn new(
@@ -142,20 +143,31 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         stages: usize,
         h: f64,
         start: &ConstrainedStart<N>,
-    ) -> Result<Self, ConstraintError> {
-        if !STAGES.contains(&stages) {
-            return Err(ConstraintError::Stages { found: stages });
-        }
+    ) -> Result<Self, InputError> {
+        let mut motion = Self::of(lagrangian, constraint, stages, h, start)?;
+        let mut workspace = motion.workspace.clone();
+        let step = motion.solve(start.t, &motion.state, &motion.velocity, &mut workspace);
+        motion.workspace = workspace;
+        motion.workspace.evaluations = 0;
+        step.map_err(InputError::FirstStep)?;
+        Ok(motion)
+    }
+
+    /// The motion, without the trial of its first step.
+    pub(super) fn of(
+        lagrangian: L,
+        constraint: C,
+        stages: usize,
+        h: f64,
+        start: &ConstrainedStart<N>,
+    ) -> Result<Self, InputError> {
+        Self::check(&lagrangian, stages)?;
         if !(h != 0.0 && h.is_finite()) {
-            return Err(InputError::Step { h }.into());
+            return Err(InputError::Step { h });
         }
-        if lagrangian.has_force() {
-            let hypothesis = "a motion without applied force";
-            return Err(InputError::Hypothesis { hypothesis }.into());
-        }
-        let at = start.resolved(&lagrangian, &constraint)?;
+        let at = start.resolved_for(&lagrangian, &constraint, h)?;
         let p = lagrangian.gradient(start.t, &at).y;
-        let mut motion = ContactLobatto {
+        Ok(ContactLobatto {
             lagrangian,
             constraint,
             redundancy: start.redundancy,
@@ -168,12 +180,15 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             sigma: 1.0,
             evaluations: 0,
             workspace: Workspace::new(stages),
-        };
-        let mut workspace = motion.workspace.clone();
-        let step = motion.solve(start.t, &motion.state, &motion.velocity, &mut workspace);
-        motion.workspace = workspace;
-        step?;
-        Ok(motion)
+        })
+    }
+
+    /// Checks the number of stages, and that no force is applied.
+    pub(super) fn check(lagrangian: &L, stages: usize) -> Result<(), InputError> {
+        if !STAGES.contains(&stages) {
+            return Err(ConstraintError::Stages { found: stages }.into());
+        }
+        check_unforced(lagrangian, "contact Lobatto collocation")
     }
 
     /// The step from a state on the constraint, over any scalar: on dual numbers it is the step with its derivatives
@@ -221,10 +236,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         guess: &SVector<f64, N>,
         work: &mut Workspace<N, M, T>,
     ) -> Result<LobattoStep<N, T>, StepError> {
-        let kept = match self.redundancy {
-            Redundancy::Refuse => [true; M],
-            Redundancy::LeastNorm => independent_rows(&self.constraint.with_jacobian(&from.q.map(|q| q.re())).1),
-        };
+        let jacobian = self.constraint.with_jacobian(&from.q.map(|q| q.re())).1;
+        let kept = self.redundancy.imposed(self.constraint.count(), &jacobian);
         for stage in &mut work.stages {
             (stage.v, stage.rho, stage.z) = (guess.map(T::from), T::one(), from.z);
             stage.y = SVector::from_fn(|_, _| T::zero());
@@ -464,7 +477,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
             let step = step.map_err(|cause| StepFailure { taken, cause })?;
             (self.state, self.velocity, self.sigma) = (step.end, step.velocity, step.sigma);
             self.taken += 1;
-            self.evaluations = self.workspace.evaluations;
+            self.evaluations += std::mem::take(&mut self.workspace.evaluations);
         }
         Ok(())
     }
@@ -484,4 +497,18 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
     fn evaluations(&self) -> u64 {
         self.evaluations
     }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        Some(self.velocity)
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        Some(words_of(self))
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        restored_from(self, words)
+    }
 }
+
+saved!([L, C, const N: usize, const M: usize] ContactLobatto<L, C, N, M> { taken, state, velocity, sigma, evaluations });

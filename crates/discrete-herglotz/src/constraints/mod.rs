@@ -6,7 +6,10 @@
 //!   Lagrangian; conformally contact.
 //! - [`Nonholonomic`]: the discrete Lagrange-d'Alembert-Herglotz equations of any symmetric discrete Lagrangian, of
 //!   order 2, and their compositions.
+//!
+//! [`Constrained`] makes an integrator of the first two, for runs with rows, events, checkpoints and an accuracy.
 
+mod constrained;
 mod drag_rattle;
 mod error;
 mod linear_system;
@@ -15,6 +18,7 @@ mod lobatto_tables;
 mod nonholonomic;
 mod start;
 
+pub use constrained::{Constrained, ConstrainedMethod};
 pub use drag_rattle::{DragRattle, RattleStep};
 pub use error::ConstraintError;
 pub use lobatto::{ContactLobatto, LobattoStep};

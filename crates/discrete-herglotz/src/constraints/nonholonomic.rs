@@ -1,8 +1,10 @@
 //! The discrete Lagrange-d'Alembert-Herglotz equations of nonholonomic motions.
 
+use super::drag_rattle::substeps;
 use super::linear_system::LinearSystem;
-use super::start::{inverse_mass, tangent_velocity};
+use super::start::{inverse_mass, round_off, tangent_velocity};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
+use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{Distribution, DistributionDerivatives};
 use contact_geom::nalgebra::SVector;
@@ -76,7 +78,7 @@ where
     /// the start, on request, changes the velocity alone.
     ///
     /// # Errors
-    /// [`ConstraintError`]: a velocity outside of the distribution, dependent rows of omega, a scheme of
+    /// [`InputError`]: a velocity outside of the distribution, dependent rows of omega, a scheme of
     /// Runge-Kutta-Nystrom type, a step that is 0 or not finite, a first step that fails; those of `rule`.
     pub fn new(
         lagrangian: L,
@@ -85,24 +87,21 @@ where
         scheme: &SplittingScheme,
         h: f64,
         start: &ConstrainedStart<N>,
-    ) -> Result<Self, ConstraintError> {
+    ) -> Result<Self, InputError> {
         if !(h != 0.0 && h.is_finite()) {
-            return Err(InputError::Step { h }.into());
+            return Err(InputError::Step { h });
         }
         let mut x = start.at;
         crate::integration::problem::check_time(start.t)?;
         PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-        let Some(substeps) = scheme.substeps() else {
-            let hypothesis = "a composition of symmetric steps, not a Nyström splitting";
-            return Err(InputError::Hypothesis { hypothesis }.into());
-        };
+        let substeps = substeps(scheme)?;
         let omega = distribution.omega(&x.q);
         let rank = independent_rows(&omega).iter().filter(|kept| **kept).count();
         if rank < M {
-            return Err(ConstraintError::RankDeficient { rank, expected: M });
+            return Err(ConstraintError::RankDeficient { rank, expected: M }.into());
         }
         let inverse = inverse_mass(&lagrangian, start.t, &x)?;
-        x.v = tangent_velocity(&omega, &inverse, &[true; M], x.v, start.off_constraint)?;
+        x.v = tangent_velocity(&omega, &inverse, &[true; M], (x.v, round_off(&x.v)), start.off_constraint)?;
         let state = PhasePoint { q: x.q, p: lagrangian.gradient(start.t, &x).y, z: x.z };
         let rules = substeps.iter().map(|g| g * h).map(rule).collect::<Result<Vec<_>, _>>()?;
         let current = Current { state, velocity: x.v, sigma: 1.0, impulse: SVector::zeros() };
@@ -118,7 +117,7 @@ where
             system: LinearSystem::new(N + M),
             residual: vec![0.0; N + M],
         };
-        motion.step()?;
+        motion.step().map_err(InputError::FirstStep)?;
         motion.evaluations = 0;
         Ok(motion)
     }
@@ -261,4 +260,15 @@ where
     fn evaluations(&self) -> u64 {
         self.evaluations
     }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        Some(words_of(self))
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        restored_from(self, words)
+    }
 }
+
+saved!([const N: usize, const M: usize] Current<N, M> { state, velocity, sigma, impulse });
+saved!([L, W, D, const N: usize, const M: usize] Nonholonomic<L, W, D, N, M> { taken, current, evaluations });

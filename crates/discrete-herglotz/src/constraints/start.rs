@@ -1,6 +1,7 @@
 //! Starts of constrained motions: checks and projections.
 
 use super::{ConstraintError, Corrections, Progress};
+use crate::InputError;
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
@@ -45,12 +46,28 @@ impl<const N: usize> ConstrainedStart<N> {
         ConstrainedStart { t: 0.0, at, off_constraint: OffConstraint::Refuse, redundancy: Redundancy::Refuse }
     }
 
-    /// The checked and, on request, projected start.
-    pub(super) fn resolved<const M: usize>(
+    /// The point that satisfies the constraints, from which a [`Problem`](crate::Problem) with a
+    /// [`Constrained`](super::Constrained) integrator starts: the checked and, on request, projected start.
+    ///
+    /// # Errors
+    /// [`InputError::Constraint`] where it is off the constraints or they are dependent; other [`InputError`]s for a
+    /// start that is not finite, and where L is singular.
+    pub fn resolved<const M: usize>(
         &self,
         lagrangian: &impl Lagrangian<N>,
         constraint: &impl Constraint<N, M>,
-    ) -> Result<VelocityPoint<N>, ConstraintError> {
+    ) -> Result<VelocityPoint<N>, InputError> {
+        self.resolved_for(lagrangian, constraint, f64::INFINITY)
+    }
+
+    /// The same for a step h: velocities that move positions by less than round-off in a step are round-off, which is
+    /// larger than that of the velocity where this is small, as at a turning point.
+    pub(super) fn resolved_for<const M: usize>(
+        &self,
+        lagrangian: &impl Lagrangian<N>,
+        constraint: &impl Constraint<N, M>,
+        h: f64,
+    ) -> Result<VelocityPoint<N>, InputError> {
         let mut x = self.at;
         crate::integration::problem::check_time(self.t)?;
         PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
@@ -58,7 +75,7 @@ impl<const N: usize> ConstrainedStart<N> {
         if !(c.iter().chain(g.iter()).all(|e| e.is_finite())) {
             return Err(GeometryError::Undefined { what: "a constraint or its derivative" }.into());
         }
-        let kept = self.independent(&g)?;
+        let kept = self.independent(constraint.count(), &g)?;
         let inverse = inverse_mass(lagrangian, self.t, &x)?;
         // The first correction is the distance.
         let step = correction(&g, &inverse, &kept, &c)?;
@@ -70,12 +87,12 @@ impl<const N: usize> ConstrainedStart<N> {
         }
         match self.off_constraint {
             OffConstraint::Refuse if exceeds(&step, round_off(&x.q)) => {
-                return Err(ConstraintError::OffConstraint { distance: step.norm(), index, value });
+                return Err(ConstraintError::OffConstraint { distance: step.norm(), index, value }.into());
             }
             OffConstraint::Refuse => {}
             OffConstraint::Project => x.q = projected(constraint, &inverse, &kept, x.q)?,
         }
-        if kept.iter().any(|kept| !kept) {
+        if kept.iter().take(constraint.count()).any(|kept| !kept) {
             check_redundant(constraint, &inverse, &kept, &x.q)?;
         }
         let (c, g) = constraint.with_jacobian(&x.q);
@@ -83,35 +100,39 @@ impl<const N: usize> ConstrainedStart<N> {
             c.iter().enumerate().fold((0, 0.0), |m, (a, c)| if c.abs() > f64::abs(m.1) { (a, *c) } else { m });
         // Dependent constraints that contradict the others are not reached by the projection.
         if exceeds(&c, 1e-9 * (g.max_abs_or_nan() * (1.0 + x.q.max_abs_or_nan()))) {
-            return Err(ConstraintError::OffConstraint { distance: f64::INFINITY, index: largest.0, value: largest.1 });
+            return Err(
+                ConstraintError::OffConstraint { distance: f64::INFINITY, index: largest.0, value: largest.1 }.into()
+            );
         }
-        x.v = tangent_velocity(&g, &inverse_mass(lagrangian, self.t, &x)?, &kept, x.v, self.off_constraint)?;
+        let inverse = inverse_mass(lagrangian, self.t, &x)?;
+        let rounding = round_off(&x.v) + round_off(&x.q) / h.abs();
+        x.v = tangent_velocity(&g, &inverse, &kept, (x.v, rounding), self.off_constraint)?;
         Ok(x)
     }
 
     /// The independent constraints.
-    fn independent<const M: usize>(&self, g: &SMatrix<f64, M, N>) -> Result<[bool; M], ConstraintError> {
+    fn independent<const M: usize>(&self, count: usize, g: &SMatrix<f64, M, N>) -> Result<[bool; M], InputError> {
         let kept = independent_rows(g);
         let rank = kept.iter().filter(|kept| **kept).count();
-        if rank < M && (self.redundancy == Redundancy::Refuse || rank == 0) {
-            return Err(ConstraintError::RankDeficient { rank, expected: M });
+        if rank < count && (self.redundancy == Redundancy::Refuse || rank == 0) {
+            return Err(ConstraintError::RankDeficient { rank, expected: count }.into());
         }
         Ok(kept)
     }
 }
 
-/// The velocity, projected to `g v = 0` on request, and refused otherwise where it is not there.
+/// The velocity, projected to `g v = 0` on request, and refused otherwise where it is not there up to its round-off.
 pub(super) fn tangent_velocity<const N: usize, const M: usize>(
     g: &SMatrix<f64, M, N>,
     inverse: &SMatrix<f64, N, N>,
     kept: &[bool; M],
-    v: SVector<f64, N>,
+    (v, rounding): (SVector<f64, N>, f64),
     off: OffConstraint,
-) -> Result<SVector<f64, N>, ConstraintError> {
+) -> Result<SVector<f64, N>, InputError> {
     let step = correction(g, inverse, kept, &(g * v))?;
     match off {
-        OffConstraint::Refuse if exceeds(&step, round_off(&v)) => {
-            Err(ConstraintError::OffVelocity { distance: step.norm() })
+        OffConstraint::Refuse if exceeds(&step, rounding) => {
+            Err(ConstraintError::OffVelocity { distance: step.norm() }.into())
         }
         OffConstraint::Refuse => Ok(v),
         OffConstraint::Project => {
@@ -128,7 +149,7 @@ fn exceeds<const K: usize>(x: &SVector<f64, K>, bound: f64) -> bool {
 }
 
 /// The size of corrections that count as round-off of a start.
-fn round_off<const N: usize>(x: &SVector<f64, N>) -> f64 {
+pub(super) fn round_off<const N: usize>(x: &SVector<f64, N>) -> f64 {
     64.0 * f64::EPSILON * x.max_abs_or_nan()
 }
 
@@ -165,7 +186,7 @@ fn projected<const N: usize, const M: usize>(
     inverse: &SMatrix<f64, N, N>,
     kept: &[bool; M],
     mut q: SVector<f64, N>,
-) -> Result<SVector<f64, N>, ConstraintError> {
+) -> Result<SVector<f64, N>, InputError> {
     let mut corrections = Corrections::new();
     loop {
         let (c, g) = constraint.with_jacobian(&q);
@@ -174,7 +195,7 @@ fn projected<const N: usize, const M: usize>(
         match corrections.after(step.max_abs_or_nan(), q.max_abs_or_nan()) {
             Ok(Progress::Ended) => return Ok(q),
             Ok(_) => {}
-            Err(_) => return Err(ConstraintError::NotProjected { distance: step.norm() }),
+            Err(_) => return Err(ConstraintError::NotProjected { distance: step.norm() }.into()),
         }
     }
 }
@@ -185,7 +206,7 @@ fn check_redundant<const N: usize, const M: usize>(
     inverse: &SMatrix<f64, N, N>,
     kept: &[bool; M],
     q: &SVector<f64, N>,
-) -> Result<(), ConstraintError> {
+) -> Result<(), InputError> {
     // A tangent direction without special symmetry, short enough for a projection.
     let generic = SVector::<f64, N>::from_fn(|i, _| 1.0 + ((i + 1) as f64 * std::f64::consts::SQRT_2).fract());
     let g = constraint.with_jacobian(q).1;
@@ -202,7 +223,7 @@ fn check_redundant<const N: usize, const M: usize>(
         (there.iter().filter(|kept| **kept).count() != rank).then_some(0)
     });
     match violated {
-        Some(index) => Err(ConstraintError::SingularPosition { rank, index, value: c[index] }),
+        Some(index) => Err(ConstraintError::SingularPosition { rank, index, value: c[index] }.into()),
         None => Ok(()),
     }
 }

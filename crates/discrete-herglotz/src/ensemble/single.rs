@@ -8,8 +8,8 @@ use crate::{
     StepperOptions, Until,
     integration::{BatchKernel, StepFormula},
 };
-use contact_geom::nalgebra::DMatrix;
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 
 /// The integrator of an ensemble, for the lifetime of the run of one member.
 pub(crate) struct OfMember<'i, 'a, L, const N: usize> {
@@ -41,6 +41,10 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         self.integrator.stepper(&self.own(problem), h, options)
+    }
+
+    fn constraint_force(&self, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Result<SVector<f64, N>, StepError> {
+        self.integrator.constraint_force(lagrangian, t, x)
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {

@@ -96,6 +96,7 @@ pub(super) fn info(scheme: &SplittingScheme) -> MethodInfo {
         in_transformed_time: false,
         collocation: None,
         substeps: scheme.stages() > 1,
+        constrained: false,
         divides: false,
         cost_per_evaluation: 2,
         source: Cow::Borrowed(scheme.source()),

@@ -2,8 +2,8 @@
 
 use crate::rules::Node;
 use crate::{InputError, Problem, SplittingScheme, StepError, Stepper};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::DMatrix;
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{PhasePoint, VelocityPoint};
 use std::borrow::Cow;
 
 /// The properties of an integrator.
@@ -26,6 +26,8 @@ pub struct MethodInfo {
     pub collocation: Option<usize>,
     /// Whether a step is a composition of substeps, some of them backward in time.
     pub substeps: bool,
+    /// Whether the motion is under constraints, so that it is not the free motion of the Lagrangian.
+    pub constrained: bool,
     /// Whether it subdivides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
     pub divides: bool,
     /// The cost of one of its [evaluations](Stepper::evaluations), in units of an evaluation of L at a stage of Gauss
@@ -48,6 +50,7 @@ impl MethodInfo {
             in_transformed_time: false,
             collocation: None,
             substeps: false,
+            constrained: false,
             divides: false,
             // Newton's method evaluates second derivatives.
             cost_per_evaluation: 32 * N as u64,
@@ -92,6 +95,15 @@ pub trait Integrator<'a, L, const N: usize> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
+
+    /// The force `G^T lambda` of the constraints at a point of the motion, for an integrator that is
+    /// [constrained](MethodInfo::constrained). The default is 0.
+    ///
+    /// # Errors
+    /// [`StepError`] where the constraints are dependent.
+    fn constraint_force(&self, _lagrangian: &L, _t: f64, _x: &VelocityPoint<N>) -> Result<SVector<f64, N>, StepError> {
+        Ok(SVector::zeros())
+    }
 
     /// The kernel with which an [`Ensemble`](crate::Ensemble) takes these steps for many motions at once; `None` where
     /// each member has its own stepper.

@@ -121,6 +121,19 @@ pub(crate) use saved;
 
 saved!([const N: usize] PhasePoint<N> { q, p, z });
 
+/// The words of a value, for [`Stepper::save`](crate::Stepper::save).
+pub(crate) fn words_of(x: &impl Saved) -> Vec<u64> {
+    let mut words = Vec::new();
+    x.save(&mut words);
+    words
+}
+
+/// Restores a value from exactly its words, for [`Stepper::restore`](crate::Stepper::restore); `false` where they are
+/// not those of such a value.
+pub(crate) fn restored_from(x: &mut impl Saved, mut words: &[u64]) -> bool {
+    x.load(&mut words).is_some() && words.is_empty()
+}
+
 /// Saves an optional value.
 pub(crate) fn save_option<T: Saved>(option: Option<&T>, to: &mut Vec<u64>) {
     option.is_some().save(to);

@@ -52,6 +52,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
             let hypothesis = "a Lagrangian without kinks and jumps, since the steps are equal in transformed time";
             return Err(InputError::Hypothesis { hypothesis });
         }
+        if switches && info.constrained {
+            let hypothesis = "a Lagrangian without kinks and jumps, since steps under constraints do not end on them";
+            return Err(InputError::Hypothesis { hypothesis });
+        }
         Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches })
     }
 
@@ -189,7 +193,10 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
     }
 
     fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError> {
-        let AtState { x, l, force, rate } = at_state(self.problem.lagrangian, t, state, &self.guess(near))?;
+        let AtState { x, l, mut force, rate } = at_state(self.problem.lagrangian, t, state, &self.guess(near))?;
+        if self.info.constrained {
+            force += self.integrator.constraint_force(self.problem.lagrangian, t, &x)?;
+        }
         Ok(PhasePoint { q: x.v, p: force + state.p * rate, z: l })
     }
 
@@ -199,6 +206,8 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
         let none = ([f64::NAN; 2], SVector::zeros());
         let ([value, rate], force) =
             at_state(*lagrangian, *t0, state, &start.v).map_or(none, |at| ([at.l, at.rate], at.force));
+        let of_constraints = self.integrator.constraint_force(lagrangian, *t0, start).unwrap_or_else(|_| none.1);
+        let force = force + of_constraints;
         let numbers = [*t0, self.t_end, self.h, start.z, value, rate];
         let vectors = [&start.q, &start.v, &state.p, &force];
         let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());

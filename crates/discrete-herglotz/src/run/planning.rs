@@ -118,6 +118,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::TimeTransformation { rate }) }
     }
 
+    /// Whether the motion is under constraints: the free motion of the Lagrangian tells nothing about it.
+    pub(crate) fn is_constrained(&self) -> bool {
+        self.integrator.as_ref().is_some_and(|integrator| integrator.info().constrained)
+    }
+
     /// The same request without action and conformal factor.
     pub(crate) fn bare(&self) -> Self {
         Request { needs: OutputRequest::default(), integrator: self.integrator.clone(), ..*self }

@@ -21,6 +21,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             in_transformed_time: false,
             collocation: None,
             substeps: true,
+            constrained: false,
             divides: false,
             cost_per_evaluation: 4,
             source: Cow::Borrowed(self.source()),

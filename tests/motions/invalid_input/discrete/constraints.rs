@@ -37,16 +37,16 @@ const PENDULUM: RigidPendulum<2> = RigidPendulum { gravity: 9.81, gamma: -0.1 };
 type Rattle = DragRattle<RigidPendulum<2>, RigidPendulum<2>, 2, 1>;
 type Lobatto = ContactLobatto<RigidPendulum<2>, RigidPendulum<2>, 2, 1>;
 
-fn rattle(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Result<Rattle, ConstraintError> {
+fn rattle(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Result<Rattle, InputError> {
     DragRattle::new(system, system, &SplittingScheme::STRANG, h, start)
 }
 
-fn lobatto(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Result<Lobatto, ConstraintError> {
+fn lobatto(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Result<Lobatto, InputError> {
     ContactLobatto::new(system, system, 3, h, start)
 }
 
 /// The numbers of a motion after ten steps: its state, and what the constraints do.
-fn by_rattle(motion: Result<Rattle, ConstraintError>) -> Result<Vec<f64>, String> {
+fn by_rattle(motion: Result<Rattle, InputError>) -> Result<Vec<f64>, String> {
     let mut motion = motion.map_err(|e| e.to_string())?;
     motion.advance(10).map_err(|e| e.to_string())?;
     let (of, impulse) = (motion.constrained_motion(), motion.impulse());
@@ -57,7 +57,7 @@ fn by_rattle(motion: Result<Rattle, ConstraintError>) -> Result<Vec<f64>, String
     Ok(numbers.chain([motion.state().z, impulse[0], multipliers[0], of.multipliers[0]]).collect())
 }
 
-fn by_lobatto(motion: Result<Lobatto, ConstraintError>) -> Result<Vec<f64>, String> {
+fn by_lobatto(motion: Result<Lobatto, InputError>) -> Result<Vec<f64>, String> {
     let mut motion = motion.map_err(|e| e.to_string())?;
     motion.advance(10).map_err(|e| e.to_string())?;
     let of = motion.constrained_motion().map_err(|e| e.to_string())?;
@@ -91,13 +91,21 @@ fn pendulums(report: &mut Report) {
         }
     }
     let off = ConstrainedStart::new(at([0.6, -0.7, 0.0, 0.0, 0.0]));
-    let named = matches!(rattle(PENDULUM, 0.01, &off), Err(ConstraintError::OffConstraint { index: 0, .. }));
+    let named = matches!(
+        rattle(PENDULUM, 0.01, &off),
+        Err(InputError::Constraint(ConstraintError::OffConstraint { index: 0, .. }))
+    );
     report.check(named, || "a start off the constraint by RATTLE".into());
-    let named = matches!(lobatto(PENDULUM, 0.01, &off), Err(ConstraintError::OffConstraint { index: 0, .. }));
+    let named = matches!(
+        lobatto(PENDULUM, 0.01, &off),
+        Err(InputError::Constraint(ConstraintError::OffConstraint { index: 0, .. }))
+    );
     report.check(named, || "a start off the constraint by Lobatto's method".into());
     for stages in [0, 1, 9, usize::MAX] {
         let refused = ContactLobatto::new(PENDULUM, PENDULUM, stages, 0.01, &ConstrainedStart::new(at(base)));
-        report.check(matches!(refused, Err(ConstraintError::Stages { .. })), || format!("{stages} stages"));
+        report.check(matches!(refused, Err(InputError::Constraint(ConstraintError::Stages { .. }))), || {
+            format!("{stages} stages")
+        });
     }
 }
 

@@ -1,6 +1,6 @@
 //! The constrained Herglotz equations, solved for accelerations and multipliers.
 
-use super::{Constraint, ConstraintDerivatives, Redundancy, independent_rows, least_norm, restricted};
+use super::{Constraint, ConstraintDerivatives, Redundancy, least_norm, restricted};
 use crate::support::linear::{SingularMatrix, solve};
 use crate::{Derivatives, Dual, GeometryError, Lagrangian, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
@@ -56,10 +56,7 @@ pub fn constrained_motion<const N: usize, const M: usize>(
     for a in 0..M {
         responses.set_column(a, &solved(g.row(a).transpose())?);
     }
-    let independent = match redundancy {
-        Redundancy::Refuse => [true; M],
-        Redundancy::LeastNorm => independent_rows(&g),
-    };
+    let independent = redundancy.imposed(constraint.count(), &g);
     let mut multipliers = -curvature - g * free;
     for (a, _) in independent.iter().enumerate().filter(|(_, kept)| !**kept) {
         multipliers[a] = 0.0;

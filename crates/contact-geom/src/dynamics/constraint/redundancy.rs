@@ -20,6 +20,17 @@ pub enum Redundancy {
     LeastNorm,
 }
 
+impl Redundancy {
+    /// The constraints that are imposed, for their number and their Jacobian at a point: all of them, or independent
+    /// ones among them.
+    pub fn imposed<const N: usize, const M: usize>(self, count: usize, jacobian: &SMatrix<f64, M, N>) -> [bool; M] {
+        match self {
+            Redundancy::Refuse => std::array::from_fn(|a| a < count),
+            Redundancy::LeastNorm => independent_rows(jacobian),
+        }
+    }
+}
+
 /// Independent rows of a matrix: the largest rows first, each if it is independent of those before (Gram-Schmidt with
 /// pivoting, relative to the norms of the rows).
 pub fn independent_rows<const N: usize, const M: usize>(matrix: &SMatrix<f64, M, N>) -> [bool; M] {

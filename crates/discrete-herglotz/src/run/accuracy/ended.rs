@@ -16,6 +16,9 @@ const SPENT: &str = "the budget of the search";
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
     pub(crate) fn time_of_end(&self, terminal: Terminal<'_, N>) -> Option<f64> {
+        if self.is_constrained() {
+            return None;
+        }
         let request = Request { integrator: None, needs: terminal.needs(), ..*self };
         let count = first_guess(self, EVENT_SEARCH.stages, EVENT_SEARCH_ERROR).max(MIN_EVENT_SEARCH_STEPS);
         let h = self.span / count as f64;

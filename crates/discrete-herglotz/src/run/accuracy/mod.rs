@@ -1,5 +1,6 @@
 //! Step-size selection for a requested error, by trial runs.
 
+mod by_doubled_steps;
 mod comparison_grid;
 mod converge;
 mod defect_history;

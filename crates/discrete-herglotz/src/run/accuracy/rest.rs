@@ -14,6 +14,9 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
     /// span is long enough for the decay.
     #[inline(never)]
     pub(crate) fn time_of_rest(&self) -> Option<f64> {
+        if self.is_constrained() {
+            return None;
+        }
         let problem = self.problem;
         let change = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
         // Written so that a NaN counts as no decrease.

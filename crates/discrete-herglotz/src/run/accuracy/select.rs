@@ -2,6 +2,7 @@
 
 use crate::gauss::MAX_STAGES;
 use crate::integration::is_separable;
+use crate::run::accuracy::by_doubled_steps::by_doubled_steps;
 use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
 use crate::run::accuracy::divided::divided_steps;
 use crate::run::accuracy::first_guess::first_guess;
@@ -73,6 +74,7 @@ pub(crate) fn select_within_budget<'p, L: Lagrangian<N>, const N: usize>(
     let Some(integrator) = trials.request.integrator.clone() else { return select_integrator(trials) };
     let info = integrator.info();
     match info.collocation {
+        _ if info.constrained => by_doubled_steps(trials, &integrator),
         Some(stages) if stages >= MIN_OWN_REFERENCE_STAGES && info.in_transformed_time => {
             Ok(in_transformed_time(trials, &integrator, stages)?)
         }

@@ -1,0 +1,180 @@
+//! Methods for holonomic constraints as integrators of runs.
+
+use super::drag_rattle::substeps;
+use super::{ConstrainedStart, ContactLobatto, DragRattle, OffConstraint};
+use crate::integration::{StepFormula, check_kicks};
+use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
+use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+
+/// A method for motions under holonomic constraints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConstrainedMethod {
+    /// [`DragRattle`], composed by a scheme: for `v.Mv/2 - V(t, q) + gamma z`.
+    Rattle(SplittingScheme),
+    /// [`ContactLobatto`] with this number of stages, for any Lagrangian.
+    Lobatto {
+        /// The number of stages, from 2 to 8.
+        stages: usize,
+    },
+}
+
+/// Constraints with a method, as an [`Integrator`] of a [`Problem`]: runs have rows, events, dense output, checkpoints,
+/// a plan and an accuracy as without constraints.
+///
+/// The start of the problem satisfies the constraints: [`ConstrainedStart::resolved`] projects one that does not. An
+/// accuracy is met by runs with steps that are halved until they agree, since collocation, the reference for other
+/// integrators, knows no constraints. The derivative of the motion in its start holds along vectors that are tangent to
+/// the constraints.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
+/// use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
+/// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Until};
+/// let pendulum = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };
+/// let rattle = Constrained::new(&pendulum, ConstrainedMethod::Rattle(SplittingScheme::KAHAN_LI_8));
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0))?;
+/// let mut lowest = Events::new([Event::new(|_, x| x.q[0])]);
+/// let outcome = problem.by(rattle).accuracy(1e-9).observe(&mut lowest).run(Until::Time(2.0))?;
+/// println!("{:?}, lowest at t = {}", outcome.q, lowest.crossings[0].t);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constrained<C, const M: usize> {
+    /// The constraints.
+    pub constraint: C,
+    /// The method.
+    pub method: ConstrainedMethod,
+    /// What happens where the constraints are redundant.
+    pub redundancy: Redundancy,
+}
+
+impl<C, const M: usize> Constrained<C, M> {
+    /// Constraints that are independent, with a method.
+    pub fn new(constraint: C, method: ConstrainedMethod) -> Self {
+        Constrained { constraint, method, redundancy: Redundancy::Refuse }
+    }
+}
+
+/// A number with one derivative.
+type Along = Dual<f64, SVector<f64, 1>>;
+
+impl<C, const M: usize> Constrained<C, M> {
+    /// The start of the steps of a problem.
+    fn start<const N: usize>(&self, t: f64, at: VelocityPoint<N>) -> ConstrainedStart<N> {
+        ConstrainedStart { t, at, off_constraint: OffConstraint::Refuse, redundancy: self.redundancy }
+    }
+}
+
+impl<'a, L, C, const N: usize, const M: usize> Integrator<'a, L, N> for Constrained<C, M>
+where
+    L: Lagrangian<N>,
+    C: Constraint<N, M> + Clone + 'a,
+{
+    fn info(&self) -> MethodInfo {
+        let symmetric = MethodInfo { symmetric: true, constrained: true, ..MethodInfo::of_discrete::<N>("", 0) };
+        match self.method {
+            ConstrainedMethod::Rattle(scheme) => MethodInfo {
+                name: format!("rattle_{}", scheme.name()).into(),
+                order: scheme.order(),
+                exact_rate: true,
+                substeps: scheme.order() > 2,
+                // A force and the multipliers, each with the Jacobian of the constraints.
+                cost_per_evaluation: 8 * N as u64,
+                source: format!("Andersen, J. Comput. Phys. 52 (1983), 24-34; {}", scheme.source()).into(),
+                ..symmetric
+            },
+            ConstrainedMethod::Lobatto { stages } => MethodInfo {
+                name: format!("lobatto_{stages}").into(),
+                order: 2 * (stages as u32).saturating_sub(1),
+                source: "Jay, SIAM J. Numer. Anal. 33 (1996)".into(),
+                ..symmetric
+            },
+        }
+    }
+
+    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        match self.method {
+            ConstrainedMethod::Rattle(scheme) => {
+                substeps(&scheme)?;
+                let structure = lagrangian.structure();
+                let missing = [("separable", structure.separable), ("constant_rate", structure.has_constant_rate())];
+                if let Some((claim, _)) = missing.into_iter().find(|(_, claimed)| !claimed) {
+                    return Err(InputError::Unclaimed { claim });
+                }
+                check_kicks(lagrangian, "RATTLE")
+            }
+            ConstrainedMethod::Lobatto { stages } => ContactLobatto::<L, C, N, M>::check(lagrangian, stages),
+        }
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        _options: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        let start = self.start(problem.t0, problem.start);
+        let constraint = self.constraint.clone();
+        Ok(match self.method {
+            ConstrainedMethod::Rattle(scheme) => {
+                Box::new(DragRattle::of(problem.lagrangian, constraint, &scheme, h, &start)?)
+            }
+            ConstrainedMethod::Lobatto { stages } => {
+                Box::new(ContactLobatto::of(problem.lagrangian, constraint, stages, h, &start)?)
+            }
+        })
+    }
+
+    fn constraint_force(&self, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Result<SVector<f64, N>, StepError> {
+        let motion = constrained_motion(lagrangian, &self.constraint, t, x, self.redundancy);
+        let multipliers = motion.map_err(|_| StepError::Singular { pivot: 0.0 })?.multipliers;
+        Ok(self.constraint.with_jacobian(&x.q).1.transpose() * multipliers)
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(StepFormula::Jacobian)
+    }
+
+    fn step_jacobian(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        (t, from, _): (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        let x = crate::theory::legendre_inverse(problem.lagrangian, t, from, &problem.start.v)?;
+        let start = self.start(t, x);
+        let (of, constraint) = (crate::error::step_error, &self.constraint);
+        match self.method {
+            ConstrainedMethod::Rattle(scheme) => {
+                let motion = DragRattle::of(problem.lagrangian, constraint, &scheme, h, &start).map_err(of)?;
+                by_columns(from, |x| Ok(motion.step(t, x)?.end))
+            }
+            ConstrainedMethod::Lobatto { stages } => {
+                let motion = ContactLobatto::of(problem.lagrangian, constraint, stages, h, &start).map_err(of)?;
+                by_columns(from, |along| Ok(motion.step(t, along, &x.v)?.end))
+            }
+        }
+        .map(Some)
+    }
+}
+
+/// The derivative of a map of states, one column after the other.
+fn by_columns<const N: usize>(
+    at: &PhasePoint<N>,
+    map: impl Fn(&PhasePoint<N, Along>) -> Result<PhasePoint<N, Along>, StepError>,
+) -> Result<DMatrix<f64>, StepError> {
+    let mut jacobian = DMatrix::zeros(2 * N + 1, 2 * N + 1);
+    for k in 0..=2 * N {
+        let number = |i: usize, re: f64| Dual { re, d: SVector::<f64, 1>::new(if i == k { 1.0 } else { 0.0 }) };
+        let end = map(&PhasePoint {
+            q: SVector::from_fn(|i, _| number(i, at.q[i])),
+            p: SVector::from_fn(|i, _| number(N + i, at.p[i])),
+            z: number(2 * N, at.z),
+        })?;
+        let slopes = end.q.iter().chain(&end.p).chain([&end.z]).map(|x| x.d[0]);
+        slopes.enumerate().for_each(|(i, slope)| jacobian[(i, k)] = slope);
+    }
+    Ok(jacobian)
+}
