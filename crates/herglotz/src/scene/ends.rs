@@ -154,7 +154,9 @@ impl EndsScene {
         use InputError as E;
         let span = match error {
             RuntimeError::Argument { argument: "integrator", .. } => self.integrator_at,
-            RuntimeError::Argument { argument: "coordinates", .. } | RuntimeError::Formula(_) => self.system_at,
+            RuntimeError::Argument { argument: "coordinates", .. }
+            | RuntimeError::Formula(_)
+            | RuntimeError::WithConstraints { .. } => self.system_at,
             RuntimeError::Input(E::Step { .. } | E::Count { .. } | E::TooMany { .. }) => self.steps_at,
             RuntimeError::Input(
                 E::Unclaimed { .. }

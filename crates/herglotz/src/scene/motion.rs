@@ -314,6 +314,8 @@ impl Scene {
             RuntimeError::NotRegular { .. }
             | RuntimeError::Formula(_)
             | RuntimeError::HamiltonianDimension { .. }
+            | RuntimeError::ConstrainedDimension { .. }
+            | RuntimeError::WithConstraints { .. }
             | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
             RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
             RuntimeError::Input(error) => match error {
@@ -329,9 +331,12 @@ impl Scene {
                 | E::Stages { .. } => spans.integrator,
                 E::FalseClaim { .. } => spans.lagrangian,
                 E::Times { .. } => spans.rows,
-                E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::TimeTransformation { .. } | E::EqualPoints => {
-                    spans.start
-                }
+                E::Constraint(_)
+                | E::Undefined
+                | E::FirstStep(_)
+                | E::Sigma { .. }
+                | E::TimeTransformation { .. }
+                | E::EqualPoints => spans.start,
                 _ => spans.run,
             },
             RuntimeError::ForceUndefined { .. } => spans.force,
