@@ -407,7 +407,8 @@ fn quantity(system: &System, text: &str) -> Result<Quantity, RuntimeError> {
             return Err(RuntimeError::argument("quantity", why));
         }
         Column::Expression(expression) => Quantity::Expression(expression),
-        Column::Energy | Column::LogFactor => Quantity::Expression(Box::new(formula.expression("energy")?)),
+        // A system with constraints, the only one with multipliers, has been refused.
+        Column::Energy | Column::LogFactor | Column::Multiplier(_) => Quantity::Expression(Box::new(formula.expression("energy")?)),
     })
 }
 
