@@ -9,12 +9,14 @@
 mod runs;
 
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy};
+use contact_geom::groups::{Inertia, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::support::linear::solve;
 use contact_geom::systems::constrained::{FourBar, ParallelCranks, RigidPendulum, Squeezer};
 use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, OffConstraint};
+use discrete_herglotz::groups::{GroupGauss, GroupMotion, GroupState};
 use discrete_herglotz::{InputError, SplittingScheme, StepError, Stepper};
 
 /// A bead on a closed curve, with a Lagrangian that is nonlinear in q, v and z.
@@ -223,6 +225,39 @@ fn spherical_pendulum_by_both_methods() {
         let tension = -2.0 * rattle.multipliers().unwrap()[0];
         assert!((tension - (x.v.dot(&x.v) - x.q[2])).abs() < 1e-13);
     }
+}
+
+/// The spherical pendulum through both poles: under the constraint, and as the axis of a symmetric top without spin, on the
+/// group SO(3). The constraint `q.q = 1` and a chart of the group have no poles.
+#[test]
+fn spherical_pendulum_by_a_constraint_and_by_a_group() {
+    let gamma = -0.1;
+    let system = RigidPendulum::<3> { gravity: 1.0, gamma };
+    let start = ConstrainedStart::new(VelocityPoint::new([0.6, 0.0, -0.8], [2.0, 0.0, 1.5], 0.2));
+    let rattle = DragRattle::new(system, system, &SplittingScheme::SOFRONIOU_SPALETTA_10, 0.05, &start);
+    let lobatto = ContactLobatto::new(system, system, 6, 0.05, &start);
+    let gravity = UniformGravity { weight: [0.0, 0.0, -1.0], centre: [0.0, 0.0, 1.0] };
+    let top = RigidBody::rotating(&Inertia::principal([1.0, 1.0, 0.3]).unwrap(), gravity, gamma).unwrap();
+    // The rotation about the second axis that turns the third one to the start.
+    let half = 0.5 * f64::atan2(0.6, -0.8);
+    let g = Rotation::from_quaternion([half.cos(), 0.0, half.sin(), 0.0]).unwrap();
+    let state = GroupState { g, momentum: SVector::from([0.0, -2.5, 0.0]), z: 0.2 };
+    let mut on_group = GroupMotion::<Rotations, 3>::new(0.0, state).unwrap();
+    let gauss = GroupGauss::new::<Rotations, 3>(&top, 6, 0.05).unwrap();
+    let mut under_constraint: [Box<dyn Stepper<3>>; 2] = [Box::new(rattle.unwrap()), Box::new(lobatto.unwrap())];
+    let [mut highest, mut lowest]: [f64; 2] = [-1.0, 1.0];
+    for _ in 0..120 {
+        on_group.advance(&gauss, 1).unwrap();
+        let axis = on_group.state().g.apply(&SVector::from([0.0, 0.0, 1.0]));
+        (highest, lowest) = (highest.max_or_nan(axis[2]), -(-lowest).max_or_nan(-axis[2]));
+        for motion in &mut under_constraint {
+            motion.advance(1).unwrap();
+            let PhasePoint { q, z, .. } = motion.state();
+            // The errors of order 10 and more of steps of a twentieth, and of round-off.
+            assert!((q - axis).max_abs_or_nan() < 1e-11 && (z - on_group.state().z).abs() < 1e-11);
+        }
+    }
+    assert!(highest > 0.99 && lowest < -0.99, "{highest} {lowest}");
 }
 
 /// The angles of Andrews' squeezing mechanism at t = 0.03: to 1e-12 those of another method for other equations, and to

@@ -6,6 +6,9 @@
 #![deny(clippy::disallowed_methods)]
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+#[path = "groups/boundary.rs"]
+mod boundary;
+
 use contact_geom::groups::{
     GroupError, GroupLagrangian, Inertia, LieGroup, Pair, PlaneRotation, PlaneRotations, Product, RigidBody,
     RigidMotion, RigidMotions, Rotation, Rotations, Translations, UniformGravity,

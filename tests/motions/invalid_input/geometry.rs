@@ -22,6 +22,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("ParametricHamiltonian::*", "the implementor's; tests/hamiltonians/hamiltonians/derivatives"),
     ("OneParameterGroup::act", "the implementor's; that of Symmetry is tested with its callers"),
     ("Constraint::value", "the implementor's"),
+    ("Constraint::count", "takes no number"),
     ("Distribution::omega", "the implementor's"),
     ("GroupLagrangian::constant_rate", "the implementor's, and takes no number"),
     ("GroupLagrangian::value", "the implementor's; that of RigidBody is tested by its partials"),

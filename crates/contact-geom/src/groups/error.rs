@@ -96,6 +96,17 @@ pub enum GroupError {
         /// The pivot that vanishes.
         pivot: f64,
     },
+    /// No motion between two configurations was found.
+    #[error(
+        "no motion between the configurations was found: after {iterations} corrections the end is off by {residual:e}; \
+         give a guess of the momentum nearer to that of a motion, or take more time"
+    )]
+    NoMotionBetween {
+        /// The remaining residual.
+        residual: f64,
+        /// The number of corrections.
+        iterations: u32,
+    },
     /// The integrating factor of the action is not positive in a step.
     #[error("sigma_d = {sigma} is not positive: the step is too long for the rate L_z; take a smaller step")]
     SigmaVanished {

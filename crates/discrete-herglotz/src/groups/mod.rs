@@ -20,12 +20,14 @@
 //! # Ok::<(), contact_geom::groups::GroupError>(())
 //! ```
 
+mod boundary;
 mod gauss;
 mod motion;
 mod splitting;
 mod stages;
 mod state;
 
+pub use boundary::{GroupEnds, MotionBetween};
 pub use gauss::GroupGauss;
 pub use motion::GroupMotion;
 pub use splitting::RigidBodySplitting;

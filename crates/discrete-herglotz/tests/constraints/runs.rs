@@ -54,8 +54,9 @@ fn an_accuracy_is_met() {
         assert_eq!((found.status, found.unresolved), (Status::Completed, None), "{method:?}");
         let position = found.q[0] - expected.q[0].sin();
         assert!(position.abs() <= accuracy, "{method:?}: {position:e}");
-        // The action is no part of the requested accuracy; its rate is below 5 for an error 1 of the state.
-        let action = found.z.unwrap() - expected.z.unwrap();
+        // The potential of the pendulum in its angle vanishes at the lowest point, that of the other one at the centre. The
+        // action is no part of the requested accuracy; its rate is below 5 for an error 1 of the state.
+        let action = found.z.unwrap() - expected.z.unwrap() - f64::exp_m1(10.0 * gamma) / gamma;
         assert!(action.abs() <= 50.0 * accuracy, "{method:?}: {action:e}");
         assert_eq!(crossed.crossings.len(), lowest.crossings.len(), "{method:?}");
         for (a, b) in crossed.crossings.iter().zip(&lowest.crossings) {
@@ -78,7 +79,9 @@ fn runs_are_resumed() {
     for method in METHODS {
         let run = || problem.by(Constrained::new(&system, method)).steps(Steps::Count(40)).with_conformal_factor();
         let whole = run().run(Until::Time(4.0)).unwrap();
-        assert!((whole.log_factor.unwrap() + 0.4).abs() < 1e-14, "{method:?}: {whole:?}");
+        // Exact for a linear drag by RATTLE, of the order of the method otherwise.
+        let bound = if matches!(method, ConstrainedMethod::Rattle(_)) { 1e-14 } else { 1e-10 };
+        assert!((whole.log_factor.unwrap() + 0.4).abs() < bound, "{method:?}: {whole:?}");
         let mut saved = Checkpoint::every(13, &path).unwrap();
         let mut interrupt = |at: &StepView<'_, 2>| match at.k {
             13 => ControlFlow::Break(Stop::here("a test")),

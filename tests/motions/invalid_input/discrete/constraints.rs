@@ -6,14 +6,17 @@ use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::systems::constrained::{KnifeEdge, RigidPendulum};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::constraints::{
-    ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, Nonholonomic, OffConstraint,
+    Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, Nonholonomic,
+    OffConstraint,
 };
-use discrete_herglotz::{SplittingScheme, Stepper, rules::Midpoint};
+use discrete_herglotz::{InputError, Integrator, Problem, SplittingScheme, Stepper, Steps, Until, rules::Midpoint};
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
         entries: &[
+            "Constrained::new",
             "ConstrainedStart::new",
+            "ConstrainedStart::resolved",
             "ContactLobatto::constrained_motion",
             "ContactLobatto::multipliers",
             "ContactLobatto::new",
@@ -23,6 +26,7 @@ pub const TESTS: &[InputTest] = &[
             "DragRattle::multipliers",
             "DragRattle::new",
             "DragRattle::velocity_point",
+            "Integrator::constraint_force",
         ],
         run: pendulums,
     },
@@ -67,6 +71,17 @@ fn by_lobatto(motion: Result<Lobatto, InputError>) -> Result<Vec<f64>, String> {
     Ok(numbers.chain([motion.state().z, multipliers[0], of.multipliers[0]]).collect())
 }
 
+/// The end of a run by RATTLE from the resolved start, and the force of the constraint there.
+fn by_run(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Result<Vec<f64>, String> {
+    let at = start.resolved(&system, &system).map_err(|e| e.to_string())?;
+    let problem = Problem::new(&system, start.t, at).map_err(|e| e.to_string())?;
+    let rattle = Constrained::new(&system, ConstrainedMethod::Rattle(SplittingScheme::STRANG));
+    let run = problem.by(rattle).steps(Steps::Size(h.abs())).run(Until::After(10.0 * h)).map_err(|e| e.to_string())?;
+    let end = VelocityPoint { q: run.q, v: run.p, z: 0.0 };
+    let force = rattle.constraint_force(&&system, run.t, &end).map_err(|e| e.to_string())?;
+    Ok(run.q.iter().chain(&run.p).chain(&force).copied().chain(run.z).collect())
+}
+
 fn pendulums(report: &mut Report) {
     let base = [0.6, -0.8, 0.4, 0.3, 0.2];
     let at = |c: [f64; 5]| VelocityPoint::new([c[0], c[1]], [c[2], c[3]], c[4]);
@@ -77,6 +92,7 @@ fn pendulums(report: &mut Report) {
                 let start = ConstrainedStart { off_constraint, ..ConstrainedStart::new(at(c)) };
                 report.entry_point(&c.to_vec(), by_rattle(rattle(PENDULUM, 0.01, &start)));
                 report.entry_point(&c.to_vec(), by_lobatto(lobatto(PENDULUM, 0.01, &start)));
+                report.entry_point(&c.to_vec(), by_run(PENDULUM, 0.01, &start));
             }
         }
         let start = ConstrainedStart::new(at(base));
@@ -84,6 +100,7 @@ fn pendulums(report: &mut Report) {
         report.entry_point(&value, by_rattle(rattle(PENDULUM, 0.01, &later)));
         report.entry_point(&value, by_lobatto(lobatto(PENDULUM, 0.01, &later)));
         report.entry_point(&value, by_rattle(rattle(PENDULUM, value, &start)));
+        report.entry_point(&value, by_run(PENDULUM, value, &start));
         report.entry_point(&value, by_lobatto(lobatto(PENDULUM, value, &start)));
         for system in [RigidPendulum { gravity: value, ..PENDULUM }, RigidPendulum { gamma: value, ..PENDULUM }] {
             report.entry_point(&value, by_rattle(rattle(system, 0.01, &start)));

@@ -19,7 +19,7 @@ pub const TESTS: &[InputTest] = &[
         run: holonomic,
     },
     InputTest { entries: &["DistributionDerivatives::rates"], run: distribution },
-    InputTest { entries: &["independent_rows", "least_norm", "restricted"], run: rows },
+    InputTest { entries: &["independent_rows", "least_norm", "restricted", "Redundancy::imposed"], run: rows },
     InputTest { entries: &["FourBar::closed_at", "ParallelCranks::at"], run: mechanisms },
 ];
 
@@ -68,6 +68,8 @@ fn rows(report: &mut Report) {
             let independent = independent_rows(&matrix);
             // No row of a matrix that is not finite is left out.
             let all = independent == [true; 2];
+            let imposed = [Redundancy::LeastNorm, Redundancy::Refuse].map(|of| of.imposed(1, &matrix));
+            report.check(imposed == [independent, [true, false]], || format!("{matrix:?} has {imposed:?}"));
             report.check(all || matrix.iter().all(|x| x.is_finite()), || format!("{matrix:?} has {independent:?}"));
             let found = least_norm(&matrix, &[true, false], &SVector::from([1.0, 0.0]));
             report.formula(&matrix, found.map_err(|e| format!("{e:?}")));

@@ -5,12 +5,14 @@ use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::systems::constrained::RigidPendulum;
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
     TimeTransformation, VelocityDrag, VelocityPoint,
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
+use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::hamiltonian::{HamiltonianSplitting, Kinetic, PieceStepper, Quadratic};
 use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint, Rectangle};
@@ -192,6 +194,12 @@ fn input_errors() {
         InputError::Geometry(_) => {
             Flow::new(&Midpoint::new(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
         }, ["p[0] = NaN", "finite"];
+        InputError::Constraint(_) => {
+            let hanging = RigidPendulum::<2> { gravity: 1.0, gamma: -0.1 };
+            let problem = Problem::new(&hanging, 0.0, VelocityPoint::new([1.1, 0.0], [0.0, 0.0], 0.0)).unwrap();
+            let lobatto = Constrained::new(&hanging, ConstrainedMethod::Lobatto { stages: 3 });
+            problem.by(lobatto).steps(Steps::Count(3)).run(Until::Time(1.0)).err().unwrap()
+        }, ["off the constraints", "constraint 0", "OffConstraint::Project"];
         InputError::Sigma { .. } => Flow::new(&strong(), 0.0, pendulum_at(0.5)).err().unwrap(), ["sigma_d = -1", "smaller step"];
         InputError::EqualPoints => {
             Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err().unwrap()
