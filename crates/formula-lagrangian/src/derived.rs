@@ -57,6 +57,8 @@ pub(crate) struct Derived {
     /// The value and the force for any values of the parameters.
     pub parametric_value: ParametricNodes,
     pub parametric_force: ParametricNodes,
+    /// The holonomic constraints.
+    pub constraints: Tape,
     /// The nodes of these forces.
     pub applied_nodes: Vec<Id>,
     pub proved_force: ProvedForce,
@@ -139,6 +141,7 @@ impl Derived {
         let parametric_value = ParametricNodes::new(&graph, &[root]);
         let parametric_force = ParametricNodes::new(&graph, &applied_nodes);
         let proved_force = ProvedForce::of(&mut graph, &applied_nodes, n, MOST_NODES_WITH_HESSIAN);
+        let constraints = Tape::new(&graph, &formula.constraints, n).ok_or(too_large)?;
         let formula = Formula { graph, ..formula.clone() };
         let mut derived = Derived {
             formula,
@@ -161,6 +164,7 @@ impl Derived {
             applied,
             parametric_value,
             parametric_force,
+            constraints,
             applied_nodes,
             proved_force,
             unforced: structure,
@@ -207,9 +211,20 @@ impl Derived {
 
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
-        let Derived { value, force, with_force, gradient, rate, with_gradient, mass, second, switching, .. } =
-            &mut *self;
-        for tape in [value, force, with_force, gradient, rate, with_gradient, mass, second, switching] {
+        let Derived {
+            value,
+            force,
+            with_force,
+            gradient,
+            rate,
+            with_gradient,
+            mass,
+            second,
+            switching,
+            constraints,
+            ..
+        } = &mut *self;
+        for tape in [value, force, with_force, gradient, rate, with_gradient, mass, second, switching, constraints] {
             tape.set_constants(&constants);
         }
         if let Some(applied) = &mut self.applied {

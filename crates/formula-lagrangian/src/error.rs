@@ -39,6 +39,23 @@ pub enum FormulaError {
         /// The reason, and the remedy.
         why: &'static str,
     },
+    /// A holonomic constraint that is not one, or that cannot be combined with another part of the formula.
+    #[error("a constraint {why}")]
+    Constraint {
+        /// The reason, and the remedy.
+        why: &'static str,
+    },
+    /// As many holonomic constraints as coordinates, or more.
+    #[error(
+        "there are {found} constraints on {coordinates} coordinates, so that nothing can move; give fewer constraints \
+         than coordinates, each independent of the others"
+    )]
+    Constraints {
+        /// The number of constraints.
+        found: usize,
+        /// The number of coordinates.
+        coordinates: usize,
+    },
     /// A time at which steps are to end is not finite.
     #[error("a break of the motion is at the time {time}; it must be a finite number")]
     Break {

@@ -31,6 +31,8 @@ pub struct Formula {
     /// The times at which steps end, as given by the user.
     pub(crate) breaks: Vec<f64>,
     pub(crate) resets: Vec<FormulaReset>,
+    /// The functions of the coordinates that vanish.
+    pub(crate) constraints: Vec<Id>,
 }
 
 impl Formula {
@@ -83,7 +85,16 @@ impl Formula {
     }
 
     fn new(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Self {
-        Formula { names, graph, root, values, forces: Forces::default(), breaks: Vec::new(), resets: Vec::new() }
+        Formula {
+            names,
+            graph,
+            root,
+            values,
+            forces: Forces::default(),
+            breaks: Vec::new(),
+            resets: Vec::new(),
+            constraints: Vec::new(),
+        }
     }
 
     /// A formula that is built by a program: a node of a graph, in which coordinates and parameters are given by their
@@ -225,7 +236,7 @@ impl Formula {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
     }
 
-    /// The parameters on which the Lagrangian, a force or a reset depends, in their order.
+    /// The parameters on which the Lagrangian, a force, a reset or a constraint depends, in their order.
     pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
         let needed = self.graph.needed_by(&self.roots());
         let is_used = move |i: usize| {
@@ -243,7 +254,8 @@ impl Formula {
     /// The nodes of all that the formula consists of.
     fn roots(&self) -> Vec<Id> {
         let of_resets = self.resets.iter().flat_map(FormulaReset::roots);
-        std::iter::once(self.root).chain(self.forces.roots()).chain(of_resets).collect()
+        let constraints = self.constraints.iter().copied();
+        std::iter::once(self.root).chain(self.forces.roots()).chain(of_resets).chain(constraints).collect()
     }
 
     /// Sets the value of a parameter.

@@ -69,6 +69,7 @@ impl Formula {
     /// or if the number of the law is outside its range.
     pub fn with_impact(&self, when: &str, law: Impact, rest: Option<&[(&str, &str)]>) -> Result<Self, FormulaError> {
         self.check_is_lagrangian(NO_RESETS.0, NO_RESETS.1)?;
+        self.check_has_no_constraints()?;
         match law {
             Impact::Restitution(e) if !(0.0..=1.0).contains(&e) => {
                 return Err(FormulaError::Impact { why: "has a restitution outside of 0 to 1; give one within" });

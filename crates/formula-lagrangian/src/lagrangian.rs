@@ -100,7 +100,8 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// products and areas, such as `x^2 + y^2`; and common translations and rotations of bodies, whose coordinates are
     /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order. With forces, they are those along
     /// which the forces do no work, as far as their expressions show: the forces on the coordinates that are moved are
-    /// 0, or cancel as `F` and `-F`. With resets, which change momenta, there are none.
+    /// 0, or cancel as `F` and `-F`; with constraints, they are those under which each constraint is invariant, as far as
+    /// its expression shows. With resets, which change momenta, there are none.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along =
             |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
@@ -108,21 +109,23 @@ impl<const N: usize> FormulaLagrangian<N> {
             return Vec::new();
         }
         let n = self.derived.formula.dimension();
-        let Formula { graph, root, .. } = &self.derived.formula;
+        let Formula { graph, root, constraints, .. } = &self.derived.formula;
+        let moves = |set: &[usize]| constraints.iter().all(|c| graph.moves_into_itself(*c, set));
+        let turned = |planes: &[(usize, usize)]| constraints.iter().all(|c| graph.turns_into_itself(*c, planes));
         let mut work = Work::new(graph, &self.derived.applied_nodes);
         let bodies = graph.sets_of_differences(*root, n);
         let mut seen = Vec::new();
         let cyclic = (0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true));
-        seen.extend(cyclic.filter(|i| work.vanishes_along(&[*i])).map(|i| along(&[i])));
+        seen.extend(cyclic.filter(|i| moves(&[*i]) && work.vanishes_along(&[*i])).map(|i| along(&[i])));
         let moving = bodies.iter().filter(|set| graph.moves_into_itself(*root, set));
-        seen.extend(moving.filter(|set| work.vanishes_along(set)).map(|set| along(set)));
-        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, &[(*i, *j)]);
+        seen.extend(moving.filter(|set| moves(set) && work.vanishes_along(set)).map(|set| along(set)));
+        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, &[(*i, *j)]) && turned(&[(*i, *j)]);
         let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j))).filter(turns);
         seen.extend(pairs.filter(|pair| work.vanishes_around(&[*pair])).map(|(i, j)| Symmetry::Rotation(i, j)));
         for (k, second) in bodies.iter().enumerate() {
             for first in bodies.iter().take(k).filter(|first| first.len() == second.len()) {
                 let planes: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
-                if graph.turns_into_itself(*root, &planes) && work.vanishes_around(&planes) {
+                if graph.turns_into_itself(*root, &planes) && turned(&planes) && work.vanishes_around(&planes) {
                     seen.extend(Symmetry::rotations(&planes));
                 }
             }

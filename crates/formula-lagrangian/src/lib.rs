@@ -106,6 +106,27 @@
 //! differences whose sign decides `min`, `max` and `if`, and for a table at another argument its distance from each
 //! sample. [`Formula::with_reset`] adds functions at whose zeros the state is replaced.
 //!
+//! # Constraints
+//!
+//! [`Formula::with_constraints`] adds holonomic constraints `c(q) = 0`: equations such as `x^2 + y^2 = l^2`, or
+//! expressions that vanish. They are smooth functions of the coordinates and parameters, without velocities, t and the
+//! action, and there are fewer of them than coordinates. [`FormulaLagrangian`] is then also a
+//! [`Constraint`](contact_geom::constraints::Constraint) for the integrators of constrained motions.
+//!
+//! ```
+//! use contact_geom::VelocityPoint;
+//! use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
+//! use discrete_herglotz::{Problem, SplittingScheme, Steps, Until};
+//! use formula_lagrangian::Formula;
+//! let free = Formula::parse("(x'^2 + y'^2)/2 - 9.81*y", &["x", "y"], &[])?;
+//! let l = free.with_constraints(&["x^2 + y^2 = 1"])?.lagrangian::<2>()?;
+//! let problem = Problem::new(&l, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0))?;
+//! let rattle = Constrained::<_, 2>::new(&l, ConstrainedMethod::Rattle(SplittingScheme::KAHAN_LI_8));
+//! let outcome = problem.by(rattle).steps(Steps::Count(100)).run(Until::Time(1.0))?;
+//! assert!((outcome.q.norm() - 1.0).abs() < 1e-15);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Bounds
 //!
 //! A text has at most [`LONGEST_TEXT`] bytes, a nesting depth of at most [`DEEPEST_NESTING`], and at most
@@ -113,6 +134,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod constraints;
 mod degrees;
 mod derivatives;
 mod derived;

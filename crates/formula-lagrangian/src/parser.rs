@@ -1,12 +1,14 @@
 //! A parser from text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
 
 mod calls;
+mod constraints;
 mod expressions;
 mod forces;
 mod messages;
 mod targets;
 mod values;
 
+pub(crate) use constraints::not_holonomic;
 pub(crate) use targets::{Kind, Target};
 
 use crate::forces::{Forces, RAYLEIGH};
@@ -51,6 +53,8 @@ pub(crate) struct Parser<'a> {
     beside: Option<&'a Formula>,
     /// The forces of the text; `None` for a text that can have none.
     forces: Option<Forces>,
+    /// Whether the text is that of a holonomic constraint, a smooth function of the coordinates.
+    positions_only: bool,
 }
 
 type Parsed<T> = Result<T, ParseError>;
@@ -76,6 +80,7 @@ impl<'a> Parser<'a> {
             value_name,
             beside: None,
             forces: None,
+            positions_only: false,
         })
     }
 

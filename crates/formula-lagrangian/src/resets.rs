@@ -214,7 +214,7 @@ impl Formula {
     /// # Errors
     /// [`FormulaError::Parse`]; [`FormulaError::Target`] if there is no such variable, or if it is assigned twice;
     /// [`FormulaError::Reset`] if nothing is assigned, if the function is constant, or if an expression contains the
-    /// conformal factor; [`FormulaError::TooLarge`].
+    /// conformal factor; [`FormulaError::Constraint`] if the formula has constraints; [`FormulaError::TooLarge`].
     ///
     /// [`FormulaLagrangian::reset_of`]: crate::FormulaLagrangian::reset_of
     pub fn with_reset(&self, reset: Reset<'_>) -> Result<Self, FormulaError> {
@@ -272,9 +272,11 @@ impl Formula {
     ///
     /// # Errors
     /// [`FormulaError::ForeignNode`]; [`FormulaError::Unknown`] if there is no such coordinate; [`FormulaError::Reset`]
-    /// if nothing is assigned, if a variable is assigned twice, or if the function is constant.
+    /// if nothing is assigned, if a variable is assigned twice, or if the function is constant;
+    /// [`FormulaError::Constraint`] if the formula has constraints.
     pub fn with_reset_nodes(mut self, reset: ResetNodes) -> Result<Self, FormulaError> {
         self.check_is_lagrangian(NO_RESETS.0, NO_RESETS.1)?;
+        self.check_has_no_constraints()?;
         let ResetNodes { when, direction, then, rest } = reset;
         let reset = FormulaReset { when, direction, change: Change::Assignment(then), rest };
         reset.roots().try_for_each(|id| self.check_node(id))?;

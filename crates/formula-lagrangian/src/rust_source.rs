@@ -36,7 +36,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     ///
     /// # Errors
     /// [`FormulaError::Name`] if `name` is not a valid name of a type; [`FormulaError::NotInRust`] if the formula has
-    /// tables or resets.
+    /// tables, resets or constraints.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
         let letters =
             name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
@@ -51,6 +51,9 @@ impl<const N: usize> FormulaLagrangian<N> {
         }
         if self.resets() > 0 {
             return Err(FormulaError::NotInRust { what: "resets" });
+        }
+        if self.derived.formula.constraints() > 0 {
+            return Err(FormulaError::NotInRust { what: "constraints" });
         }
         let mut text = String::new();
         // Writing to a string does not fail.

@@ -4,6 +4,7 @@
 #![allow(missing_docs, clippy::panic, clippy::unwrap_used)]
 
 mod accuracy;
+mod constraints;
 mod derivatives;
 mod forces;
 mod friction;

@@ -4,6 +4,8 @@
 
 #[path = "scenes/additions.rs"]
 mod additions;
+#[path = "scenes/constraints.rs"]
+mod constraints;
 #[path = "../../formula-lagrangian/tests/random/mod.rs"]
 mod random;
 #[path = "scenes/where_z_bites.rs"]

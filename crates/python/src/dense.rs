@@ -80,7 +80,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         let plan = motion.system.plan(&motion.motion)?;
         let by = match motion.motion.step_control {
             StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Ok(by),
-            StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
+            StepControl::Accuracy { by: None, .. } => plan.by().ok_or(()),
         };
         let Ok(by) = by else { return Ok(None) };
         let again = herglotz_runtime::Motion {

@@ -91,6 +91,8 @@ pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz_runtime::Runtim
 #[pymethods]
 impl Motion {
     #[new]
+    #[pyo3(signature = (system, start, t, every, step_control, events, columns, conformal_factor, estimate, scales,
+                        project = false))]
     #[expect(clippy::too_many_arguments, reason = "they are those of `solve`, which names them")]
     fn new(
         system: &System,
@@ -103,6 +105,7 @@ impl Motion {
         conformal_factor: bool,
         estimate: bool,
         scales: Option<Bound<'_, PyAny>>,
+        project: bool,
     ) -> PyResult<Self> {
         let formula = &system.formula;
         let (q, velocity, is_momentum, z, near) = start;
@@ -159,6 +162,7 @@ impl Motion {
             conformal_factor,
             estimate,
             scales,
+            project,
             interrupt: Some(signals.interrupt()),
             ..herglotz_runtime::Motion::new(start, end, step_control)
         };

@@ -34,6 +34,8 @@ struct Additions {
     rayleigh: Vec<String>,
     /// The times of jumps that are named by the user.
     breaks: Vec<f64>,
+    /// The holonomic constraints.
+    constraints: Vec<String>,
 }
 
 /// Whether the formula is a Hamiltonian, the names of its momenta as they were given, and the name of the action.
@@ -74,6 +76,10 @@ impl Additions {
         for text in &self.rayleigh {
             formula = formula.with_rayleigh(text).map_err(|error| value_error(format!("`rayleigh`: {error}")))?;
         }
+        for text in &self.constraints {
+            let with = formula.with_constraints(&[text.as_str()]);
+            formula = with.map_err(|error| value_error(format!("the constraint {text:?}: {error}")))?;
+        }
         formula.with_breaks(&self.breaks).map_err(value_error)
     }
 }
@@ -90,6 +96,7 @@ type Arguments<'py> = (
     Vec<(String, String)>,
     Vec<String>,
     Vec<f64>,
+    Vec<String>,
     GivenKind,
 );
 
@@ -117,7 +124,7 @@ pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
 impl System {
     #[new]
     #[pyo3(signature = (lagrangian, coordinates, parameters = None, tables = Vec::new(), forces = Vec::new(),
-                        rayleigh = Vec::new(), breaks = Vec::new(), kind = None))]
+                        rayleigh = Vec::new(), breaks = Vec::new(), constraints = Vec::new(), kind = None))]
     #[expect(clippy::too_many_arguments, reason = "they are those of `system`, which names them")]
     fn new(
         lagrangian: String,
@@ -127,6 +134,7 @@ impl System {
         forces: Vec<(String, String)>,
         rayleigh: Vec<String>,
         breaks: Vec<f64>,
+        constraints: Vec<String>,
         kind: Option<GivenKind>,
     ) -> PyResult<Self> {
         let (hamiltonian, momenta, action) = kind.unwrap_or_else(|| (false, Vec::new(), "z".to_owned()));
@@ -134,7 +142,7 @@ impl System {
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let tables = tables.into_iter().map(|(name, table)| (name, table.get().inner.clone())).collect();
-        let additions = Additions { tables, forces, rayleigh, breaks };
+        let additions = Additions { tables, forces, rayleigh, breaks, constraints };
         let formula = additions.formula(&kind, &lagrangian, &texts(&coordinates), &values)?;
         let inner = herglotz_runtime::System::new(&formula).map_err(value_error)?;
         Ok(System { inner, formula, additions, kind, lagrangian, given_coordinates: coordinates })
@@ -162,6 +170,12 @@ impl System {
     #[getter]
     fn breaks(&self) -> Vec<f64> {
         self.additions.breaks.clone()
+    }
+
+    /// The holonomic constraints.
+    #[getter]
+    fn constraints(&self) -> Vec<String> {
+        self.additions.constraints.clone()
     }
 
     /// What contact flows have and the motions of this system lose because of its forces, each with the reason.
@@ -205,18 +219,19 @@ impl System {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (this, py) = (slf.get(), slf.py());
-        let Additions { forces, rayleigh, breaks, .. } = this.additions.clone();
+        let Additions { forces, rayleigh, breaks, constraints, .. } = this.additions.clone();
         let (text, coordinates) = (this.lagrangian.clone(), this.given_coordinates.clone());
         let tables = this.tables();
         let parameters = this.parameters(py)?;
-        Ok((slf.get_type(), (text, coordinates, parameters, tables, forces, rayleigh, breaks, this.kind())))
+        let arguments = (text, coordinates, parameters, tables, forces, rayleigh, breaks, constraints, this.kind());
+        Ok((slf.get_type(), arguments))
     }
 
     fn __repr__(&self) -> String {
         let parameters = self.inner.formula().parameters().map(|(name, value)| format!("{name:?}: {value:?}"));
         let parameters: Vec<String> = parameters.collect();
         let (l, coordinates) = (&self.lagrangian, &self.given_coordinates);
-        let Additions { tables, forces, rayleigh, breaks } = &self.additions;
+        let Additions { tables, forces, rayleigh, breaks, constraints } = &self.additions;
         let mut text = format!("System({l:?}, {coordinates:?}, {{{}}}", parameters.join(", "));
         if !tables.is_empty() {
             text += &format!(", tables={:?}", tables.iter().map(|(name, _)| name).collect::<Vec<_>>());
@@ -229,6 +244,9 @@ impl System {
         }
         if !breaks.is_empty() {
             text += &format!(", breaks={breaks:?}");
+        }
+        if !constraints.is_empty() {
+            text += &format!(", constraints={constraints:?}");
         }
         if self.kind.hamiltonian || self.kind.action != "z" {
             text += &format!(", kind={:?}", self.kind());

@@ -21,13 +21,16 @@ pub enum Column {
     Energy,
     /// The logarithm of the conformal factor since the start: the integral of `L_z`.
     LogFactor,
+    /// The multiplier lambda of the constraint with this index: the force of the constraint is `lambda c_q`.
+    Multiplier(usize),
     /// An expression of time and state.
     Expression(Box<Expression>),
 }
 
 impl Column {
     /// Parses a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an
-    /// array), `energy`, `sigma`, `log_factor`, unless a coordinate or a parameter has that name. Any other text is an
+    /// array), `energy`, `sigma`, `log_factor`; `lambda[0]` for the multiplier of the first constraint, or `lambda` if it is the only
+    /// one; unless a coordinate or a parameter has that name. Any other text is an
     /// expression in all of these, with or without a name.
     ///
     /// # Errors
@@ -51,6 +54,13 @@ impl Column {
             "energy" if !taken && of_lagrangian => return Ok(Column::Energy),
             "log_factor" if !taken => return Ok(Column::LogFactor),
             _ => {}
+        }
+        let of_constraint = (0..formula.constraints()).find(|i| {
+            name.strip_prefix("lambda[").and_then(|rest| rest.strip_suffix(']')) == Some(i.to_string().as_str())
+        });
+        let only = (name == "lambda" && formula.constraints() == 1).then_some(0);
+        if let Some(i) = of_constraint.or(only).filter(|_| !names_lambda(formula)) {
+            return Ok(Column::Multiplier(i));
         }
         if !taken && let Some(i) = formula.momenta().iter().position(|momentum| momentum == name) {
             return Ok(Column::Momentum(i));
@@ -89,4 +99,10 @@ pub fn velocity_name(coordinate: &str) -> String {
         Some((name, index)) => format!("{name}'[{index}"),
         None => format!("{coordinate}'"),
     }
+}
+
+/// Whether a coordinate or a parameter is named lambda.
+fn names_lambda(formula: &Formula) -> bool {
+    let is_lambda = |name: &str| name == "lambda" || name.starts_with("lambda[");
+    formula.coordinates().iter().any(|name| is_lambda(name)) || formula.parameters().any(|(name, _)| is_lambda(name))
 }

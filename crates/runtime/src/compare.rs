@@ -121,6 +121,7 @@ impl System {
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
+        crate::kernel::refuse_constraints(self.formula(), "comparisons of integrators")?;
         let without_output = |step_control: StepControl| Motion {
             action: false,
             interrupt: motion.interrupt.clone(),

@@ -1,6 +1,7 @@
 //! Errors of a request.
 
 use contact_geom::GeometryError;
+use discrete_herglotz::constraints::ConstraintError;
 use discrete_herglotz::{
     CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError, sensitivity::SensitivityError,
 };
@@ -85,6 +86,26 @@ pub enum RuntimeError {
     /// Something that is computed for Lagrangians only was requested of a Hamiltonian.
     #[error("{what} are not computed for a Hamiltonian; give a Lagrangian, or use the library in Rust")]
     OfLagrangians {
+        /// What was requested.
+        what: &'static str,
+    },
+    /// A formula with constraints has more coordinates than are compiled.
+    #[error(
+        "the system has constraints on {found} coordinates; it can have up to {most}. Choose coordinates in which some \
+         constraints are solved, or use `Constraint` in Rust"
+    )]
+    ConstrainedDimension {
+        /// The number of coordinates.
+        found: usize,
+        /// The largest number.
+        most: usize,
+    },
+    /// Something that is not computed under constraints was requested of a formula with constraints.
+    #[error(
+        "{what} are not computed with constraints; motions, their rows, events, plans and checkpoints, and ensembles \
+         are. Choose coordinates in which the constraints are solved"
+    )]
+    WithConstraints {
         /// What was requested.
         what: &'static str,
     },
@@ -200,6 +221,18 @@ pub fn in_words(error: &InputError) -> String {
         InputError::Hypothesis { hypothesis } => {
             format!("the integrator requires {hypothesis}; choose another integrator")
         }
+        InputError::Constraint(ConstraintError::OffConstraint { distance, index, value }) => format!(
+            "the start is off the constraints by the distance {distance:e}: constraint {index} has the value \
+             {value:e}; give a start on the constraints, or request its projection with `project`"
+        ),
+        InputError::Constraint(ConstraintError::OffVelocity { distance }) => format!(
+            "the initial velocity violates the constraints by the velocity {distance:e}; give a velocity that is \
+             tangent to them, or request its projection with `project`"
+        ),
+        InputError::Constraint(ConstraintError::RankDeficient { rank, expected }) => format!(
+            "the constraints are dependent at the start: {rank} of {expected} are independent; remove those that \
+             follow from others, or start at another position"
+        ),
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
         InputError::Forced { method } => format!(
             "there is a force that {method} does not take; choose a Gauss method such as \"gauss_8\", or write the force \

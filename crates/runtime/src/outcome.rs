@@ -1,6 +1,6 @@
 //! Results of a motion.
 
-use discrete_herglotz::{MethodInfo, PlanEntry, Status, UnresolvedStep};
+use discrete_herglotz::{AnyIntegrator, MethodInfo, PlanEntry, Status, UnresolvedStep};
 
 /// The result of a motion. Where the motion was ended early, it describes the part that was computed.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,6 +81,19 @@ pub struct Plan {
     pub error: Option<f64>,
     /// The entries of the plan, one for each line of the text.
     pub items: Vec<PlanEntry>,
+}
+
+impl Plan {
+    /// The integrator by whose name the motion can be repeated with these steps. For a system with constraints, the
+    /// names are those of the methods without constraints that stand for them. `None` where it has no name.
+    pub fn by(&self) -> Option<AnyIntegrator> {
+        let name = self.integrator.name.as_ref();
+        match (name.strip_prefix("rattle_"), name.strip_prefix("lobatto_")) {
+            (Some(scheme), _) => scheme.parse().ok(),
+            (_, Some(stages)) => Some(AnyIntegrator::Gauss { stages: stages.parse::<usize>().ok()?.checked_sub(1)? }),
+            _ => name.parse().ok(),
+        }
+    }
 }
 
 /// Callbacks during a motion. Where a callback returns `Break`, the motion ends and all that was recorded is kept.

@@ -156,6 +156,8 @@ pub struct Motion {
     /// The scale of each coordinate by which errors are measured; without it errors are relative to the size of the
     /// whole state.
     pub scales: Option<Vec<f64>>,
+    /// Whether a start that violates the constraints of the formula is moved to them; otherwise it is refused.
+    pub project: bool,
     /// Whether every step is passed to [`RunMonitor::node`](crate::RunMonitor::node).
     pub nodes: bool,
     /// Whether the motion is refused if it could not be interrupted and [resumed](crate::System::resume).
@@ -179,6 +181,7 @@ impl Motion {
             conformal_factor: false,
             estimate: false,
             scales: None,
+            project: false,
             nodes: false,
             resumable: false,
             interrupt: None,

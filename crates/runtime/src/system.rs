@@ -208,6 +208,7 @@ impl System {
         if self.formula().is_hamiltonian() {
             return Err(RuntimeError::OfLagrangians { what: "paths between two positions" });
         }
+        kernel::refuse_constraints(self.formula(), "paths between two positions")?;
         kernel::path::search(self.formula(), problem)
     }
 }

@@ -4,6 +4,8 @@
 
 #[path = "motions/catalogue.rs"]
 mod catalogue;
+#[path = "motions/constraints.rs"]
+mod constraints;
 #[path = "motions/dimensions.rs"]
 mod dimensions;
 #[path = "motions/ensembles.rs"]

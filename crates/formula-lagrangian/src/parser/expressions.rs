@@ -71,7 +71,11 @@ impl<'a> Parser<'a> {
             }
             Token::Sign('+') => self.expression(SIGN),
             Token::Sign('(') => self.bracketed(|parser| parser.expression(0), ')'),
-            Token::Name(name) => self.named(name, word),
+            Token::Name(name) => {
+                let value = self.named(name, word)?;
+                self.check_in_constraint(value, word)?;
+                Ok(value)
+            }
             _ => {
                 self.at = self.at.saturating_sub(1);
                 Err(self.unexpected(word, "a value"))

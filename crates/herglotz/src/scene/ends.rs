@@ -2,6 +2,7 @@
 
 use super::SceneError;
 use super::checked::check_version;
+use super::constraints::with_constraints;
 use super::file::{SystemTable, span_of_table};
 use super::forces::with_forces;
 use super::location::{Location, Named, Numbers, Span};
@@ -103,6 +104,7 @@ impl EndsScene {
         let EndsFile { system: table, start, ends, run, .. } = &file;
         let entry = entry(text, table)?;
         let formula = with_forces(text, formula(text, table, entry, &[])?, file.force.as_ref())?;
+        let formula = with_constraints(text, formula, table.constraints.as_ref())?;
         check_used(text, &formula, table, &[])?;
         let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
         let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;
@@ -152,7 +154,9 @@ impl EndsScene {
         use InputError as E;
         let span = match error {
             RuntimeError::Argument { argument: "integrator", .. } => self.integrator_at,
-            RuntimeError::Argument { argument: "coordinates", .. } | RuntimeError::Formula(_) => self.system_at,
+            RuntimeError::Argument { argument: "coordinates", .. }
+            | RuntimeError::Formula(_)
+            | RuntimeError::WithConstraints { .. } => self.system_at,
             RuntimeError::Input(E::Step { .. } | E::Count { .. } | E::TooMany { .. }) => self.steps_at,
             RuntimeError::Input(
                 E::Unclaimed { .. }

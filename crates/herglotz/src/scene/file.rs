@@ -78,6 +78,10 @@ pub(crate) struct SystemTable {
     pub momenta: Option<Location<Vec<Location<String>>>>,
     /// The name of the action, by default `z`; with another one `z` may be a coordinate.
     pub action: Option<Location<String>>,
+    /// Holonomic constraints: equations over the coordinates and the parameters, as in `["x^2 + y^2 = l^2"]`, or
+    /// expressions that vanish. The motion is then that on the surface where they hold. `gauss_4` means a contact Lobatto
+    /// method of the same order, and a splitting means RATTLE that is composed by its scheme.
+    pub constraints: Option<Location<Vec<Location<String>>>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,
@@ -97,6 +101,9 @@ pub(crate) struct RunTable {
     pub step: Option<Location<f64>>,
     /// The number of steps, instead of their length.
     pub steps: Option<Location<usize>>,
+    /// Whether a start that violates the constraints is moved to them; otherwise it is refused, with its distance.
+    #[serde(default)]
+    pub project: bool,
     /// The size of each coordinate, in the order of the coordinates, where they differ much: the errors of each
     /// coordinate and its velocity are measured in units of its size.
     pub scales: Option<Location<Vec<f64>>>,

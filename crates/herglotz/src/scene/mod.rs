@@ -2,6 +2,7 @@
 
 mod body;
 mod checked;
+mod constraints;
 mod csv_file;
 mod ends;
 mod error;

@@ -1,6 +1,7 @@
 //! Scenes of motions from an initial state.
 
 use super::checked::{check_version, finite};
+use super::constraints::with_constraints;
 use super::file::{self, EventTable, File};
 use super::fit::{self, SceneFit};
 use super::forces::with_forces;
@@ -40,11 +41,12 @@ pub struct Scene {
     end: f64,
     step_control: StepControl,
     rows: RowTimes,
-    /// Forces, tables, breaks and resets in one text, to distinguish scenes.
+    /// Forces, constraints, tables, breaks and resets in one text, to distinguish scenes.
     additions: String,
     conformal_factor: bool,
     estimate: bool,
     scales: Option<Vec<f64>>,
+    project: bool,
     text: String,
     spans: Spans,
 }
@@ -130,6 +132,7 @@ impl Scene {
         let tables = tables::read(text, folder, &file.tables)?;
         let formula = formula(text, &file.system, entry, &tables)?;
         let formula = with_forces(text, formula, file.force.as_ref())?;
+        let formula = with_constraints(text, formula, file.system.constraints.as_ref())?;
         let (system, run) = (&file.system, &file.run);
         let header = file.start.as_ref().map_or(system.span(), Location::span);
         let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
@@ -186,6 +189,7 @@ impl Scene {
             conformal_factor: file.want.conformal_factor,
             estimate: file.want.estimate,
             scales: run.scales.as_deref().cloned(),
+            project: run.project,
             text: text.to_owned(),
             spans: Spans {
                 lagrangian,
@@ -221,7 +225,8 @@ impl Scene {
 
     /// The motion with no output but its end.
     pub fn bare_motion(&self) -> Motion {
-        Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.step_control) }
+        let motion = Motion::new(self.start.clone(), self.end, self.step_control);
+        Motion { scales: self.scales.clone(), project: self.project, ..motion }
     }
 
     /// The fit of its motion to data, if it has one.
@@ -314,6 +319,8 @@ impl Scene {
             RuntimeError::NotRegular { .. }
             | RuntimeError::Formula(_)
             | RuntimeError::HamiltonianDimension { .. }
+            | RuntimeError::ConstrainedDimension { .. }
+            | RuntimeError::WithConstraints { .. }
             | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
             RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
             RuntimeError::Input(error) => match error {
@@ -329,9 +336,12 @@ impl Scene {
                 | E::Stages { .. } => spans.integrator,
                 E::FalseClaim { .. } => spans.lagrangian,
                 E::Times { .. } => spans.rows,
-                E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::TimeTransformation { .. } | E::EqualPoints => {
-                    spans.start
-                }
+                E::Constraint(_)
+                | E::Undefined
+                | E::FirstStep(_)
+                | E::Sigma { .. }
+                | E::TimeTransformation { .. }
+                | E::EqualPoints => spans.start,
                 _ => spans.run,
             },
             RuntimeError::ForceUndefined { .. } => spans.force,
@@ -374,7 +384,7 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
     columns.chain(events).map(|text| &**text)
 }
 
-/// Forces, tables, breaks and resets in one text.
+/// Forces, constraints, tables, breaks and resets in one text.
 fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
     let pairs = |table: &Option<Location<Named<String>>>| {
         let all = table.iter().flat_map(|table| &table.0);
@@ -386,5 +396,9 @@ fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
     };
     let resets: Vec<String> = file.want.events.iter().map(of_event).collect();
     let breaks: Vec<f64> = file.run.breaks.iter().flat_map(|breaks| breaks.iter()).map(|t| **t).collect();
-    format!("{:?} {} {breaks:?} {resets:?}", pairs(&file.force), tables::fingerprint(tables))
+    let constraints: Vec<&str> =
+        file.system.constraints.iter().flat_map(|all| all.iter()).map(|c| c.as_str()).collect();
+    let constraints =
+        if constraints.is_empty() { String::new() } else { format!(" {constraints:?} {}", file.run.project) };
+    format!("{:?} {} {breaks:?} {resets:?}{constraints}", pairs(&file.force), tables::fingerprint(tables))
 }

@@ -12,6 +12,8 @@ Direction: TypeAlias = Literal["both", "rising", "falling"]
 Pieces: TypeAlias = Literal["linear", "held", "cubic"]
 # A function (t, q, v, z, **parameters), formulas by coordinate, or the formula for a single coordinate.
 Force: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float] | str
+# Equations, functions c(q, **parameters) that vanish, or a list of them.
+Constraints: TypeAlias = Expression | Sequence[Expression]
 Impact: TypeAlias = Literal["elastic"] | tuple[Literal["restitution", "conformal"], float]
 # A function (t, q, v, z, **parameters) -> (q, v) or (q, v, z), or formulas by variable.
 Reset: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float]
@@ -29,6 +31,7 @@ class System:
         forces: Sequence[tuple[str, str]] = ...,
         rayleigh: Sequence[str] = ...,
         breaks: Sequence[float] = ...,
+        constraints: Sequence[str] = ...,
         kind: tuple[bool, Sequence[str], str] | None = None,
     ) -> System: ...
     @property
@@ -59,6 +62,8 @@ class System:
     def rayleigh(self) -> list[str]: ...
     @property
     def breaks(self) -> list[float]: ...
+    @property
+    def constraints(self) -> list[str]: ...
     @property
     def losses(self) -> list[str]: ...
     def with_parameters(self, parameters: Mapping[str, float]) -> System: ...
@@ -447,6 +452,7 @@ def system(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    constraints: Constraints | None = None,
 ) -> System: ...
 def solve(
     L: Lagrangian | None = None,
@@ -475,6 +481,8 @@ def solve(
     breaks: Sequence[float] | None = None,
     momenta: Sequence[str] | str | None = None,
     action: str | None = None,
+    constraints: Constraints | None = None,
+    project: bool = False,
 ) -> Solution: ...
 def lattice(
     site: str,

@@ -1,4 +1,4 @@
-"""What a system has in addition to its Lagrangian: tables, forces, Rayleigh's function and times of jumps."""
+"""What a system has in addition to its Lagrangian: tables, forces, Rayleigh's function, times of jumps, constraints."""
 
 import functools
 import math
@@ -20,6 +20,7 @@ class Additions(NamedTuple):
     forces: tuple = ()  # (coordinate, formula)
     rayleigh: tuple = ()  # formulas
     breaks: tuple = ()  # times
+    constraints: tuple = ()  # formulas
 
     def plus(self, other):
         """Both; a table that is given twice is kept once."""
@@ -57,12 +58,13 @@ def table(t, y, pieces="linear"):
     return _core.Table(t, y, pieces)
 
 
-def additions_of(force, rayleigh, tables, breaks, names):
+def additions_of(force, rayleigh, tables, breaks, names, constraints=None):
     """The additions from the arguments of `system`, in the names of coordinates, velocities and parameters."""
     found = _checked_tables(tables)
     forces = tuple(_forces_of(force, names, found)) if force is not None else ()
     rayleighs = (text_of("rayleigh", rayleigh, names, found),) if rayleigh is not None else ()
-    return Additions(tuple(found.items()), forces, rayleighs, breaks_of(breaks))
+    all_constraints = tuple(_constraints_of(constraints, names, found)) if constraints is not None else ()
+    return Additions(tuple(found.items()), forces, rayleighs, breaks_of(breaks), all_constraints)
 
 
 def _checked_tables(tables):
@@ -96,6 +98,22 @@ def _forces_of(force, names, tables):
     raise ValueError(
         f"`force` is {force!r}; it must be a function (t, q, v, z), or give formulas by coordinate, as in "
         f'force={{{coordinates[0]!r}: "..."}}'
+    )
+
+
+def _constraints_of(constraints, names, tables):
+    """The formulas of constraints: of a text, of a function c(q, **parameters), or of a list of them."""
+    if isinstance(constraints, str):
+        return [constraints]
+    if callable(constraints) and not isinstance(constraints, _core.Table):
+        values = _trace.call_of_positions(constraints, names)
+        found = np.ravel(np.array(values, dtype=object))
+        return [_trace.value_text(value, constraints, names, tables) for value in found]
+    if isinstance(constraints, (list, tuple)):
+        return [text for constraint in constraints for text in _constraints_of(constraint, names, tables)]
+    raise ValueError(
+        f"`constraints` is {constraints!r}; it must be a formula such as \"x^2 + y^2 = 1\", a function c(q) that returns a "
+        "number or an array, or a list of them"
     )
 
 

@@ -203,11 +203,11 @@ class Solution:
         times = np.array(t, dtype=float, ndmin=1)
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
-        _, _, every, way, events, columns, conformal_factor, estimate, scales = self._request
+        _, _, every, way, events, columns, conformal_factor, estimate, scales, *more = self._request
         if way[3] is not None:
             # The number of steps was for another span.
             way = (None, way[1], self.plan.step, None)
-        request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales
+        request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales, *more
         return run(self.system, request, self._event_names, self._observed)
 
     def sensitivity(self, variables):

@@ -34,6 +34,8 @@ def solve(
     breaks=None,
     momenta=None,
     action=None,
+    constraints=None,
+    project=False,
 ):
     """The motion of a Lagrangian system: Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
 
@@ -86,8 +88,11 @@ def solve(
         Times of jumps within the span, in ascending order: steps end there. Those that the formulas show, as samples of
         tables and ``np.where(t < 3, ...)``, are known without it.
 
-    momenta, action
-        As in `system`.
+    momenta, action, constraints
+        As in `system`. ``observe={"tension": "lambda[0]"}`` records the multiplier of the first constraint, whose force is
+        the multiplier times its gradient.
+    project : bool
+        Whether a start that violates the constraints is moved to them; otherwise it is refused, with its distance.
 
     Returns
     -------
@@ -129,10 +134,12 @@ def request_of(
     H=None,
     momenta=None,
     action=None,
+    constraints=None,
+    project=False,
 ):
     """The system and the request for the arguments of `solve`, with the names of the events and of the columns."""
     given = (L if H is None else H, *functions_of(force, rayleigh))
-    more = force, rayleigh, tables, breaks
+    more = force, rayleigh, tables, breaks, constraints
     kind = H, momenta, action
     if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in (*more, *kind)):
         L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more, kind)
@@ -156,6 +163,7 @@ def request_of(
         conformal_factor,
         estimate,
         copied(scales),
+        project,
     )
     if parameters:
         check_parameters(L, parameters, given, [*texts_of_events(given_events), *columns])
@@ -175,7 +183,7 @@ def run(L, request, event_names, observed, halted=None):
     return sol
 
 
-def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4, kind=(None,) * 3):
+def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 5, kind=(None,) * 3):
     """The system of an argument, and the start, which the catalogue may provide."""
     if L is None and kind[0] is None:
         raise ValueError("give either `L` or `H`")
@@ -186,9 +194,9 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 4, k
     if q0 is None:
         raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1
-    force, rayleigh, tables, breaks = more
+    force, rayleigh, tables, breaks, *constraints = more
     H, momenta, action = kind
-    names = dict(H=H, momenta=momenta, action=action)
+    names = dict(H=H, momenta=momenta, action=action, constraints=constraints[0] if constraints else None)
     of = system(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks, **names)
     return of, q0, v0
 

@@ -27,6 +27,7 @@ def system(
     rayleigh=None,
     tables=None,
     breaks=None,
+    constraints=None,
 ):
     """The system of a Lagrangian, or of a contact Hamiltonian.
 
@@ -62,6 +63,11 @@ def system(
         their tables without this argument.
     breaks : list of float, optional
         Times at which steps end, in ascending order: those of jumps that the formulas do not show as such.
+    constraints : str, function, or a list of them, optional
+        Holonomic constraints: equations over the coordinates and parameters, ``"x^2 + y^2 = l^2"``, or functions
+        ``c(q)`` or ``c(q, l)`` that vanish, each of which returns a number or an array. The motion is that on the
+        surface where they hold. The names of Gauss methods then stand for contact Lobatto methods of the same order, and
+        those of splittings for RATTLE composed by their schemes. Up to 8 coordinates.
 
     Returns
     -------
@@ -81,13 +87,13 @@ def system(
     if isinstance(given, _core.System) and (H is not None or action is not None):
         raise ValueError("a System has its names already: give it as `L`, without `H` and `action`")
     kind = (H is not None, tuple(momenta or ()), "z" if action is None else action)
-    is_plain = force is None and rayleigh is None and not tables and breaks is None
+    is_plain = force is None and rayleigh is None and not tables and breaks is None and constraints is None
     if isinstance(L, _core.System):
         if is_plain:
             return L.with_parameters(parameters) if parameters else L
         text, coordinates, known = L.lagrangian, L.given_coordinates, L.parameters
         parameters = known | dict(parameters or {})
-        more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks))
+        more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks), tuple(L.constraints))
         kind = (L.kind[0], tuple(L.kind[1]), L.kind[2])
     else:
         found = {}
@@ -95,7 +101,7 @@ def system(
         more = Additions(tuple(found.items()))
     if not is_plain:
         of = names_in(coordinates, tuple(parameters or ()), kind)
-        more = more.plus(additions_of(force, rayleigh, tables, breaks, of))
+        more = more.plus(additions_of(force, rayleigh, tables, breaks, of, constraints))
     return _built(text, coordinates, parameters, more, kind)
 
 

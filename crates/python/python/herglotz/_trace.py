@@ -257,18 +257,28 @@ def call_traced(function, names):
     """The value of a function (t, q, v, z, **parameters) of symbols."""
     coordinates, _, parameters = names[:3]
     t, q, v, z, values = symbols(len(coordinates), len(parameters))
-    wanted = _parameters_of(function)
+    return function(t, _vector(q), _vector(v), z, **_given(function, parameters, values, 4))
+
+
+def call_of_positions(function, names):
+    """The value of a function (q, **parameters) of symbols."""
+    coordinates, _, parameters = names[:3]
+    _, q, _, _, values = symbols(len(coordinates), len(parameters))
+    return function(_vector(q), **_given(function, parameters, values, 1))
+
+
+def _given(function, parameters, values, first):
+    """The parameters that a function takes after its `first` arguments, with their symbols."""
+    wanted = _parameters_of(function, first)
     if wanted is None:
-        given = dict(zip(parameters, values))
-    else:
-        required, others = wanted
-        for name in required:
-            if name not in parameters:
-                raise ValueError(
-                    f"the parameter {name!r} of {name_of(function)} has no value: give parameters={{{name!r}: ...}}"
-                )
-        given = {name: value for name, value in zip(parameters, values) if name in required or name in others}
-    return function(t, _vector(q), _vector(v), z, **given)
+        return dict(zip(parameters, values))
+    required, others = wanted
+    for name in required:
+        if name not in parameters:
+            raise ValueError(
+                f"the parameter {name!r} of {name_of(function)} has no value: give parameters={{{name!r}: ...}}"
+            )
+    return {name: value for name, value in zip(parameters, values) if name in required or name in others}
 
 
 def texts_of(values, n, what, function, names, tables):
@@ -300,10 +310,10 @@ def name_of(function):
     return getattr(function, "__name__", "the function")
 
 
-def _parameters_of(function):
-    """The names of the parameters of a function after t, q, v and z: without a default, and with one."""
+def _parameters_of(function, first=4):
+    """The names of the parameters of a function after its first arguments: without a default, and with one."""
     code = getattr(function, "__code__", None)
-    if code is not None and code.co_argcount == 4 and not code.co_kwonlyargcount and not code.co_flags & 8:
+    if code is not None and code.co_argcount == first and not code.co_kwonlyargcount and not code.co_flags & 8:
         return (), ()
     try:
         found = list(inspect.signature(function).parameters.values())
@@ -311,7 +321,7 @@ def _parameters_of(function):
         return None
     if any(p.kind is p.VAR_KEYWORD for p in found):
         return None
-    found = [p for p in found[4:] if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    found = [p for p in found[first:] if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
     return [p.name for p in found if p.default is p.empty], [p.name for p in found if p.default is not p.empty]
 
 

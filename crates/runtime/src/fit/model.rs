@@ -58,6 +58,7 @@ pub(super) struct FitModel<'a> {
 
 impl<'a> FitModel<'a> {
     pub fn new(system: &'a System, request: &MotionFit, monitor: &'a mut dyn RunMonitor) -> Result<Self, RuntimeError> {
+        crate::kernel::refuse_constraints(system.formula(), "fits")?;
         let t0 = request.motion.start.t;
         let unknowns = request.unknowns.iter().map(|unknown| unknown_of(system, &unknown.name));
         let unknowns = unknowns.collect::<Result<Vec<_>, _>>()?;
@@ -406,7 +407,8 @@ fn quantity(system: &System, text: &str) -> Result<Quantity, RuntimeError> {
             return Err(RuntimeError::argument("quantity", why));
         }
         Column::Expression(expression) => Quantity::Expression(expression),
-        Column::Energy | Column::LogFactor => Quantity::Expression(Box::new(formula.expression("energy")?)),
+        // A system with constraints, the only one with multipliers, has been refused.
+        Column::Energy | Column::LogFactor | Column::Multiplier(_) => Quantity::Expression(Box::new(formula.expression("energy")?)),
     })
 }
 

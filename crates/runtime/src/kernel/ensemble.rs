@@ -150,10 +150,18 @@ impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
             }),
         };
         let refused = |cause| EnsembleError::Member { index: first, cause };
-        let many = match step_control {
-            StepControl::Accuracy { error, by: None } => many.accuracy(error),
-            StepControl::Accuracy { error, by: Some(by) } => many.by(L::by(by).map_err(refused)?).accuracy(error),
-            StepControl::Steps { by, steps } => many.by(L::by(by).map_err(refused)?).steps(steps),
+        let by = match step_control {
+            StepControl::Accuracy { by, .. } => by,
+            StepControl::Steps { by, .. } => Some(by),
+        };
+        let many = match (step_control, system.0.constrained(by).map_err(refused)?) {
+            (StepControl::Accuracy { error, .. }, Some(method)) => many.by(method).accuracy(error),
+            (StepControl::Steps { steps, .. }, Some(method)) => many.by(method).steps(steps),
+            (StepControl::Accuracy { error, by: None }, None) => many.accuracy(error),
+            (StepControl::Accuracy { error, by: Some(by) }, None) => {
+                many.by(L::by(by).map_err(refused)?).accuracy(error)
+            }
+            (StepControl::Steps { by, steps }, None) => many.by(L::by(by).map_err(refused)?).steps(steps),
         };
         let many = match ensemble.threads {
             Some(threads) => many.threads(threads),
@@ -187,11 +195,12 @@ impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
                     v: coordinates(&row.v.unwrap_or_else(|| SVector::repeat(f64::NAN)), n).to_vec(),
                     p: coordinates(&row.p, n).to_vec(),
                     z: ending.state.z,
-                    columns: own_columns(member.index).iter().map(|column| number(column, &row)).collect(),
+                    columns: own_columns(member.index).iter().map(|column| number(l, column, &row)).collect(),
                 }
             });
             let columns = own_columns(member.index);
-            let rows = rows.iter().map(|row| columns.iter().map(|column| number(column, row)).collect());
+            let l = lagrangian(member.index).unwrap_or(&system.0);
+            let rows = rows.iter().map(|row| columns.iter().map(|column| number(l, column, row)).collect());
             let member = MemberEnd { index: first + member.index, ending, rows: rows.collect(), crossings };
             *ended = monitor.member(member).is_break();
         };

@@ -1,7 +1,8 @@
 //! What the kernels use of a formula: a Lagrangian, or a contact Hamiltonian in its place.
 
+use super::constrained::{OfConstraints, multipliers, projected};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry};
+use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry, VelocityPoint};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
@@ -22,6 +23,10 @@ pub(super) trait Observed<const N: usize> {
     /// What expressions contain beside the position and the action: the velocity, found from a guess, or the momentum
     /// for a Hamiltonian. `None` where there is none.
     fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>>;
+    /// The multiplier of the constraint with this index; NaN where it is not determined.
+    fn multiplier(&self, _t: f64, _x: &VelocityPoint<N>, _index: usize) -> f64 {
+        f64::NAN
+    }
 }
 
 /// A formula that is run.
@@ -30,12 +35,28 @@ pub(super) trait FormulaSystem<const N: usize>:
 {
     /// The integrators for it, which are compiled.
     type By: for<'a> Integrator<'a, Self, N> + Copy + Sync;
+    /// The integrators for it where it has constraints.
+    type Constrained: for<'a> Integrator<'a, Self, N> + Copy + Sync + 'static;
 
     /// An integrator by its name.
     ///
     /// # Errors
     /// [`InputError::Hypothesis`] where there is none of this name for it.
     fn by(integrator: AnyIntegrator) -> Result<Self::By, InputError>;
+    /// The integrator for the constraints, by its name or chosen by the structure; `None` without constraints.
+    ///
+    /// # Errors
+    /// [`InputError::Hypothesis`] where none of this name takes constraints.
+    fn constrained(&self, _by: Option<AnyIntegrator>) -> Result<Option<Self::Constrained>, InputError> {
+        Ok(None)
+    }
+    /// The point of the constraints next to the start of a motion.
+    ///
+    /// # Errors
+    /// [`InputError::Constraint`] where it is not found.
+    fn projected(&self, _t: f64, at: VelocityPoint<N>) -> Result<VelocityPoint<N>, InputError> {
+        Ok(at)
+    }
     /// Sets the value of a parameter.
     fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError>;
     /// The recognised symmetries.
@@ -62,13 +83,26 @@ impl<const N: usize> Observed<N> for FormulaLagrangian<N> {
     fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>> {
         legendre_inverse(self, t, state, guess).ok().map(|x| x.v)
     }
+
+    fn multiplier(&self, t: f64, x: &VelocityPoint<N>, index: usize) -> f64 {
+        multipliers(self, t, x).and_then(|all| all.get(index).copied()).unwrap_or(f64::NAN)
+    }
 }
 
 impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
     type By = AnyIntegrator;
+    type Constrained = OfConstraints;
 
     fn by(integrator: AnyIntegrator) -> Result<AnyIntegrator, InputError> {
         Ok(integrator)
+    }
+
+    fn constrained(&self, by: Option<AnyIntegrator>) -> Result<Option<OfConstraints>, InputError> {
+        (self.formula().constraints() > 0).then(|| OfConstraints::named(self, by)).transpose()
+    }
+
+    fn projected(&self, t: f64, at: VelocityPoint<N>) -> Result<VelocityPoint<N>, InputError> {
+        projected(self, t, at)
     }
 
     fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
@@ -146,6 +180,7 @@ impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>
 
 impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {
     type By = OfHamiltonians;
+    type Constrained = OfHamiltonians;
 
     fn by(integrator: AnyIntegrator) -> Result<OfHamiltonians, InputError> {
         match integrator {

@@ -1,6 +1,7 @@
 //! One kernel for each dimension: all code that is compiled for a fixed number of coordinates is in this module.
 
 mod check;
+mod constrained;
 mod ensemble;
 mod formula_system;
 mod geometry;
@@ -19,10 +20,12 @@ use crate::{
     BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, HamiltonianGeometry, Interrupt, Loss,
     LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
+pub(crate) use constrained::refuse_constraints;
 use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
-use discrete_herglotz::{AnyIntegrator, InputError, ResumeState, ensemble::Tally, sensitivity::Variable};
+use discrete_herglotz::{AnyIntegrator, InputError, Integrator, ResumeState, ensemble::Tally, sensitivity::Variable};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
+use formula_system::FormulaSystem;
 use sized::Sized;
 use std::sync::Arc;
 use work_thread::on_large_stack;
@@ -107,7 +110,7 @@ pub(crate) trait Kernel: Send + Sync {
     }
 }
 
-/// What a Hamiltonian has no kernel for.
+/// What a Hamiltonian has no kernel for, nor a formula with constraints.
 const DERIVATIVES: &str = "derivatives of motions";
 
 /// The error of what is compiled for Lagrangians only.
@@ -120,10 +123,15 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
     if formula.is_hamiltonian() {
         return hamiltonian::kernel_of(formula);
     }
+    if formula.constraints() > 0 && formula.dimension() > constrained::MOST_CONSTRAINED {
+        let (found, most) = (formula.dimension(), constrained::MOST_CONSTRAINED);
+        return Err(RuntimeError::ConstrainedDimension { found, most });
+    }
+    let constrained = formula.constraints() > 0;
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
-                $(found if found <= $n => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
+                $(found if found <= $n && (!constrained || constrained::is_compiled($n)) => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
                 found => Err(FormulaError::Dimension { found }.into()),
             }
         };
@@ -172,7 +180,10 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     }
 
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
-        integrator.check(&self.0)
+        match self.0.constrained(Some(integrator))? {
+            Some(method) => method.check(&self.0),
+            None => integrator.check(&self.0),
+        }
     }
 
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
@@ -197,14 +208,17 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     }
 
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
+        refuse_constraints(self.formula(), "the geometry on TQ x R and the Herglotz field")?;
         geometry::at(self, at)
     }
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        refuse_constraints(self.formula(), "checks of steps and theorems")?;
         on_large_stack(|| check::check(self, motion, samples))
     }
 
     fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        refuse_constraints(self.formula(), "modified Hamiltonians")?;
         check::modified_defects(self, motion, most)
     }
 
@@ -215,6 +229,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         times: &[f64],
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
+        refuse_constraints(self.formula(), DERIVATIVES)?;
         sensitivity::tangent(self, motion, variables, times, monitor)
     }
 
@@ -225,6 +240,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
+        refuse_constraints(self.formula(), DERIVATIVES)?;
         sensitivity::gradient(self, motion, times, loss, monitor)
     }
 
@@ -233,6 +249,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
+        refuse_constraints(self.formula(), "Lyapunov exponents")?;
         sensitivity::lyapunov_exponents(self, motion, monitor)
     }
 
@@ -243,6 +260,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         loss: &BatchLoss<'_>,
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        refuse_constraints(self.formula(), DERIVATIVES)?;
         member_derivatives::gradients(self, ensemble, times, loss, interrupt)
     }
 
@@ -253,6 +271,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         times: &[f64],
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+        refuse_constraints(self.formula(), DERIVATIVES)?;
         member_derivatives::sensitivities(self, ensemble, variables, times, interrupt)
     }
 }

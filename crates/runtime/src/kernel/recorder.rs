@@ -5,8 +5,8 @@ use super::sized::coordinates;
 use crate::{
     AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };
-use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
+use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
 };
@@ -29,6 +29,7 @@ pub(super) struct Recorder<'r, const N: usize> {
     needs: OutputRequest,
     run_info: Option<RunInfo>,
     dimension: usize,
+    lagrangian: &'r dyn Observed<N>,
     monitor: &'r mut dyn RunMonitor,
 }
 
@@ -54,6 +55,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
             needs: of_rows.and(of_all),
             run_info: None,
             dimension: lagrangian.formula().dimension(),
+            lagrangian,
             monitor,
         })
     }
@@ -65,7 +67,8 @@ impl<'r, const N: usize> Recorder<'r, N> {
         let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
         for row in rows.rows.drain(..).filter(|row| !beyond(row.t)) {
             self.numbers.clear();
-            self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
+            let lagrangian = self.lagrangian;
+            self.numbers.extend(self.columns.iter().map(|column| number(lagrangian, column, &row)));
             if self.monitor.row(&self.numbers).is_break() {
                 return ControlFlow::Break(Stop::here("the monitor"));
             }
@@ -108,12 +111,12 @@ pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -
     };
     let any = |of: fn(&Column) -> bool| columns.iter().any(of);
     let velocity = any(|c| match c {
-        Column::Velocity(_) => true,
+        Column::Velocity(_) | Column::Multiplier(_) => true,
         Column::Expression(e) => e.has_velocity() && !e.is_of_hamiltonian(),
         _ => false,
     });
     let action = any(|c| match c {
-        Column::Action => true,
+        Column::Action | Column::Multiplier(_) => true,
         Column::Expression(e) => e.has_action(),
         _ => false,
     });
@@ -124,7 +127,7 @@ pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -
 }
 
 /// The value of a column in a row; NaN where the row does not have it.
-pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
+pub(super) fn number<const N: usize>(lagrangian: &dyn Observed<N>, column: &Column, row: &Row<N>) -> f64 {
     let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
     match column {
         Column::Time => row.t,
@@ -134,6 +137,10 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
         Column::Action => row.z.unwrap_or(f64::NAN),
         Column::Energy => row.energy.unwrap_or(f64::NAN),
         Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
+        Column::Multiplier(i) => match (row.v, row.z) {
+            (Some(v), Some(z)) => lagrangian.multiplier(row.t, &VelocityPoint { q: row.q, v, z }, *i),
+            _ => f64::NAN,
+        },
         Column::Expression(e) => {
             // An expression that does not contain v or z ignores the zeros here.
             let v = if e.is_of_hamiltonian() { row.p } else { row.v.unwrap_or_else(SVector::zeros) };

@@ -17,10 +17,16 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     problem: &'p Problem<'p, L, N>,
     motion: &Motion,
 ) -> Result<Run<'p, 'o, L, N>, RuntimeError> {
-    let run = match motion.step_control {
-        StepControl::Accuracy { error, by: None } => problem.accuracy(error),
-        StepControl::Accuracy { error, by: Some(by) } => problem.by(L::by(by)?).accuracy(error),
-        StepControl::Steps { by, steps } => problem.by(L::by(by)?).steps(steps),
+    let by = match motion.step_control {
+        StepControl::Accuracy { by, .. } => by,
+        StepControl::Steps { by, .. } => Some(by),
+    };
+    let run = match (motion.step_control, system.0.constrained(by)?) {
+        (StepControl::Accuracy { error, .. }, Some(method)) => problem.by(method).accuracy(error),
+        (StepControl::Steps { steps, .. }, Some(method)) => problem.by(method).steps(steps),
+        (StepControl::Accuracy { error, by: None }, None) => problem.accuracy(error),
+        (StepControl::Accuracy { error, by: Some(by) }, None) => problem.by(L::by(by)?).accuracy(error),
+        (StepControl::Steps { by, steps }, None) => problem.by(L::by(by)?).steps(steps),
     };
     let run = if motion.action { run } else { run.without_action() };
     let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };

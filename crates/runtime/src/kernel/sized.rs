@@ -1,5 +1,6 @@
 //! A system compiled for a number of coordinates.
 
+use super::constrained::check_projection;
 use super::formula_system::FormulaSystem;
 use crate::{InitialVelocity, Motion, RuntimeError, Start};
 use contact_geom::nalgebra::SVector;
@@ -60,7 +61,12 @@ impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
 
     /// The problem of a motion, with the interrupt of the motion for its trial runs.
     pub fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, L, N>, RuntimeError> {
+        check_projection(self.0.formula(), motion)?;
         let problem = self.problem(&motion.start)?;
+        let problem = match motion.project {
+            true => Problem::new(&self.0, motion.start.t, self.0.projected(motion.start.t, *problem.start())?)?,
+            false => problem,
+        };
         Ok(match &motion.interrupt {
             Some(interrupt) => problem.with_interrupt(interrupt.for_integrators()),
             None => problem,

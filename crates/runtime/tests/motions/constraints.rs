@@ -1,0 +1,201 @@
+//! Formulas with holonomic constraints: the integrators that their names stand for, rows, ensembles, refusals.
+
+use crate::members;
+use herglotz_runtime::{
+    BoundaryProblem, Column, Ensemble, Event, Formula, InputError, Motion, OutputTimes, RuntimeError, Start, Status,
+    StepControl, Steps, System, Varied,
+};
+
+/// The period of a pendulum of length 1 that starts at rest at the height of its pivot.
+const PERIOD: f64 = 2.367841947576237;
+
+const NEWTON: &str = "(x'^2 + y'^2)/2 - 9.81*y + gamma*z";
+
+fn pendulum(lagrangian: &str) -> System {
+    let formula = Formula::parse(lagrangian, &["x", "y"], &[("gamma", 0.0), ("l", 1.0)]).unwrap();
+    System::new(&formula.with_constraints(&["x^2 + y^2 = l^2"]).unwrap()).unwrap()
+}
+
+fn at_rest() -> Start {
+    Start::new(0.0, [1.0, 0.0], [0.0, 0.0], 0.0)
+}
+
+fn named(name: &str, steps: usize) -> StepControl {
+    StepControl::Steps { by: name.parse().unwrap(), steps: Steps::Count(steps) }
+}
+
+/// The pendulum returns after a period by each of the integrators, also by those that are chosen: RATTLE where L is
+/// separable, else a Lobatto method.
+#[test]
+fn a_pendulum_returns_after_its_period() {
+    let general = "(x'^2 + y'^2)/2 - 9.81*y + gamma*z + (x^2 + y^2 - 1)*x'^4";
+    for (lagrangian, step_control, method) in [
+        (NEWTON, named("kahan_li_8", 200), "rattle_kahan_li_8"),
+        (NEWTON, named("gauss_4", 100), "lobatto_5"),
+        (NEWTON, StepControl::Accuracy { error: 1e-10, by: None }, "rattle_kahan_li_8"),
+        (general, StepControl::Accuracy { error: 1e-10, by: None }, "lobatto_5"),
+    ] {
+        let system = pendulum(lagrangian);
+        let motion = Motion {
+            rows: Some(OutputTimes::Every(1)),
+            columns: vec![
+                Column::parse("x^2 + y^2 - 1", system.formula()).unwrap(),
+                Column::parse("2*x*x' + 2*y*y'", system.formula()).unwrap(),
+            ],
+            ..Motion::new(at_rest(), PERIOD, step_control)
+        };
+        let plan = system.plan(&motion).unwrap();
+        assert_eq!(plan.integrator.name, method);
+        assert_eq!(
+            plan.by(),
+            if method.starts_with("rattle") { "kahan_li_8".parse().ok() } else { "gauss_4".parse().ok() }
+        );
+        let (outcome, rows) = system.record(&motion).unwrap();
+        assert_eq!(outcome.status, Status::Completed);
+        // The velocity vanishes there: the error of the position is of the second order of that of the time.
+        assert!((outcome.q[0] - 1.0).abs() < 1e-9 && outcome.q[1].abs() < 1e-9, "{method}: {:?}", outcome.q);
+        let largest = |k: usize| rows.iter().map(|row| row[k].abs()).max_by(f64::total_cmp).unwrap();
+        // Of velocities up to 4.5, a few roundings.
+        assert!(largest(0) < 1e-14 && largest(1) < 1e-13, "{method}: {} {}", largest(0), largest(1));
+    }
+}
+
+/// The multiplier is that of the tension in closed form, `-T/2` with `T = v^2 - g y`, and a crossing is located where
+/// the pendulum is lowest, with the speed in closed form.
+#[test]
+fn multipliers_and_events() {
+    let system = pendulum(NEWTON);
+    let formula = system.formula();
+    let of = |text: &str| Column::parse(text, formula).unwrap();
+    let motion = Motion {
+        rows: Some(OutputTimes::At((0..=8).map(|k| f64::from(k) / 8.0).collect())),
+        columns: vec![of("lambda"), of("lambda[0]"), of("-(x'^2 + y'^2 - 9.81*y)/2"), of("energy")],
+        events: vec![Event::new(formula.expression("x").unwrap())],
+        ..Motion::new(at_rest(), 1.0, named("kahan_li_8", 100))
+    };
+    let (outcome, rows) = system.record(&motion).unwrap();
+    assert_eq!((outcome.status, rows.len()), (Status::Completed, 9));
+    for row in &rows {
+        assert!((row[0] - row[2]).abs() < 1e-12 && row[0] == row[1] && row[3].abs() < 1e-9, "{row:?}");
+    }
+    struct Speed(Vec<f64>);
+    impl herglotz_runtime::RunMonitor for Speed {
+        fn crossing(&mut self, crossing: &herglotz_runtime::Crossing) -> std::ops::ControlFlow<()> {
+            self.0.push(crossing.v[0]);
+            std::ops::ControlFlow::Continue(())
+        }
+    }
+    let mut speed = Speed(Vec::new());
+    system.run(&motion, &mut speed).unwrap();
+    assert!(speed.0.len() == 1 && (speed.0[0] + (2.0 * 9.81f64).sqrt()).abs() < 1e-9, "{:?}", speed.0);
+    // Without constraints there is no such column.
+    let free = Formula::parse(NEWTON, &["x", "y"], &[("gamma", 0.0)]).unwrap();
+    assert!(Column::parse("lambda", &free).is_err() && Column::parse("lambda[1]", formula).is_err());
+}
+
+/// Starts off the constraints are refused with their distance, and moved to them on request.
+#[test]
+fn starts_off_the_constraints() {
+    let system = pendulum(NEWTON);
+    let off = Start::new(0.0, [1.0, 0.1], [0.5, 1.0], 0.0);
+    let motion = Motion::new(off, 0.1, named("gauss_3", 10));
+    let error = system.run(&motion, &mut ()).unwrap_err();
+    assert!(matches!(error, RuntimeError::Input(InputError::Constraint(_))), "{error:?}");
+    assert!(error.to_string().contains("off the constraints by the distance 4.97"), "{error}");
+    let (outcome, rows) = system
+        .record(&Motion {
+            project: true,
+            rows: Some(OutputTimes::Every(1)),
+            columns: vec![Column::parse("x^2 + y^2", system.formula()).unwrap()],
+            ..motion.clone()
+        })
+        .unwrap();
+    assert_eq!(outcome.status, Status::Completed);
+    assert!(rows.iter().all(|row| (row[0] - 1.0).abs() < 1e-14), "{rows:?}");
+    let free = System::parse(NEWTON, &["x", "y"], &[("gamma", 0.0)]).unwrap();
+    let error = free.run(&Motion { project: true, ..motion }, &mut ()).unwrap_err();
+    assert!(error.to_string().contains("no constraints"), "{error}");
+}
+
+/// Members of an ensemble have the constraints of their own parameters; one that starts off them fails by itself.
+#[test]
+fn ensembles_under_constraints() {
+    let system = pendulum(NEWTON);
+    let lengths = [1.0, 2.0, 0.5];
+    let values = |i: usize| vec![lengths[i]];
+    let start = |i: usize| Start::new(0.0, [if i == 2 { 1.0 } else { lengths[i] }, 0.0], [0.0, 0.0], 0.0);
+    let step_control = named("kahan_li_8", 200);
+    let ensemble = Ensemble {
+        count: 3,
+        start: &start,
+        t0: 0.0,
+        varied: Some(Varied { names: &["l"], values: &values }),
+        end: 1.0,
+        step_control,
+        rows: None,
+        columns: &[],
+        events: &[],
+        threads: Some(1),
+    };
+    let ends = members(&system, &ensemble);
+    for (i, length) in lengths.iter().enumerate().take(2) {
+        let own = system.with_parameters(&[("l", *length)]).unwrap();
+        let alone = own.run(&Motion::new(start(i), 1.0, step_control), &mut ()).unwrap();
+        let end = ends[i].ending.as_ref().unwrap();
+        assert_eq!((&end.q, &end.p), (&alone.q, &alone.p));
+        assert!((end.q[0].hypot(end.q[1]) - length).abs() < 1e-14 * length, "{end:?}");
+    }
+    assert!(matches!(ends[2].ending, Err(InputError::Constraint(_))), "{:?}", ends[2].ending);
+}
+
+/// What is not computed with constraints is refused by one error, and integrators that take none by another.
+#[test]
+fn what_is_refused_with_constraints() {
+    let system = pendulum(NEWTON);
+    let motion = Motion::new(at_rest(), 1.0, named("gauss_2", 20));
+    let loss = &mut |_: &[_]| (0.0, Vec::new());
+    let by = "gauss_2".parse().unwrap();
+    for (what, error) in [
+        ("check", system.check(&motion, 3).err()),
+        ("geometry", system.geometry(&at_rest()).err()),
+        ("path", system.path(&BoundaryProblem::new([vec![1.0, 0.0], vec![0.0, -1.0]], (0.0, 1.0), by, 10)).err()),
+        ("sensitivity", system.sensitivity(&motion, &["gamma"], &[1.0], &mut ()).err()),
+        ("gradient", system.gradient(&motion, &[1.0], loss, &mut ()).err()),
+        ("exponents", system.lyapunov_exponents(&motion, &mut ()).err()),
+        ("comparison", system.compare(&motion, &[], &mut |_| true).err()),
+    ] {
+        assert!(matches!(error, Some(RuntimeError::WithConstraints { .. })), "{what}: {error:?}");
+    }
+    for name in ["midpoint", "gauss_8", "divided_gauss_4_1e-5", "transformed_gauss_4", "midpoint_by_yoshida_4"] {
+        let Ok(by) = name.parse() else { panic!("{name}") };
+        let error = system.check_integrator(by).unwrap_err();
+        assert!(matches!(error, InputError::Hypothesis { .. }), "{name}: {error}");
+        assert!(error.to_string().contains("RATTLE") && error.to_string().contains("Lobatto"), "{error}");
+        let run = Motion::new(at_rest(), 1.0, StepControl::Steps { by, steps: Steps::Count(20) });
+        assert!(system.run(&run, &mut ()).is_err(), "{name}");
+    }
+    system.check_integrator("gauss_7".parse().unwrap()).unwrap();
+    // RATTLE is for separable Lagrangians.
+    let general = pendulum("(1 + x^2)*(x'^2 + y'^2)/2 - 9.81*y");
+    assert!(matches!(general.check_integrator("strang".parse().unwrap()), Err(InputError::Unclaimed { .. })));
+    let nine = Formula::parse("sum(i, 0, n-1, v[i]^2)/2", &["q[9]"], &[]).unwrap();
+    let error = System::new(&nine.with_constraints(&["q[0] = 0"]).unwrap()).err().unwrap();
+    assert!(matches!(error, RuntimeError::ConstrainedDimension { found: 9, most: 8 }), "{error}");
+}
+
+/// A chain of five coordinates runs in eight, and three in four: the coordinates in addition do not move.
+#[test]
+fn constraints_in_other_dimensions() {
+    for n in [3usize, 5, 6] {
+        let lagrangian = "sum(i, 0, n-1, v[i]^2)/2 - sum(i, 0, n-1, i*q[i])";
+        let formula = Formula::parse(lagrangian, &[format!("q[{n}]").as_str()], &[]).unwrap();
+        let system = System::new(&formula.with_constraints(&["sum(i, 0, n-1, q[i]^2) = 1"]).unwrap()).unwrap();
+        let mut q = vec![0.0; n];
+        q[0] = 1.0;
+        let outcome =
+            system.run(&Motion::new(Start::new(0.0, q, vec![0.0; n], 0.0), 1.0, named("gauss_3", 20)), &mut ());
+        let outcome = outcome.unwrap();
+        assert_eq!((outcome.q.len(), outcome.status), (n, Status::Completed));
+        assert!((outcome.q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-14, "{:?}", outcome.q);
+    }
+}
