@@ -408,7 +408,9 @@ fn quantity(system: &System, text: &str) -> Result<Quantity, RuntimeError> {
         }
         Column::Expression(expression) => Quantity::Expression(expression),
         // A system with constraints, the only one with multipliers, has been refused.
-        Column::Energy | Column::LogFactor | Column::Multiplier(_) => Quantity::Expression(Box::new(formula.expression("energy")?)),
+        Column::Energy | Column::LogFactor | Column::Multiplier(_) => {
+            Quantity::Expression(Box::new(formula.expression("energy")?))
+        }
     })
 }
 
