@@ -206,7 +206,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
         let none = ([f64::NAN; 2], SVector::zeros());
         let ([value, rate], force) =
             at_state(*lagrangian, *t0, state, &start.v).map_or(none, |at| ([at.l, at.rate], at.force));
-        let of_constraints = self.integrator.constraint_force(lagrangian, *t0, start).unwrap_or_else(|_| none.1);
+        let of_constraints = self.integrator.constraint_force(lagrangian, *t0, start).unwrap_or(none.1);
         let force = force + of_constraints;
         let numbers = [*t0, self.t_end, self.h, start.z, value, rate];
         let vectors = [&start.q, &start.v, &state.p, &force];
