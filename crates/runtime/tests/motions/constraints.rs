@@ -1,6 +1,6 @@
 //! Formulas with holonomic constraints: the integrators that their names stand for, rows, ensembles, refusals.
 
-use crate::members;
+use super::members;
 use herglotz_runtime::{
     BoundaryProblem, Column, Ensemble, Event, Formula, InputError, Motion, OutputTimes, RuntimeError, Start, Status,
     StepControl, Steps, System, Varied,
