@@ -2,6 +2,7 @@
 
 use super::{GroupIntegrator, GroupMotion, GroupState};
 use contact_geom::groups::{GroupError, LieGroup};
+use contact_geom::numbers::max_or_nan;
 
 /// The steps that reach an accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +30,8 @@ pub fn group_distance<G: LieGroup<N>, const N: usize>(a: &GroupState<G, N>, b: &
 }
 
 /// The steps with which a motion over `span` reaches an accuracy at its end: their number is doubled from `steps` until
-/// two runs differ by at most `accuracy`. A step that fails is divided like one that is not accurate.
+/// two runs differ by at most `accuracy`, and by at most half as much as the two runs before: steps that are too long for
+/// the motion may agree by chance. A step that fails is divided like one that is not accurate.
 ///
 /// # Errors
 /// [`GroupError::Accuracy`] where it is below the round-off of the runs, or takes more than 2^24 steps; the last error
@@ -45,7 +47,8 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
         return Err(GroupError::Accuracy { requested: accuracy, reached: f64::NAN, steps: 0 });
     }
     let mut last: Result<GroupState<G, N>, GroupError> = Err(GroupError::Step { h: span });
-    let (mut smallest, mut stagnant, mut best) = (f64::INFINITY, 0, 0);
+    // The difference before is not a number for the first two runs, and after one that failed.
+    let (mut smallest, mut stagnant, mut best, mut before) = (f64::INFINITY, 0, 0, f64::NAN);
     let mut count = steps.max(1);
     while count <= MOST {
         let h = span / count as f64;
@@ -54,8 +57,11 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
         let end = motion.advance(&method, count).map(|()| motion.state());
         match (&last, &end) {
             (Ok(coarse), Ok(fine)) => {
-                let error = group_distance(coarse, fine);
-                if error <= accuracy {
+                // Two runs may agree in all digits, but their round-off is not 0.
+                let error = max_or_nan(group_distance(coarse, fine), f64::EPSILON);
+                let falls = error <= 0.5 * before || max_or_nan(error, before) <= 0.01 * accuracy;
+                before = error;
+                if error <= accuracy && falls {
                     return Ok(GroupSteps { steps: count, h, error });
                 }
                 stagnant = if error < 0.5 * smallest { 0 } else { stagnant + 1 };
@@ -68,7 +74,7 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
                 }
             }
             (_, Err(error)) if count > MOST / 2 => return Err(*error),
-            _ => {}
+            _ => before = f64::NAN,
         }
         last = end;
         count = count.saturating_mul(2);

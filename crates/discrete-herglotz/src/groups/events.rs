@@ -98,7 +98,8 @@ impl<I: GroupIntegrator<G, N>, G: LieGroup<N>, const N: usize> Taken<'_, I, G, N
         if part == 1.0 { self.to.0 } else { self.from.0 + part * self.h }
     }
 
-    /// The part of the step before a time; times that are those of an end up to round-off are that end.
+    /// The part of the step before a time, above 1 for a time after the step; times that are those of an end up to round-off
+    /// are that end.
     pub fn part(&self, t: f64) -> f64 {
         let rounding = 4.0 * f64::EPSILON * (t.abs() + self.h.abs());
         if (t - self.to.0).abs() <= rounding {
@@ -106,7 +107,7 @@ impl<I: GroupIntegrator<G, N>, G: LieGroup<N>, const N: usize> Taken<'_, I, G, N
         } else if (t - self.from.0).abs() <= rounding {
             0.0
         } else {
-            ((t - self.from.0) / self.h).clamp(0.0, 1.0)
+            (t - self.from.0) / self.h
         }
     }
 }

@@ -226,10 +226,8 @@ impl<G: LieGroup<N>, const N: usize> GroupRun<'_, G, N> {
             }
             *taken += 1;
             let is_last = *taken == self.steps;
-            while let Some(time) =
-                rows.next_if(|time| is_last || (time - step.to.0) * h <= 0.0 || step.part(*time) == 1.0)
-            {
-                observed(observer.row(time, &step.after(step.part(time))?))?;
+            while let Some(time) = rows.next_if(|time| is_last || step.part(*time) <= 1.0) {
+                observed(observer.row(time, &step.after(step.part(time).min(1.0))?))?;
             }
             if let GroupRows::Every(every) = self.rows
                 && (is_last || taken.is_multiple_of(every.max(1)))

@@ -54,7 +54,6 @@ fn rows_at_times_are_ends_of_runs() {
         let turn = Rotations::log(&Rotations::compose(&Rotations::inverse(&alone.state().g), &state.g));
         let momentum = (alone.state().momentum - state.momentum).max_abs_or_nan() / 70.0;
         let action = (alone.state().z / state.z - 1.0).abs();
-        println!("{t} {} {momentum:e} {action:e}", turn.max_abs_or_nan());
         assert!(turn.max_abs_or_nan() < 1e-11 && momentum < 1e-11 && action < 1e-12, "t = {t}: {turn:?}");
     }
 }
@@ -78,7 +77,6 @@ fn the_heavy_top_passes_a_height() {
     };
     let (found, again) = (crossings(120), crossings(160));
     let all: Vec<_> = found.iter().filter(|(event, ..)| *event == 0).collect();
-    println!("{:?}", all.iter().map(|(_, t, x)| (t, level(*t, x))).collect::<Vec<_>>());
     assert!(all.len() >= 2 && found.len() == again.len(), "{} {}", found.len(), again.len());
     // The first sign change is downward, since the centre starts at the height 0, and they alternate.
     assert_eq!(found.len() - all.len(), all.len().div_ceil(2));
@@ -124,7 +122,6 @@ fn steps_for_an_accuracy() {
     let mut end = motion.clone();
     end.advance(&method(found.h).unwrap(), found.steps).unwrap();
     let error = distance(&end.state(), &end_of(Top::Body(body), 8, 12));
-    println!("{found:?} {error:e}");
     assert!(error < found.error && found.error <= 1e-7 && found.error > 1e-9, "{found:?} {error:e}");
     let refused = group_steps(&motion, 1.5, 1e-19, 2, method);
     assert!(matches!(refused, Err(GroupError::Accuracy { reached, .. }) if reached < 1e-14), "{refused:?}");
