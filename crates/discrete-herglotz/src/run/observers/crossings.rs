@@ -20,8 +20,9 @@ const DEFAULT_COUNT: f64 = 64.0;
 
 /// The time scale of the round-off of times, in steps. It does not depend on the length of the run: of two consecutive
 /// runs with the same steps, both decide alike whether the point between them is on a surface, so that its crossing is
-/// counted in exactly one.
-const ROUND_OFF_IN_STEPS: f64 = 64.0;
+/// counted in exactly one. For steps of a thousandth of the time scale of the motion the round-off of positions still is
+/// that of times of half this scale.
+const ROUND_OFF_IN_STEPS: f64 = 512.0;
 
 /// The function of an event at the last point of evaluation.
 #[derive(Clone, Copy)]
