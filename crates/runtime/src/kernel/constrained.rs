@@ -7,7 +7,7 @@ use contact_geom::{Lagrangian, Scalar, VelocityPoint};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod, ConstrainedStart, OffConstraint};
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper, StepperOptions,
+    AnyIntegrator, InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions,
 };
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
@@ -100,6 +100,19 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
             self.with::<_, N>(problem.lagrangian()).stepper(problem, h, options)
         } else {
             not_compiled()
+        }
+    }
+
+    fn constraint_force(
+        &self,
+        lagrangian: &FormulaLagrangian<N>,
+        t: f64,
+        x: &VelocityPoint<N>,
+    ) -> Result<SVector<f64, N>, StepError> {
+        if const { is_compiled(N) } {
+            self.with::<_, N>(lagrangian).constraint_force(lagrangian, t, x)
+        } else {
+            Err(StepError::NonFinite)
         }
     }
 }
