@@ -7,7 +7,8 @@ use contact_geom::groups::{GroupError, Inertia, RigidBody, Rotation, Rotations, 
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
 use discrete_herglotz::groups::{
-    GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun, GroupState, RigidBodySplitting, group_steps,
+    GroupEnds, GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun, GroupState, RigidBodySplitting,
+    group_steps,
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -25,6 +26,7 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest {
         entries: &[
+            "GroupEnds::search",
             "GroupIntegrator::step_by",
             "GroupMotion::advance_by",
             "GroupMotion::restore",
@@ -131,6 +133,18 @@ fn runs(report: &mut Report) {
         report.entry_point(&value, steps.map(|steps| vec![steps.h, steps.error]));
         let steps = group_steps(&motion, 0.5, value, 2, method);
         report.entry_point(&value, steps.map(|steps| vec![steps.h, steps.error]));
+        for i in 0..8 {
+            let c: [f64; 8] = std::array::from_fn(|j| if i == j { value } else { GOOD[j] });
+            let GroupState { g: g1, momentum, z } = start(c);
+            let ends = GroupEnds::<Rotations, 3> { t0: 0.0, g0: start(GOOD).g, g1, z0: z, steps: 3 };
+            let found = ends.search(&gauss, &momentum);
+            report.entry_point(
+                &c.to_vec(),
+                found.map(|found| vec![found.residual, found.start.momentum.sum(), found.end.z]),
+            );
+        }
+        let ends = GroupEnds::<Rotations, 3> { t0: value, g0: start(GOOD).g, g1: start(GOOD).g, z0: 0.0, steps: 3 };
+        report.entry_point(&value, ends.search(&gauss, &start(GOOD).momentum).map(|found| vec![found.residual]));
         // The last three numbers are a velocity, which need not be known.
         for i in 0..23 {
             let mut saved = motion.save();
