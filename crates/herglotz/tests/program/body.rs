@@ -77,7 +77,7 @@ fn wrong_bodies_are_refused() {
             "line 13, column 8: `step` is refused: the step h = 0.05 turns the body by 7.5",
         ),
         ("step = 0.005", "", "line 10, column 1: the run has neither"),
-        ("\"Pi2\"", "\"Pi4\"", "line 15, column 41: unknown column `Pi4`"),
+        ("\"Pi2\"", "\"Pi4\"", "line 15, column 40: unknown column `Pi4`"),
         ("tip_z + 0.3", "tip_w + 0.3", "line 16, column 21: unknown name `tip_w`"),
         ("tip_z + 0.3", "energy", "line 16, column 20: `when` contains `energy`"),
     ];

@@ -257,6 +257,8 @@ impl<'a> SparseRattle<'a> {
     pub fn multipliers(&mut self) -> Result<&[f64], StepError> {
         let rate = self.system.rate(self.time());
         let ConstraintSolver { change, inverse_masses, .. } = &mut self.solver;
+        // The fixed components at both ends are at rest.
+        change.fill(0.0);
         for (i, force) in self.force.iter().enumerate() {
             change[i + 1] = inverse_masses[i + 1] * force + rate * self.v[i + 1];
         }
