@@ -17,7 +17,7 @@ pub struct GroupSteps {
 }
 
 /// The largest number of steps of a trial run.
-const MOST: usize = 1 << 24;
+const MAX_STEPS: usize = 1 << 24;
 
 /// The distance of two states: the larger of the chart vector `log(g_a^-1 g_b)`, by its norm, and the difference of the
 /// spatial momenta relative to their size. NaN if a state is not finite.
@@ -50,7 +50,7 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
     // The difference before is not a number for the first two runs, and after one that failed.
     let (mut smallest, mut stagnant, mut best, mut before) = (f64::INFINITY, 0, 0, f64::NAN);
     let mut count = steps.max(1);
-    while count <= MOST {
+    while count <= MAX_STEPS {
         let h = span / count as f64;
         let method = integrator(h)?;
         let mut motion = start.clone();
@@ -73,7 +73,7 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
                     return Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best });
                 }
             }
-            (_, Err(error)) if count > MOST / 2 => return Err(*error),
+            (_, Err(error)) if count > MAX_STEPS / 2 => return Err(*error),
             _ => before = f64::NAN,
         }
         last = end;

@@ -115,7 +115,7 @@ impl From<GroupError> for Ended {
     }
 }
 
-/// The end of a run that its observer wants.
+/// The end of a run that its observer requests.
 fn observed(flow: ControlFlow<()>) -> Result<(), Ended> {
     if flow.is_break() { Err(Ended::Stopped) } else { Ok(()) }
 }

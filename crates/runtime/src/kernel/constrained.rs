@@ -12,12 +12,12 @@ use discrete_herglotz::{
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
 /// The largest number of coordinates with constraints.
-pub(super) const MOST_CONSTRAINED: usize = 8;
+pub(super) const MAX_CONSTRAINED_COORDINATES: usize = 8;
 
 /// Whether motions under constraints are compiled for this number of coordinates. A formula with constraints has a
 /// kernel of the next of these sizes.
 pub(super) const fn is_compiled(coordinates: usize) -> bool {
-    matches!(coordinates, 2 | 4 | MOST_CONSTRAINED)
+    matches!(coordinates, 2 | 4 | MAX_CONSTRAINED_COORDINATES)
 }
 
 /// The number of stages of contact Lobatto methods where none is named: order 8.

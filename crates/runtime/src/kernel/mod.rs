@@ -123,8 +123,8 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
     if formula.is_hamiltonian() {
         return hamiltonian::kernel_of(formula);
     }
-    if formula.constraints() > 0 && formula.dimension() > constrained::MOST_CONSTRAINED {
-        let (found, most) = (formula.dimension(), constrained::MOST_CONSTRAINED);
+    if formula.constraints() > 0 && formula.dimension() > constrained::MAX_CONSTRAINED_COORDINATES {
+        let (found, most) = (formula.dimension(), constrained::MAX_CONSTRAINED_COORDINATES);
         return Err(RuntimeError::ConstrainedDimension { found, most });
     }
     let constrained = formula.constraints() > 0;
