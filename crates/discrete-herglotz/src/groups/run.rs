@@ -89,7 +89,7 @@ impl Display for GroupStatus {
 /// let mut motion = GroupMotion::<Rotations, 3>::new(0.0, start)?;
 /// let turned = GroupEvent::new(|_, x: &GroupState<Rotations, 3>| x.momentum[1]).terminal();
 /// let run = GroupRun { events: vec![turned], ..GroupRun::new(100) };
-/// let status = run.run(&mut motion, &GroupGauss::new(&body, 3, 0.1)?, &mut ())?;
+/// let status = run.run(&mut motion, &GroupGauss::new::<Rotations, 3>(&body, 3, 0.1)?, &mut ())?;
 /// assert!(matches!(status, GroupStatus::Event { .. }) && motion.state().momentum[1].abs() < 1e-14);
 /// # Ok::<(), contact_geom::groups::GroupError>(())
 /// ```

@@ -38,7 +38,8 @@ use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, Unr
 /// let start = State { t: 0.0, q: &q, v: &vec![0.0; 200], z: Some(0.0) };
 /// let mut motion = SparseRattle::new(&chain, &SplittingScheme::STRANG, 1e-3, start, OffConstraint::Refuse)?;
 /// assert!(motion.advance(10).is_ok());
-/// println!("{:?}, multiplier at the top {:?}", motion.state().q, motion.multipliers().map(|m| m[0]));
+/// println!("{:?}", motion.state().q);
+/// println!("multiplier at the top {:?}", motion.multipliers().map(|m| m[0]));
 /// # Ok::<(), sparse_herglotz::SparseError>(())
 /// ```
 pub struct SparseRattle<'a> {
