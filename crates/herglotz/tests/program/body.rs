@@ -46,9 +46,9 @@ fn a_rigid_body_runs() {
         assert!(at.read(&format!("out/{figure}")).contains("<svg"), "{figure}");
     }
     let accurate = at.write("accurate.toml", &TOP.replace("step = 0.005", "accuracy = 1e-8"));
-    let told = succeed(&["run", &accurate, "--out", &out, "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    assert!(told["estimated_error"].as_f64().unwrap() <= 1e-8 && told["events"] == 1, "{told}");
+    let printed = succeed(&["run", &accurate, "--out", &out, "--json"]);
+    let outcome: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    assert!(outcome["estimated_error"].as_f64().unwrap() <= 1e-8 && outcome["events"] == 1, "{outcome}");
     for command in ["plan", "check", "compare"] {
         let (code, said) = fail(&[command, &file]);
         assert!(code == Some(2) && said.contains("a rigid body works only with `herglotz run`"), "{command}: {said}");

@@ -42,7 +42,8 @@ pub(crate) fn by_doubled_steps<'p, L: Lagrangian<N>, const N: usize>(
         }
         match trials.with_integrator(integrator, count, &grid)? {
             TrialEnd::Completed(track) => {
-                let apart = known.replace(track.clone()).map_or(f64::INFINITY, |coarser| coarser.distance(&track));
+                let apart = known.as_ref().map_or(f64::INFINITY, |coarser| coarser.distance(&track));
+                known = Some(track);
                 let agree = before.is_finite() && before >= decrease * apart;
                 // Runs that differ by round-off alone do not agree better and better.
                 if agree || before.max(apart) <= NEGLIGIBLE_DEFECT * wanted {
