@@ -9,6 +9,9 @@
 #[path = "groups/boundary.rs"]
 mod boundary;
 
+#[path = "groups/derivatives.rs"]
+mod derivatives;
+
 use contact_geom::groups::{
     GroupError, GroupLagrangian, Inertia, LieGroup, Pair, PlaneRotation, PlaneRotations, Product, RigidBody,
     RigidMotion, RigidMotions, Rotation, Rotations, Translations, UniformGravity,

@@ -17,7 +17,7 @@ mod lagrangian;
 mod lagrangian_enum;
 mod law_derivatives;
 pub(crate) mod nearest_name;
-mod parameters;
+pub(crate) mod parameters;
 pub(crate) mod probe;
 mod rounding;
 mod structure;

@@ -125,6 +125,16 @@ pub enum GroupError {
         /// The final time.
         to: f64,
     },
+    /// A time at which a state is requested is outside of the motion.
+    #[error("t = {t} is outside of the motion, which is from {from} to {to}; take more steps, or a time within")]
+    OutsideSpan {
+        /// The time.
+        t: f64,
+        /// The initial time.
+        from: f64,
+        /// The final time.
+        to: f64,
+    },
     /// An accuracy is not positive, or is not reached.
     #[error(
         "the accuracy {requested:e} is not reached{}; it must be a positive number above round-off", if *steps > 0 {

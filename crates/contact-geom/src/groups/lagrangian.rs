@@ -13,7 +13,8 @@ use nalgebra::{SMatrix, SVector};
 ///
 /// `gdot = g xi`, `Pidot = ad_xi^T Pi + l_g + l_z Pi`, `zdot = l`
 ///
-/// (arXiv 2512.17424). Only [`value`](Self::value) is needed; closed derivatives make steps faster.
+/// (arXiv 2512.17424). A force that has no potential, such as a thrust, is added to `l_g`:
+/// [`applied_force`](Self::applied_force). Only [`value`](Self::value) is needed; closed derivatives make steps faster.
 pub trait GroupLagrangian<G: LieGroup<N>, const N: usize> {
     /// The value `l(t, g, xi, z)`.
     fn value<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> T;
@@ -23,20 +24,21 @@ pub trait GroupLagrangian<G: LieGroup<N>, const N: usize> {
         None
     }
 
+    /// The force in the body that has no potential, by the principle of Lagrange, d'Alembert and Herglotz: its virtual
+    /// work is `force . (g^-1 delta g)`, a torque on SO(3). By default it is 0.
+    #[inline]
+    fn applied_force<T: Scalar>(&self, _t: T, _g: &G::Element<T>, _xi: &SVector<T, N>, _z: T) -> SVector<T, N> {
+        SVector::zeros()
+    }
+
+    /// Whether there is an [applied force](Self::applied_force), with which the flow is not contact.
+    fn is_forced(&self) -> bool {
+        false
+    }
+
     /// The value with its first derivatives, by default by dual numbers.
     fn partials<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T> {
-        type Seed<T, const N: usize> = Dual<T, ChartVector<N, T>>;
-        let mut eta = SVector::<Seed<T, N>, N>::zeros();
-        let mut velocity = xi.map(Seed::<T, N>::constant);
-        for i in 0..N {
-            eta[i].d.x[i] = T::one();
-            velocity[i].d.y[i] = T::one();
-        }
-        let mut action = Seed::<T, N>::constant(z);
-        action.d.z = T::one();
-        let moved = G::compose(&G::lift(g, Seed::<T, N>::constant), &G::exp(&eta));
-        let value = self.value(Dual::constant(t), &moved, &velocity, action);
-        GroupPartials { value: value.re, force: value.d.x, momentum: value.d.y, rate: value.d.z }
+        partials_of::<G, T, N>(t, g, xi, z, |t, g, xi, z| self.value(t, g, xi, z))
     }
 
     /// Solves `l_xixi x = b` for the mass matrix `l_xixi`, by default with second derivatives by dual numbers.
@@ -67,12 +69,43 @@ pub trait GroupLagrangian<G: LieGroup<N>, const N: usize> {
     }
 }
 
+/// A number with its derivatives along body coordinates `(eta, xi, z)` at `g exp(eta)`.
+pub(super) type Seed<T, const N: usize> = Dual<T, ChartVector<N, T>>;
+
+/// The value with its first derivatives, from a function on dual numbers.
+#[inline]
+pub(super) fn partials_of<G: LieGroup<N>, T: Scalar, const N: usize>(
+    t: T,
+    g: &G::Element<T>,
+    xi: &SVector<T, N>,
+    z: T,
+    value: impl FnOnce(Seed<T, N>, &G::Element<Seed<T, N>>, &SVector<Seed<T, N>, N>, Seed<T, N>) -> Seed<T, N>,
+) -> GroupPartials<N, T> {
+    let mut eta = SVector::<Seed<T, N>, N>::zeros();
+    let mut velocity = xi.map(Seed::<T, N>::constant);
+    for i in 0..N {
+        eta[i].d.x[i] = T::one();
+        velocity[i].d.y[i] = T::one();
+    }
+    let mut action = Seed::<T, N>::constant(z);
+    action.d.z = T::one();
+    let moved = G::compose(&G::lift(g, Seed::<T, N>::constant), &G::exp(&eta));
+    let value = value(Dual::constant(t), &moved, &velocity, action);
+    GroupPartials { value: value.re, force: value.d.x, momentum: value.d.y, rate: value.d.z }
+}
+
 impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupLagrangian<G, N> for &L {
     fn value<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> T {
         (**self).value(t, g, xi, z)
     }
     fn constant_rate(&self) -> Option<f64> {
         (**self).constant_rate()
+    }
+    fn applied_force<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N> {
+        (**self).applied_force(t, g, xi, z)
+    }
+    fn is_forced(&self) -> bool {
+        (**self).is_forced()
     }
     fn partials<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T> {
         (**self).partials(t, g, xi, z)

@@ -16,9 +16,11 @@
 //! Formulas branch on the value of a number, so groups are evaluated for one state at a time, not in SIMD lanes.
 
 mod error;
+mod forced;
 mod inertia;
 mod lagrangian;
 mod lie_group;
+mod parametric;
 mod plane_rotation;
 mod potentials;
 mod product;
@@ -31,9 +33,11 @@ mod tests;
 mod translations;
 
 pub use error::GroupError;
+pub use forced::{GroupForce, GroupForced};
 pub use inertia::Inertia;
 pub use lagrangian::{GroupLagrangian, GroupPartials};
 pub use lie_group::LieGroup;
+pub use parametric::ParametricGroupLagrangian;
 pub use plane_rotation::{PlaneRotation, PlaneRotations};
 pub use potentials::{GroupPotential, NoPotential, UniformGravity};
 pub use product::{Pair, Product};

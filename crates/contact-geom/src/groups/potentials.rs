@@ -2,6 +2,7 @@
 
 use super::rotation::cross;
 use super::{LieGroup, Rotation, Rotations};
+use crate::dynamics::parameters::indexed_names;
 use crate::{Dual, Scalar};
 use nalgebra::SVector;
 
@@ -20,6 +21,22 @@ pub trait GroupPotential<G: LieGroup<N>, const N: usize> {
         }
         let value = self.value(&G::compose(&G::lift(g, Seed::<T, N>::constant), &G::exp(&eta)));
         (value.re, value.d)
+    }
+
+    /// The names of the parameters of the potential, with respect to which motions can be differentiated; by default
+    /// there are none.
+    fn parameter_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Their values, in the order of the names.
+    fn parameters(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The value for any values of the parameters, as many as there are names.
+    fn value_at<T: Scalar>(&self, _theta: &[T], g: &G::Element<T>) -> T {
+        self.value(g)
     }
 }
 
@@ -49,12 +66,12 @@ pub struct UniformGravity {
     pub centre: [f64; 3],
 }
 
+/// `weight[0..3]` and `centre[0..3]`.
 impl GroupPotential<Rotations, 3> for UniformGravity {
     #[inline]
     fn value<T: Scalar>(&self, g: &Rotation<T>) -> T {
-        let [x, y, z] = self.weight.map(T::from);
-        let [a, b, c] = self.centre.map(T::from);
-        -g.apply(&SVector::from([a, b, c])).dot(&SVector::from([x, y, z]))
+        let [weight, centre] = [self.weight, self.centre].map(|x| SVector::from(x.map(T::from)));
+        -g.apply(&centre).dot(&weight)
     }
 
     /// `V = -X . Gamma` with the weight in the body `Gamma = R^T weight`; the gradient is `Gamma x X`.
@@ -63,5 +80,18 @@ impl GroupPotential<Rotations, 3> for UniformGravity {
         let weight = g.apply_inverse(&SVector::from(self.weight.map(T::from)));
         let centre = SVector::from(self.centre.map(T::from));
         (-centre.dot(&weight), cross(&weight, &centre))
+    }
+
+    fn parameter_names(&self) -> Vec<String> {
+        indexed_names("weight", 3).chain(indexed_names("centre", 3)).collect()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        self.weight.into_iter().chain(self.centre).collect()
+    }
+
+    fn value_at<T: Scalar>(&self, theta: &[T], g: &Rotation<T>) -> T {
+        let [a, b, c, x, y, z] = *theta else { return T::from(f64::NAN) };
+        -g.apply(&SVector::from([x, y, z])).dot(&SVector::from([a, b, c]))
     }
 }

@@ -1,11 +1,12 @@
 //! Motions between two configurations of a group, by shooting.
 
+use super::derivatives::{after_steps, check, lifted};
 use super::{GroupIntegrator, GroupState};
+use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, LieGroup};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::support::linear::solve;
-use contact_geom::{Dual, Scalar};
 
 /// The bound on the iterations: Newton's method needs less than ten near a solution.
 const MAX_ITERATIONS: u32 = 50;
@@ -58,9 +59,6 @@ pub struct MotionBetween<G: LieGroup<N>, const N: usize> {
     pub iterations: u32,
 }
 
-/// A number with its derivatives in the momentum.
-type Differential<const N: usize> = Dual<f64, SVector<f64, N>>;
-
 impl<G: LieGroup<N>, const N: usize> GroupEnds<G, N> {
     /// The body momentum at the start of a motion that ends at `g1`, near a guess: Newton's method for
     /// `log(g1^-1 g(Pi)) = 0`, with the derivatives of the discrete motion. Corrections that do not decrease the residual
@@ -76,11 +74,8 @@ impl<G: LieGroup<N>, const N: usize> GroupEnds<G, N> {
         guess: &SVector<f64, N>,
     ) -> Result<MotionBetween<G, N>, GroupError> {
         let state = |momentum: SVector<f64, N>| GroupState { g: self.g0, momentum, z: self.z0 };
-        state(*guess).check()?;
+        check(self.t0, &state(*guess))?;
         G::check(&self.g1)?;
-        if !self.t0.is_finite() {
-            return Err(GroupError::NonFinite { what: "the initial time", value: self.t0 });
-        }
         let mut momentum = *guess;
         let mut motion = self.end_of(integrator, &state(momentum))?;
         for iterations in 0..MAX_ITERATIONS {
@@ -88,17 +83,8 @@ impl<G: LieGroup<N>, const N: usize> GroupEnds<G, N> {
             if residual.max_abs_or_nan() <= ROUND_OFF {
                 return Ok(self.found(state(momentum), motion, iterations));
             }
-            let start = GroupState::<G, N, Differential<N>> {
-                g: G::lift(&self.g0, Dual::constant),
-                momentum: SVector::from_fn(|i, _| {
-                    let mut x = Dual::<_, SVector<f64, N>>::constant(momentum[i]);
-                    x.d[i] = 1.0;
-                    x
-                }),
-                z: Dual::constant(self.z0),
-            };
-            let slopes = self.end_of(integrator, &start)?.1;
-            let mut matrix = SMatrix::<f64, N, N>::from_fn(|i, j| slopes[i].d[j]);
+            let slopes = self.end_of(integrator, &lifted(&state(momentum), true))?.1;
+            let mut matrix = SMatrix::<f64, N, N>::from_fn(|i, j| slopes[i].d.y[j]);
             let mut correction = residual;
             solve(&mut matrix, &mut correction).map_err(|e| GroupError::Singular { pivot: e.pivot })?;
             let mut scale = 1.0;
@@ -138,12 +124,10 @@ impl<G: LieGroup<N>, const N: usize> GroupEnds<G, N> {
     ) -> Result<(GroupState<G, N, T>, SVector<T, N>), GroupError> {
         let h = integrator.step_size();
         let real = GroupState { g: self.g0, momentum: start.momentum.map(|p| p.re()), z: self.z0 };
-        let mut velocity = integrator.velocity(self.t0, &real)?.map(T::from);
-        let mut state = *start;
-        for k in 0..self.steps {
-            let step = integrator.step(self.t0 + k as f64 * h, &state, &velocity)?;
-            (state, velocity) = (state.after(&step), step.velocity);
-        }
+        let velocity = integrator.velocity(self.t0, &real)?;
+        let (state, _) = after_steps(*start, velocity, self.steps, |k, state, velocity| {
+            integrator.step(self.t0 + k as f64 * h, state, velocity)
+        })?;
         let apart = G::log(&G::compose(&G::inverse(&G::lift(&self.g1, T::from)), &state.g));
         if !apart.iter().all(|x| x.re().is_finite()) {
             let what = "the distance from the final configuration";

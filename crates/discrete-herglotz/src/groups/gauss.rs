@@ -1,12 +1,12 @@
 //! Contact Gauss collocation on Lie groups.
 
-use super::stages::{Given, Stages, Table};
+use super::stages::{AtParameters, AtStages, Factors, Given, Own, Stages, Table};
 use super::{GroupIntegrator, GroupState, GroupStep};
 use crate::gauss::MAX_STAGES;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::extent::extent;
 use contact_geom::Scalar;
-use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup};
+use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup, ParametricGroupLagrangian};
 use contact_geom::nalgebra::SVector;
 use std::f64::consts::PI;
 
@@ -26,12 +26,12 @@ pub struct GroupGauss<L> {
     lagrangian: L,
     table: Table,
     h: f64,
-    /// The factors `rho_k/rho_1` at the nodes and `sigma_d - 1`, for a constant rate.
-    constant: Option<([f64; MAX_STAGES], f64)>,
+    /// For a constant rate.
+    constant: Option<Factors>,
 }
 
-/// The factors `rho_k/rho_1` at the nodes of a step and `sigma_d - 1`, for a constant rate.
-fn constant_factors(gamma: f64, h: f64, table: &Table) -> ([f64; MAX_STAGES], f64) {
+/// The factors for a constant rate.
+fn constant_factors<T: Scalar>(gamma: T, h: f64, table: &Table) -> Factors<T> {
     (table.c.map(|c| (gamma * h * (1.0 - c)).exp()), (gamma * h).exp_m1())
 }
 
@@ -87,27 +87,69 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
         from: &GroupState<G, N, T>,
         velocity: &SVector<T, N>,
     ) -> Result<GroupStep<N, T>, GroupError> {
-        let angle = G::angle(&velocity.map(|x| x.re() * h));
-        if angle >= PI {
-            return Err(GroupError::BeyondChart { h, angle, largest: PI * h.abs() / angle });
-        }
         let constant = match self.lagrangian.constant_rate() {
             Some(gamma) if h != self.h => Some(constant_factors(gamma, h, &self.table)),
             _ => self.constant,
         };
-        let given = Given {
-            lagrangian: &self.lagrangian,
-            table: &self.table,
-            constant,
-            t,
-            h,
-            g0: from.g,
-            momentum: from.momentum,
-            z0: from.z,
-        };
+        let constant = constant.map(|(rho, sigma_minus_one)| (rho.map(T::from), T::from(sigma_minus_one)));
+        self.solve(&Own(&self.lagrangian), constant, (h, t), from, velocity)
+    }
+
+    fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError> {
+        let mut xi = SVector::<f64, N>::zeros();
+        let mut change = f64::INFINITY;
+        for _ in 0..50 {
+            let residual = from.momentum - self.lagrangian.partials(t, &from.g, &xi, from.z).momentum;
+            let step = self
+                .lagrangian
+                .solve_mass(t, &from.g, &xi, from.z, &residual)
+                .map_err(|singular| GroupError::Singular { pivot: singular.pivot })?;
+            xi += step;
+            change = extent(&step);
+            // The velocity is a guess; Newton's method is quadratic.
+            if change <= 1e-8 * extent(&xi) {
+                return Ok(xi);
+            }
+        }
+        Err(GroupError::NotConverged { iterations: 50, change })
+    }
+}
+
+impl<L> GroupGauss<L> {
+    /// The step from a state, for values of the parameters of the Lagrangian.
+    pub(super) fn step_at<G: LieGroup<N>, const N: usize, T: Scalar>(
+        &self,
+        theta: &[T],
+        t: f64,
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError>
+    where
+        L: ParametricGroupLagrangian<G, N>,
+    {
+        let rate = self.lagrangian.constant_rate_at(theta);
+        let constant = rate.map(|gamma| constant_factors(gamma, self.h, &self.table));
+        self.solve(&AtParameters { lagrangian: &self.lagrangian, theta }, constant, (self.h, t), from, velocity)
+    }
+
+    /// Solves the stage equations by fixed-point iteration to round-off, from a constant body velocity.
+    fn solve<G: LieGroup<N>, V: AtStages<G, N, T>, const N: usize, T: Scalar>(
+        &self,
+        lagrangian: &V,
+        constant: Option<Factors<T>>,
+        (h, t): (f64, f64),
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError> {
+        let angle = G::angle(&velocity.map(|x| x.re() * h));
+        if angle >= PI {
+            return Err(GroupError::BeyondChart { h, angle, largest: PI * h.abs() / angle });
+        }
+        let (table, momentum) = (&self.table, from.momentum);
+        let given = Given { lagrangian, table, constant, t, h, g0: from.g, momentum, z0: from.z };
         let mut stages = Stages::<G, N, T>::guess(velocity);
         if let Some((rho, sigma_minus_one)) = constant {
-            (stages.rho, stages.sigma_minus_one) = (rho.map(T::from), T::from(sigma_minus_one));
+            (stages.rho, stages.sigma_minus_one) = (rho, sigma_minus_one);
         }
         let (mut smallest, mut stagnant) = (f64::INFINITY, 0);
         for iterations in 1..=SWEEPS {
@@ -132,31 +174,10 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
         Err(GroupError::NotConverged { iterations: SWEEPS, change: smallest })
     }
 
-    fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError> {
-        let mut xi = SVector::<f64, N>::zeros();
-        let mut change = f64::INFINITY;
-        for _ in 0..50 {
-            let residual = from.momentum - self.lagrangian.partials(t, &from.g, &xi, from.z).momentum;
-            let step = self
-                .lagrangian
-                .solve_mass(t, &from.g, &xi, from.z, &residual)
-                .map_err(|singular| GroupError::Singular { pivot: singular.pivot })?;
-            xi += step;
-            change = extent(&step);
-            // The velocity is a guess; Newton's method is quadratic.
-            if change <= 1e-8 * extent(&xi) {
-                return Ok(xi);
-            }
-        }
-        Err(GroupError::NotConverged { iterations: 50, change })
-    }
-}
-
-impl<L> GroupGauss<L> {
     /// The step from the solved stages.
-    fn end<G: LieGroup<N>, const N: usize, T: Scalar>(
+    fn end<G: LieGroup<N>, V, const N: usize, T: Scalar>(
         &self,
-        given: &Given<'_, L, G::Element<T>, N, T>,
+        given: &Given<'_, V, G::Element<T>, N, T>,
         stages: Stages<G, N, T>,
     ) -> Result<GroupStep<N, T>, GroupError> {
         let sigma = stages.sigma_minus_one.re() + 1.0;

@@ -22,6 +22,8 @@
 
 mod accuracy;
 mod boundary;
+mod dense;
+mod derivatives;
 mod events;
 mod gauss;
 mod motion;
@@ -32,6 +34,8 @@ mod state;
 
 pub use accuracy::{GroupSteps, group_distance, group_steps};
 pub use boundary::{GroupEnds, MotionBetween};
+pub use dense::DenseGroupMotion;
+pub use derivatives::GroupDerivatives;
 pub use events::GroupEvent;
 pub use gauss::GroupGauss;
 pub use motion::GroupMotion;

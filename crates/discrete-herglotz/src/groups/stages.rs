@@ -2,7 +2,7 @@
 
 use crate::gauss::MAX_STAGES;
 use contact_geom::Scalar;
-use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup};
+use contact_geom::groups::{GroupError, GroupLagrangian, GroupPartials, LieGroup, ParametricGroupLagrangian};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxOrNan;
 use std::marker::PhantomData;
@@ -52,12 +52,105 @@ fn combined<T: Scalar, const N: usize>(h: f64, weights: &[f64], x: &Rows<N, T>) 
     sum
 }
 
-/// What a step of a Lagrangian is computed from.
-pub(super) struct Given<'a, L, E, const N: usize, T> {
+/// A Lagrangian over one number type.
+pub(super) trait AtStages<G: LieGroup<N>, const N: usize, T: Scalar> {
+    /// The first derivatives.
+    fn partials(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T>;
+
+    /// Whether there is an applied force.
+    fn is_forced(&self) -> bool;
+
+    /// The applied force.
+    fn applied_force(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N>;
+
+    /// `l_xixi^-1 b`.
+    fn solve_mass(
+        &self,
+        t: T,
+        g: &G::Element<T>,
+        xi: &SVector<T, N>,
+        z: T,
+        b: &SVector<T, N>,
+    ) -> Result<SVector<T, N>, GroupError>;
+}
+
+/// A Lagrangian with its own parameters.
+pub(super) struct Own<'a, L>(pub &'a L);
+
+impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize, T: Scalar> AtStages<G, N, T> for Own<'_, L> {
+    #[inline]
+    fn partials(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T> {
+        self.0.partials(t, g, xi, z)
+    }
+
+    #[inline]
+    fn is_forced(&self) -> bool {
+        self.0.is_forced()
+    }
+
+    #[inline]
+    fn applied_force(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N> {
+        self.0.applied_force(t, g, xi, z)
+    }
+
+    #[inline]
+    fn solve_mass(
+        &self,
+        t: T,
+        g: &G::Element<T>,
+        xi: &SVector<T, N>,
+        z: T,
+        b: &SVector<T, N>,
+    ) -> Result<SVector<T, N>, GroupError> {
+        self.0.solve_mass(t, g, xi, z, b).map_err(|singular| GroupError::Singular { pivot: singular.pivot })
+    }
+}
+
+/// A Lagrangian for values of its parameters.
+pub(super) struct AtParameters<'a, L, T> {
     pub lagrangian: &'a L,
+    pub theta: &'a [T],
+}
+
+impl<G, L, const N: usize, T: Scalar> AtStages<G, N, T> for AtParameters<'_, L, T>
+where
+    G: LieGroup<N>,
+    L: ParametricGroupLagrangian<G, N>,
+{
+    fn partials(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T> {
+        self.lagrangian.partials_at(self.theta, t, g, xi, z)
+    }
+
+    fn is_forced(&self) -> bool {
+        self.lagrangian.is_forced()
+    }
+
+    fn applied_force(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N> {
+        self.lagrangian.applied_force(t, g, xi, z)
+    }
+
+    /// That of the own parameters: the iteration converges to the same stages.
+    fn solve_mass(
+        &self,
+        t: T,
+        g: &G::Element<T>,
+        xi: &SVector<T, N>,
+        z: T,
+        b: &SVector<T, N>,
+    ) -> Result<SVector<T, N>, GroupError> {
+        AtStages::<G, N, T>::solve_mass(&Own(self.lagrangian), t, g, xi, z, b)
+    }
+}
+
+/// The factors `rho_k/rho_1` at the nodes of a step and `sigma_d - 1`, for a constant rate.
+pub(super) type Factors<T = f64> = ([T; MAX_STAGES], T);
+
+/// What a step of a Lagrangian is computed from.
+pub(super) struct Given<'a, V, E, const N: usize, T> {
+    pub lagrangian: &'a V,
     pub table: &'a Table,
-    /// `(rho_k/rho_1, sigma_d - 1)` for a constant rate.
-    pub constant: Option<([f64; MAX_STAGES], f64)>,
+    /// For a constant rate.
+    pub constant: Option<Factors<T>>,
     pub t: f64,
     pub h: f64,
     pub g0: E,
@@ -87,12 +180,12 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
     /// `R_k l_V = P_k = P0 + h sum_j a_kj R_j l_Xi,j`, and the momentum at the end is `p1 = P0 + h sum_j b_j R_j
     /// l_Xi,j`, where `p1 = dexp_(-xi1)^T (sigma_d Pi0 + d_c S)` is the equation of the discrete Legendre
     /// transformation at g0.
-    pub fn sweep<L: GroupLagrangian<G, N>>(
+    pub fn sweep<V: AtStages<G, N, T>>(
         &mut self,
-        given: &Given<'_, L, G::Element<T>, N, T>,
+        given: &Given<'_, V, G::Element<T>, N, T>,
     ) -> Result<f64, GroupError> {
         let Given { lagrangian, table, h, .. } = given;
-        let (s, h) = (table.s, *h);
+        let (s, h, forced) = (table.s, *h, lagrangian.is_forced());
         let zero = SVector::<T, N>::zeros();
         let (mut chart, mut force, mut body) = ([zero; MAX_STAGES], [zero; MAX_STAGES], [zero; MAX_STAGES]);
         let mut rates = [T::zero(); MAX_STAGES];
@@ -105,12 +198,15 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
             points[k] = G::compose(&given.g0, &local);
             self.omega[k] = G::dexp(&xi, &self.v[k]);
             // With a constant rate the derivatives do not depend on z, and the action is integrated with its factor.
-            actions[k] = match given.constant {
-                Some(_) => T::zero(),
-                None => (0..s).fold(given.z0, |z, j| z + self.value[j] * (h * table.a[k][j])),
-            };
+            if given.constant.is_none() {
+                actions[k] = (0..s).fold(given.z0, |z, j| z + self.value[j] * (h * table.a[k][j]));
+            }
             let time = T::from(given.t + h * table.c[k]);
-            let partials = lagrangian.partials(time, &points[k], &self.omega[k], actions[k]);
+            let mut partials = lagrangian.partials(time, &points[k], &self.omega[k], actions[k]);
+            if forced {
+                let z = if given.constant.is_some() { self.action_at(given, k) } else { actions[k] };
+                partials.force += lagrangian.applied_force(time, &points[k], &self.omega[k], z);
+            }
             self.value[k] = partials.value;
             rates[k] = partials.rate;
             let gradient = G::dexp_gradient(&xi, &self.v[k], &partials.momentum);
@@ -118,7 +214,7 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
             impulse += G::coadjoint(&G::inverse(&local), &partials.force) * (self.rho[k] * (h * table.b[k]));
             (chart[k], body[k]) = (xi, partials.momentum);
         }
-        self.factors(given, &rates)?;
+        self.factors(given, &rates);
         self.increment = combined(h, &table.b[..s], &self.v);
         self.impulse = impulse;
         let start = given.momentum + given.momentum * self.sigma_minus_one + impulse;
@@ -128,9 +224,7 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
             let p = (p0 + combined(h, &table.a[k][..s], &force)) / self.rho[k];
             let residual = G::dexp_inverse_transposed(&chart[k], &p) - body[k];
             let time = T::from(given.t + h * table.c[k]);
-            let change = lagrangian
-                .solve_mass(time, &points[k], &self.omega[k], actions[k], &residual)
-                .map_err(|singular| GroupError::Singular { pivot: singular.pivot })?;
+            let change = lagrangian.solve_mass(time, &points[k], &self.omega[k], actions[k], &residual)?;
             let change = G::dexp_inverse(&chart[k], &change);
             self.v[k] += change;
             for i in 0..N {
@@ -141,12 +235,11 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
     }
 
     /// The factors R and `sigma_d`: in closed form for a constant rate, by one sweep of `rho = 1 - hA (rho l_z)` else.
-    fn factors<L, E>(&mut self, given: &Given<'_, L, E, N, T>, rates: &[T; MAX_STAGES]) -> Result<(), GroupError> {
+    fn factors<V, E>(&mut self, given: &Given<'_, V, E, N, T>, rates: &[T; MAX_STAGES]) {
         let (table, h) = (given.table, given.h);
         if let Some((rho, sigma_minus_one)) = given.constant {
-            self.rho = rho.map(T::from);
-            self.sigma_minus_one = T::from(sigma_minus_one);
-            return Ok(());
+            (self.rho, self.sigma_minus_one) = (rho, sigma_minus_one);
+            return;
         }
         // R = sigma_d - hA (R l_z), sigma_d = 1 + hb.(R l_z).
         let slope = |k: usize, rho: &[T; MAX_STAGES]| rho[k] * rates[k] * h;
@@ -157,11 +250,19 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
             self.rho[k] = sum - inner + 1.0;
         }
         self.sigma_minus_one = sum;
-        Ok(())
+    }
+
+    /// The action at a stage for a constant rate, from `(rho z)' = rho l_0`.
+    fn action_at<V, E>(&self, given: &Given<'_, V, E, N, T>, k: usize) -> T {
+        let mut sum = given.z0 + given.z0 * self.sigma_minus_one;
+        for j in 0..given.table.s {
+            sum += self.rho[j] * self.value[j] * (given.h * given.table.a[k][j]);
+        }
+        sum / self.rho[k]
     }
 
     /// `z1 - z0`.
-    pub fn action<L, E>(&self, given: &Given<'_, L, E, N, T>) -> T {
+    pub fn action<V, E>(&self, given: &Given<'_, V, E, N, T>) -> T {
         let mut sum = T::zero();
         for k in 0..given.table.s {
             let factor = if given.constant.is_some() { self.rho[k] } else { T::one() };
