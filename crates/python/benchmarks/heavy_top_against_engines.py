@@ -4,17 +4,18 @@
     python benchmarks/heavy_top_against_engines.py
 
 The top is that of Bruels and Cardona (2010), without drag, over 2 time units with steps of equal length. Two of its
-moments of inertia are equal, so that the free rotation is known in closed form, which the splittings use; the second top
-has three different moments. In each round every run of every program has its turn; the least time counts. Times are
-processor times of one thread, without the construction of the models. The programs keep their default tolerances, and
-nothing is projected.
+moments of inertia are equal, so that the free rotation is known in closed form, which the splittings use. The second
+top has three different moments.
+
+In each round every run of every program has its turn; the least time counts. Times are processor times of one thread,
+without the construction of the models. The programs keep their default tolerances, and nothing is projected.
 
 - herglotz: `rigid_body`, splittings on the rotation group.
 - MuJoCo: a ball joint; its integrators Euler, implicit and RK4.
 - exudyn: a body with Euler parameters and a spherical joint, by the generalised alpha method and the trapezoidal rule
   of index 2; and a body on the rotation group by explicit Runge-Kutta methods. An explicit method permits no joint, so
   the body is given its inertia about the fixed point, its position is held, and its weight is a load at the centre.
-- DART: a ball joint and its only integrator, the semi-implicit Euler method.
+- DART: a ball joint and its only integrator, the semi-implicit Euler method. With longer steps than here it diverges.
 
 The error is the 2-norm of that of the centre of mass at the end. The energy error is the largest at up to a hundred
 times, relative to the energy at the start, which is nearly all that of the rotation: the weight can change it by 5 per
@@ -192,7 +193,8 @@ def of_exudyn(at_centre, integrator, steps):
             return [energies[-1]]
 
         if parts > 1:
-            system.AddSensor(items.SensorUserFunction(sensorUserFunction=observe, writeToFile=False, storeInternal=True))
+            sensor = items.SensorUserFunction(sensorUserFunction=observe, writeToFile=False, storeInternal=True)
+            system.AddSensor(sensor)
         system.Assemble()
         settings = exudyn_settings(steps, END, parts)
         begin = time.process_time()

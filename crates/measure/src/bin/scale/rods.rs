@@ -16,10 +16,6 @@ const GAMMA: f64 = -0.1;
 const GRAVITY: f64 = 9.81;
 const H: f64 = 1e-3;
 
-/// The run time in seconds of a step of a chain of 128 links by DART, from the table of peers: measured with another
-/// program on a machine of this kind.
-const DART: f64 = 2.66e-3;
-
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let sizes: &[usize] = if report.quick { &[8, 32, 128, 512] } else { &[8, 32, 128, 512, 2048, 8192] };
     let mut times = Vec::new();
@@ -31,7 +27,6 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         times.push((links as f64, seconds));
         if links == 128 {
             report.verdict(CASE, "seconds of a step of a chain of 128 links", seconds, 2e-4);
-            report.verdict(CASE, "a step of a chain of 128 links over DART as tabulated", seconds / DART, 0.075);
         }
     }
     // From 32 links on, since the overhead of a step is not part of the growth.
