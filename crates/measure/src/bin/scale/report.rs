@@ -66,7 +66,7 @@ impl Report {
 
     /// Writes a table of a case to a file.
     pub fn table(&self, file: &str, columns: &[&str], rows: Vec<Vec<String>>) -> Result<(), Failure> {
-        self.out.table(file, columns, rows.into_iter())
+        self.out.table(file, columns, rows)
     }
 
     /// Writes tables and diagrams; fails if a figure is above its bound.
