@@ -64,6 +64,11 @@ impl Report {
         self.verdicts.push(verdict);
     }
 
+    /// Writes a table of a case to a file.
+    pub fn table(&self, file: &str, columns: &[&str], rows: Vec<Vec<String>>) -> Result<(), Failure> {
+        self.out.table(file, columns, rows)
+    }
+
     /// Writes tables and diagrams; fails if a figure is above its bound.
     pub fn finish(self) -> Result<(), Failure> {
         let row = |r: &Row| {
