@@ -19,7 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The theorem of section 4.2 is a diagram that commutes for both signs. The largest defects over the 19 systems of the
+//! The theorem of section 4.2 is a diagram that commutes for both signs. The largest defects over the 18 systems of the
 //! catalogue and steps from 1e-6 to 1 are given in units of the condition number of the motion
 //! (`cargo run --release --bin exact_tour` lists them one by one):
 //!

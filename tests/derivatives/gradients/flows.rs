@@ -5,7 +5,7 @@ use crate::gradients::runs::{Case, Method, weyl};
 use crate::lagrangians::{ForcedOne, Two};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    Chain, CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
+    CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
     SystemVisitor, TwoCoordinates, UniformField, visit_catalogue,
 };
 use contact_geom::{Force, ForceStructure, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
@@ -17,7 +17,7 @@ use discrete_herglotz::{Integrator, Problem, SplittingScheme, Steps, Until, rule
 /// no solution.
 ///
 /// Not for more than two coordinates: the loops of rules and splittings over coordinates are the same for any number of
-/// them, which is four in `rows`, and each type takes long to compile.
+/// them, which is three in `rows`, and each type takes long to compile.
 fn compare<const N: usize, S: System<N>, M: Method>(system: &S, method: M, draw: u32, name: &str) {
     if const { N > 2 } {
         return;
@@ -227,7 +227,7 @@ fn parameters_that_a_splitting_excludes() {
 #[test]
 fn rows() {
     fn check<M: Method>(method: M, name: &str) {
-        let system = Chain::<4>::default();
+        let system = Kepler::<3>::default();
         let problem = Problem::new(&system, 0.1, system.initial()).unwrap();
         let run = || method.run(&problem).steps(Steps::Count(8));
         let times = [0.1, 0.35, 0.5, 0.77, 0.9];
@@ -235,11 +235,11 @@ fn rows() {
         let tangent = run().tangent_at(&variables, &times, Until::Time(0.9)).unwrap();
         assert_eq!(tangent.rows.len(), times.len());
         let weight = |i: usize| 1.0 + 0.3 * i as f64;
-        let loss = |states: &[EndState<4>]| {
+        let loss = |states: &[EndState<3>]| {
             let value: f64 =
                 states.iter().enumerate().map(|(i, state)| weight(i) * (state.q[1] * state.v[0] + state.z)).sum();
-            let of = |(i, state): (usize, &EndState<4>)| {
-                let mut covector = EndCovector::<4>::zero();
+            let of = |(i, state): (usize, &EndState<3>)| {
+                let mut covector = EndCovector::<3>::zero();
                 covector.q[1] = weight(i) * state.v[0];
                 covector.v[0] = weight(i) * state.q[1];
                 covector.z = weight(i);
@@ -256,7 +256,7 @@ fn rows() {
             .chain(&gradient.parameters)
             .chain([&gradient.t0, &gradient.t_end]);
         for (k, found) in all.enumerate() {
-            let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow<4>)| {
+            let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow<3>)| {
                 let (state, column) = (&row.state, &row.columns[k]);
                 weight(i) * (column.q[1] * state.v[0] + state.q[1] * column.v[0] + column.z)
             };

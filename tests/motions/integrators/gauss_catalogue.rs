@@ -15,12 +15,6 @@ use discrete_herglotz::{
     theory::{derived_jet, statements},
 };
 
-/// Whether systems of the catalogue with a number of coordinates are compared. Each type takes long to compile, and those
-/// with three, Kepler's problem in space and a free chain, have the formulas of others with two and four.
-const fn is_compared(coordinates: usize) -> bool {
-    coordinates != 3
-}
-
 /// The stepper agrees with Newton's steps at random points of each system, and so does its `sigma_d`: to 1e-12, which
 /// is round-off times its growth in five steps of these motions.
 #[test]
@@ -28,11 +22,6 @@ fn the_stepper_takes_the_steps_of_newton() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            if const { !is_compared(N) } {
-                let known = ["kepler_spatial", "chain_free"].contains(&system.name());
-                assert!(known, "{} has three coordinates: compare another of its formula", system.name());
-                return;
-            }
             for s in [1, 2, 3, 5, 8, 16] {
                 let cases = if s * N > 24 { 4 } else { 12 };
                 on_some(cases, &format!("{} with {s} stages", system.name()), 2 * N + 3, |u| {
@@ -69,16 +58,13 @@ fn the_stepper_takes_the_steps_of_newton() {
     visit_catalogue(&mut Visitor);
 }
 
-/// Statement 24, `Phi* eta = sigma_d eta`, on each system that is compared: the differential of the action, through the stages, is `p1
+/// Statement 24, `Phi* eta = sigma_d eta`, on each system: the differential of the action, through the stages, is `p1
 /// dq1 - sigma_d p0 dq0 + (sigma_d - 1) dz0`, with the `p0`, `p1` and `sigma_d` of the step; to 1e-12.
 #[test]
 fn the_flow_is_conformal() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            if const { !is_compared(N) } {
-                return;
-            }
             for s in [1, 2, 3, 5, 8, 16] {
                 on_some(
                     if s * N > 24 { 2 } else { 8 },
@@ -145,9 +131,6 @@ fn curves_meet_the_states() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            if const { !is_compared(N) } {
-                return;
-            }
             for s in [1, 2, 3, 8, 13, 16] {
                 let (t0, x) = (system.initial_time(), system.initial());
                 let start = legendre(system, t0, &x);

@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub const EXACT_TOLERANCE: f64 = 1e-12;
 
 /// The number of systems of the catalogue that declare a symmetry.
-pub const SYMMETRIC: usize = 8;
+pub const SYMMETRIC: usize = 7;
 
 /// The systems to which a statement applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

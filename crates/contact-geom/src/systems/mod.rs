@@ -107,6 +107,7 @@ systems! {
         PerturbedKepler: PerturbedKepler,
         CoupledPlane: CoupledPlane,
         ChargedParticle: ChargedParticle,
+        Chain: Chain<2>,
     }
 }
 
@@ -116,7 +117,8 @@ pub trait SystemVisitor {
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S);
 }
 
-/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and [`VanDerPol`] are not
+/// Visits every regular system of the catalogue with its natural parameters. Systems of any dimension are visited in one,
+/// so that generic code is compiled for three types only. [`Lienard`] and [`VanDerPol`] are not
 /// included: they have a contact Hamiltonian, but no regular Lagrangian.
 pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     let one = |system: OneCoordinate, visitor: &mut _| SystemVisitor::visit(visitor, &system);
@@ -129,7 +131,6 @@ pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     one(Duffing::forced().into(), visitor);
     two(SphericalPendulum::default().into(), visitor);
     two(DoublePendulum::default().into(), visitor);
-    visitor.visit(&Kepler::<2>::default());
     visitor.visit(&Kepler::<3>::default());
     two(PerturbedKepler::default().into(), visitor);
     one(LaneEmden::default().into(), visitor);
@@ -138,8 +139,8 @@ pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     two(CoupledPlane::default().into(), visitor);
     two(ChargedParticle::default().into(), visitor);
     one(Relativistic::default().into(), visitor);
-    visitor.visit(&Chain::<4>::default());
-    visitor.visit(&Chain::<3>::free());
+    two(Chain::default().into(), visitor);
+    two(Chain::free().into(), visitor);
 }
 
 /// The number of systems that [`visit_catalogue`] visits.
