@@ -13,6 +13,7 @@ mod modified;
 mod new;
 mod plan;
 mod run;
+mod run_writer;
 mod scene_arguments;
 mod sweep;
 
