@@ -1,6 +1,7 @@
 //! The commands of the program, one file each.
 
 mod body;
+mod body_sweep;
 mod check;
 mod checkpoint;
 mod compare;
@@ -16,6 +17,7 @@ mod run;
 mod run_writer;
 mod scene_arguments;
 mod sweep;
+mod sweep_writer;
 
 use crate::failure::Failure;
 use crate::output::{print, print_json};

@@ -1,6 +1,7 @@
 //! Scenes of a rigid body.
 
 use super::SceneError;
+use super::body_overrides;
 use super::checked::{check_version, finite};
 use super::combinations::Combinations;
 use super::file::{DirectionName, RowsTable, RunTable, Values, span_of_table};
@@ -9,7 +10,6 @@ use super::output::{RowTimes, of_formula};
 use super::quantities::Quantities;
 use super::step_control::step_control;
 use super::sweep::{self, Slot, SweptQuantity};
-use super::body_overrides;
 use crate::runtime::{Body, BodyEvent, BodyMotion, Direction, RuntimeError};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -32,8 +32,8 @@ pub(crate) struct BodyFile {
     /// The output.
     #[serde(default)]
     pub want: BodyWant,
-    /// Numbers of the body, `inertia1`, `inertia2`, `inertia3`, `mass`, `centre1`, ..., `gravity1`, ..., `gamma`, or of the
-    /// start, `start.omega1`, ..., `start.z`, over whose values `herglotz sweep` runs. With several of them all
+    /// Numbers of the body, `inertia1`, `inertia2`, `inertia3`, `mass`, `centre1`, ..., `gravity1`, ..., `gamma`, or of
+    /// the start, `start.omega1`, ..., `start.z`, over whose values `herglotz sweep` runs. With several of them all
     /// combinations are run; the last one varies fastest.
     #[serde(default)]
     pub sweep: Quantities<Values>,
@@ -223,7 +223,17 @@ impl BodyScene {
         let columns = columns(text, want.rows.as_ref())?;
         let events = want.events.iter().map(|event| (*event.when).clone()).collect();
         let swept = sweep::read_of_body(text, &file.sweep)?;
-        Ok(BodyScene { body, motion, events, columns, swept, rows: row_times, text: text.into(), spans, run: run.span() })
+        Ok(BodyScene {
+            body,
+            motion,
+            events,
+            columns,
+            swept,
+            rows: row_times,
+            text: text.into(),
+            spans,
+            run: run.span(),
+        })
     }
 
     /// The combinations of the swept values.

@@ -72,7 +72,11 @@ impl RunMonitor for Record<'_> {
     }
 
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        if self.interrupt.is_some_and(Interrupt::is_wanted) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if self.interrupt.is_some_and(Interrupt::is_wanted) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 

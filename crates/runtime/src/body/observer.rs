@@ -140,10 +140,11 @@ impl Observer<'_> {
 
 impl GroupObserver<Rotations, 3> for Observer<'_> {
     fn row(&mut self, t: f64, state: &GroupState<Rotations, 3>) -> ControlFlow<()> {
-        match self.every {
-            Some(every) if !self.is_row(every) => return ControlFlow::Continue(()),
-            _ => self.passed += 1,
+        let every = self.every;
+        if every.is_some_and(|every| !self.is_row(every)) {
+            return ControlFlow::Continue(());
         }
+        self.passed += 1;
         self.monitor.row(&self.rows.row(t, state))
     }
 

@@ -69,7 +69,10 @@ impl BodyMotion {
     }
 
     /// The start, validated.
-    pub(super) fn start(&self, lagrangian: &RigidBody<UniformGravity, 3>) -> Result<GroupMotion<Rotations, 3>, RuntimeError> {
+    pub(super) fn start(
+        &self,
+        lagrangian: &RigidBody<UniformGravity, 3>,
+    ) -> Result<GroupMotion<Rotations, 3>, RuntimeError> {
         if !self.t.is_finite() {
             return Err(RuntimeError::NotFinite { what: "t".into(), value: self.t });
         }
