@@ -10,4 +10,4 @@ mod scene;
 
 #[doc(no_inline)]
 pub use herglotz_runtime as runtime;
-pub use scene::{BodyScene, EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, schema};
+pub use scene::{BodyScene, Combinations, EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, schema};

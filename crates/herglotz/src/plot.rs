@@ -111,9 +111,11 @@ pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Opti
     (!panels.is_empty()).then(|| grid(&panels))
 }
 
-/// The figure of one column against the swept value, over the members of a sweep.
-pub(crate) fn of_sweep(scene: &Scene, quantity: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
-    let quantities = [Quantity::plain(quantity), Quantity::of(scene, column)];
+/// The figure of one column, which may be an angle, against the swept value, over the members of a sweep.
+pub(crate) fn of_sweep(quantity: &str, column: (&str, bool), points: Vec<(f64, f64)>) -> Option<String> {
+    let (name, is_angle) = column;
+    let coordinate = if is_angle { Coordinate::Angle } else { Coordinate::Number };
+    let quantities = [Quantity::plain(quantity), Quantity { name, coordinate }];
     panel(quantities, single(points.len()), points).map(|panel| draw(&panel))
 }
 

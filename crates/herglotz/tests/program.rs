@@ -4,6 +4,8 @@
 
 #[path = "program/body.rs"]
 mod body;
+#[path = "program/body_commands.rs"]
+mod body_commands;
 #[path = "program/ends.rs"]
 mod ends;
 #[path = "program/events.rs"]

@@ -44,7 +44,7 @@ mod sparse;
 mod symmetry;
 mod system;
 
-pub use body::{Body, BodyEvent, BodyMotion, BodyOutcome};
+pub use body::{Body, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyResumeState};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, NotContact, Sample, StatementResidual};
 pub use column::{Column, velocity_name};

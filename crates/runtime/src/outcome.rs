@@ -133,6 +133,14 @@ pub trait RunMonitor {
     fn checkpoint(&mut self, _steps: usize, _at: discrete_herglotz::ResumeState) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
+
+    /// The same as [`interrupted`](Self::interrupted) for the motion of a [rigid body](crate::Body).
+    fn body_interrupted(&mut self, _at: crate::BodyResumeState) {}
+
+    /// The same as [`checkpoint`](Self::checkpoint) for the motion of a [rigid body](crate::Body).
+    fn body_checkpoint(&mut self, _steps: usize, _at: crate::BodyResumeState) -> std::ops::ControlFlow<()> {
+        std::ops::ControlFlow::Continue(())
+    }
 }
 
 /// Ignores everything.

@@ -2,6 +2,13 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+#[path = "body/ensembles.rs"]
+mod ensembles;
+#[path = "body/plans.rs"]
+mod plans;
+#[path = "body/resume.rs"]
+mod resume;
+
 use herglotz_runtime::{
     Body, BodyEvent, BodyMotion, Crossing, Direction, GroupStatus, OutputTimes, RunMonitor, RuntimeError, StepControl,
     Steps,

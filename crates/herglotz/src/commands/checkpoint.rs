@@ -2,9 +2,9 @@
 
 use crate::failure::Failure;
 use crate::output::Directory;
-use herglotz::Scene;
-use herglotz::runtime::{Plan, ResumeState};
+use herglotz::runtime::Plan;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 use std::time::{Duration, Instant};
 
 const FILE: &str = "checkpoint.json";
@@ -20,7 +20,8 @@ pub(crate) struct Checkpoint {
     pub in_transformed_time: bool,
     pub taken: usize,
     pub written: Written,
-    /// The bytes of [`ResumeState`].
+    /// The bytes of a [`ResumeState`](herglotz::runtime::ResumeState), or of a
+    /// [`BodyResumeState`](herglotz::runtime::BodyResumeState).
     state: Vec<u8>,
 }
 
@@ -34,24 +35,27 @@ pub(crate) struct Written {
 }
 
 impl Checkpoint {
-    /// Reads the checkpoint of a directory, for a scene.
-    pub fn read(directory: &Directory, scene: &Scene) -> Result<Self, Failure> {
+    /// Reads the checkpoint of a directory, for a scene with a fingerprint.
+    pub fn read(directory: &Directory, scene: &str) -> Result<Self, Failure> {
         let path = directory.file(FILE);
         let refuse = |why: &str| Failure::Input(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(&path)
             .map_err(|_| refuse("there is no interrupted run in this directory; run without --resume"))?;
         let read: Checkpoint =
             serde_json::from_str(&text).map_err(|_| refuse("the checkpoint is damaged; run without --resume"))?;
-        if read.scene != scene.fingerprint() {
+        if read.scene != scene {
             return Err(refuse("the scene differs from that of the interrupted run; run without --resume"));
         }
         Ok(read)
     }
 
     /// The state from which the run is resumed.
-    pub fn state(&self, directory: &Directory) -> Result<ResumeState, Failure> {
-        let read = ResumeState::from_bytes(&self.state);
-        read.map_err(|error| Failure::Input(format!("{}: {error}", directory.file(FILE).display())))
+    pub fn state<T, E: Display>(
+        &self,
+        directory: &Directory,
+        from_bytes: fn(&[u8]) -> Result<T, E>,
+    ) -> Result<T, Failure> {
+        from_bytes(&self.state).map_err(|error| Failure::Input(format!("{}: {error}", directory.file(FILE).display())))
     }
 
     /// Removes the checkpoint of a directory.
@@ -72,11 +76,11 @@ pub(crate) struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// Checkpoints in a directory at an interval of time.
-    pub fn new(directory: &Directory, scene: &Scene, plan: &Plan, every: Duration) -> Self {
+    /// Checkpoints of a scene with a fingerprint, in a directory at an interval of time.
+    pub fn new(directory: &Directory, scene: String, plan: &Plan, every: Duration) -> Self {
         CheckpointWriter {
             directory: directory.clone(),
-            scene: scene.fingerprint(),
+            scene,
             integrator: plan.integrator.name.to_string(),
             count: plan.steps,
             in_transformed_time: plan.integrator.in_transformed_time,
@@ -91,7 +95,7 @@ impl CheckpointWriter {
     }
 
     /// Saves the state after a number of steps.
-    pub fn save(&mut self, taken: usize, written: Written, state: &ResumeState) -> Result<(), Failure> {
+    pub fn save(&mut self, taken: usize, written: Written, state: &[u8]) -> Result<(), Failure> {
         let CheckpointWriter { scene, integrator, count, in_transformed_time, .. } = &*self;
         let checkpoint = Checkpoint {
             scene: scene.clone(),
@@ -100,7 +104,7 @@ impl CheckpointWriter {
             in_transformed_time: *in_transformed_time,
             taken,
             written,
-            state: state.to_bytes(),
+            state: state.to_vec(),
         };
         let text = serde_json::to_string(&checkpoint).map_err(std::io::Error::from)?;
         self.directory.replace(FILE, &text)?;

@@ -1,6 +1,6 @@
 //! `herglotz compare`.
 
-use super::run::progress_bar;
+use super::run_writer::progress_bar;
 use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, short};

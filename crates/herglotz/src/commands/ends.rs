@@ -1,6 +1,7 @@
 //! `herglotz run` for a path between ends.
 
-use super::run::{ROWS, Run};
+use super::run::Run;
+use super::run_writer::ROWS;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, json, print, print_json, short};
 use crate::plot;

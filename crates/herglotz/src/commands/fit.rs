@@ -1,6 +1,6 @@
 //! `herglotz fit`.
 
-use super::run::interrupt_flag;
+use super::run_writer::interrupt_flag;
 use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, short, table};

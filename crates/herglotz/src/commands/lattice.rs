@@ -1,46 +1,12 @@
 //! `herglotz run` for a lattice.
 
-use super::run::{ROWS, Run, interrupt_flag, progress_bar};
+use super::run::Run;
+use super::run_writer::{Headers, RunWriter};
 use crate::failure::Failure;
-use crate::output::{Directory, Table, json, print, print_json, short};
+use crate::output::{Directory, json, print, print_json, short};
 use crate::plot;
 use herglotz::LatticeScene;
-use herglotz::runtime::{Outcome, RunMonitor, Status};
-use indicatif::ProgressBar;
-use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Writes the rows of a motion, and keeps those that are drawn.
-struct Writer {
-    rows: Table,
-    count: usize,
-    drawn: Option<Vec<Vec<f64>>>,
-    bar: ProgressBar,
-    stop: Arc<AtomicBool>,
-    failure: Option<Failure>,
-}
-
-impl RunMonitor for Writer {
-    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-        self.count += 1;
-        if let Some(drawn) = &mut self.drawn {
-            drawn.push(numbers.to_vec());
-        }
-        match self.rows.numbers(numbers) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(failure) => {
-                self.failure = Some(failure);
-                ControlFlow::Break(())
-            }
-        }
-    }
-
-    fn poll(&mut self, part: f64) -> ControlFlow<()> {
-        self.bar.set_position((part * 1000.0) as u64);
-        if self.stop.load(Ordering::Relaxed) && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-}
+use herglotz::runtime::{Outcome, Status};
 
 impl Run {
     /// Runs a scene with `[lattice]`.
@@ -52,28 +18,17 @@ impl Run {
         }
         let scene = LatticeScene::read(text).map_err(|error| self.scene.explain(error))?;
         let directory = Directory::new(self.out.clone(), &self.scene.file);
-        directory.create()?;
-        let header = scene.columns();
-        let mut writer = Writer {
-            rows: Table::new(directory.file(ROWS), header.iter().map(String::as_str))?,
-            count: 0,
-            drawn: self.plot.then(Vec::new),
-            bar: progress_bar(!self.json),
-            stop: interrupt_flag(),
-            failure: None,
-        };
+        let headers = Headers { rows: scene.columns(), events: None };
+        let mut writer = RunWriter::new(&directory, &headers, None, !self.json)?;
+        writer.kept = self.plot.then(Vec::new);
         let outcome = scene.system.run(&scene.motion, &mut writer);
-        writer.bar.finish_and_clear();
+        writer.end_progress();
         let outcome = outcome.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let Writer { rows, count, drawn, failure, .. } = writer;
-        rows.finish()?;
-        if let Some(failure) = failure {
-            return Err(failure);
-        }
-        for (name, figure) in drawn.iter().flat_map(|rows| plot::of_lattice(&scene, rows)) {
+        let written = writer.finish(&directory, outcome.steps)?;
+        for (name, figure) in written.kept.iter().flat_map(|rows| plot::of_lattice(&scene, rows)) {
             directory.write(&name, &figure)?;
         }
-        self.tell_lattice(&scene, &outcome, count)
+        self.tell_lattice(&scene, &outcome, written.rows)
     }
 
     /// Prints the final state.

@@ -1,6 +1,7 @@
 //! The commands of the program, one file each.
 
 mod body;
+mod body_sweep;
 mod check;
 mod checkpoint;
 mod compare;
@@ -13,8 +14,10 @@ mod modified;
 mod new;
 mod plan;
 mod run;
+mod run_writer;
 mod scene_arguments;
 mod sweep;
+mod sweep_writer;
 
 use crate::failure::Failure;
 use crate::output::{print, print_json};

@@ -4,8 +4,8 @@ use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
-use herglotz::Scene;
-use herglotz::runtime::FormulaSymmetry;
+use herglotz::runtime::{Body, FormulaSymmetry, RuntimeError};
+use herglotz::{BodyScene, Scene};
 
 #[derive(Args)]
 pub(crate) struct Plan {
@@ -59,13 +59,63 @@ fn proved(scene: &Scene) -> Vec<(&'static str, bool, &'static str)> {
     ]
 }
 
+/// The same for a rigid body.
+fn proved_of_body(body: &Body) -> Vec<(&'static str, bool, &'static str)> {
+    let is_free = body.mass == 0.0 || body.gravity == [0.0; 3];
+    vec![
+        ("autonomous", true, "L does not depend on t"),
+        ("z_free", body.gamma == 0.0, "L does not depend on z: no dissipation"),
+        ("z_affine", true, "L = L0(R, omega) + gamma z"),
+        ("constant_rate", true, "L_z is constant"),
+        ("free", is_free, "no torque acts"),
+    ]
+}
+
+/// What is printed of a scene beside the plan of its motion.
+struct Facts {
+    /// What the properties are proved from.
+    source: &'static str,
+    /// The properties that can be proved, whether they are, and their meaning.
+    proved: Vec<(&'static str, bool, &'static str)>,
+    /// The momenta of symmetries.
+    momenta: Vec<String>,
+    /// The number of members of the sweep, and whether there is one.
+    members: (usize, bool),
+}
+
 impl Plan {
     pub fn run(&self) -> Result<(), Failure> {
+        let text = self.scene.text()?;
+        if BodyScene::is_one(&text) {
+            return self.plan_body(&text);
+        }
         let scene = self.scene.read()?;
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let proved = proved(&scene);
-        let momenta: Vec<String> =
-            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
+        let facts = Facts {
+            source: "the formula",
+            proved: proved(&scene),
+            momenta: scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect(),
+            members: (scene.members().count(), !scene.swept.is_empty()),
+        };
+        self.print(&plan, &facts)
+    }
+
+    /// The plan of a scene with `[body]`.
+    fn plan_body(&self, text: &str) -> Result<(), Failure> {
+        let scene = self.scene.read_body(text)?;
+        let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
+        let plan = scene.body.plan(&scene.motion).map_err(explain)?;
+        let facts = Facts {
+            source: "the body",
+            proved: proved_of_body(&scene.body),
+            momenta: scene.body.momenta().map_err(explain)?,
+            members: (scene.combinations().count(), !scene.swept.is_empty()),
+        };
+        self.print(&plan, &facts)
+    }
+
+    fn print(&self, plan: &herglotz::runtime::Plan, facts: &Facts) -> Result<(), Failure> {
+        let Facts { source, proved, momenta, members: (members, has_sweep) } = facts;
         if self.json {
             let of = |item: &herglotz::runtime::PlanEntry| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
             let proved: serde_json::Map<_, _> =
@@ -80,15 +130,15 @@ impl Plan {
                 "items": plan.items.iter().map(of).collect::<Vec<_>>(),
                 "proved": proved,
                 "momenta": momenta,
-                "members": scene.members().count(),
+                "members": members,
             }));
         }
-        let mut lines = vec![plan.text.trim_end().to_owned(), "proved from the formula:".to_owned()];
+        let mut lines = vec![plan.text.trim_end().to_owned(), format!("proved from {source}:")];
         let holding = proved.iter().filter(|(_, holds, _)| *holds);
         lines.extend(holding.map(|(name, _, meaning)| format!("  {name}: {meaning}")));
         lines.extend(momenta.iter().map(|momentum| format!("  {momentum} decays as the conformal factor")));
-        if !scene.swept.is_empty() {
-            lines.push(format!("the sweep has {} members", scene.members().count()));
+        if *has_sweep {
+            lines.push(format!("the sweep has {members} members"));
         }
         print(&lines.join("\n"))
     }

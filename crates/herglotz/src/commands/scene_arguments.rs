@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use clap::Args;
-use herglotz::{Scene, SceneError};
+use herglotz::{BodyScene, Scene, SceneError};
 use std::path::{Path, PathBuf};
 
 /// A scene file, with overrides.
@@ -11,7 +11,7 @@ pub(crate) struct SceneArguments {
     /// The scene file.
     pub(crate) file: PathBuf,
     /// Override a value of the scene: a parameter, start.NAME, run.time, run.accuracy, run.step, run.steps or
-    /// run.integrator.
+    /// run.integrator; for a rigid body mass, gamma, inertia1, inertia=[1.0, 2.0, 3.0], start.omega1 and others.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub(crate) changes: Vec<String>,
 }
@@ -21,6 +21,11 @@ impl SceneArguments {
     pub fn read(&self) -> Result<Scene, Failure> {
         let folder = self.file.parent().unwrap_or(Path::new(""));
         Scene::read_in(&self.text()?, &self.changes, folder).map_err(|error| self.explain(error))
+    }
+
+    /// Reads the scene of a rigid body from its text.
+    pub fn read_body(&self, text: &str) -> Result<BodyScene, Failure> {
+        BodyScene::read_with(text, &self.changes).map_err(|error| self.explain(error))
     }
 
     /// The text of the file.

@@ -1,11 +1,15 @@
 //! Scenes of a rigid body.
 
 use super::SceneError;
+use super::body_overrides;
 use super::checked::{check_version, finite};
-use super::file::{DirectionName, RowsTable, RunTable, span_of_table};
+use super::combinations::Combinations;
+use super::file::{DirectionName, RowsTable, RunTable, Values, span_of_table};
 use super::location::{Location, Span};
 use super::output::{RowTimes, of_formula};
+use super::quantities::Quantities;
 use super::step_control::step_control;
+use super::sweep::{self, Slot, SweptQuantity};
 use crate::runtime::{Body, BodyEvent, BodyMotion, Direction, RuntimeError};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -28,6 +32,11 @@ pub(crate) struct BodyFile {
     /// The output.
     #[serde(default)]
     pub want: BodyWant,
+    /// Numbers of the body, `inertia1`, `inertia2`, `inertia3`, `mass`, `centre1`, ..., `gravity1`, ..., `gamma`, or of
+    /// the start, `start.omega1`, ..., `start.z`, over whose values `herglotz sweep` runs. With several of them all
+    /// combinations are run; the last one varies fastest.
+    #[serde(default)]
+    pub sweep: Quantities<Values>,
 }
 
 /// The body.
@@ -110,6 +119,9 @@ pub struct BodyScene {
     pub events: Vec<String>,
     /// The columns of rows.csv, by their numbers in [`Body::COLUMNS`].
     pub columns: Vec<usize>,
+    /// The swept quantities with their values.
+    pub swept: Vec<SweptQuantity>,
+    rows: RowTimes,
     text: String,
     spans: [(&'static str, Span); 8],
     run: Span,
@@ -141,8 +153,19 @@ impl BodyScene {
     /// # Errors
     /// [`SceneError`] with the position in the text.
     pub fn read(text: &str) -> Result<Self, SceneError> {
+        Self::read_with(text, &[])
+    }
+
+    /// Reads a scene file with `[body]` and overrides some of its values: numbers such as `gamma=-0.2`, `mass=2`,
+    /// `inertia1=0.5` and `start.omega3=10`, vectors such as `start.omega=[0.0, 0.0, 10.0]`, and those of the run as in
+    /// [`Scene::read_with`](super::Scene::read_with).
+    ///
+    /// # Errors
+    /// [`SceneError`] with the position in the text, or in the override.
+    pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
-        let file: BodyFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        let mut file: BodyFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        changes.iter().try_for_each(|change| body_overrides::apply(&mut file, change))?;
         let BodyFile { body: table, start, run, want, .. } = &file;
         let number = |x: &Option<Location<f64>>, name: &str| match x {
             Some(x) => finite(text, x, name),
@@ -184,11 +207,11 @@ impl BodyScene {
         }
         let end = finite(text, &run.time, "time")?;
         let t = number(&start.t, "t")?;
-        let rows = RowTimes::read(text, want.rows.as_ref(), (t, end))?.when(t, end);
+        let row_times = RowTimes::read(text, want.rows.as_ref(), (t, end))?;
         let motion = BodyMotion {
             t,
             z: number(&start.z, "z")?,
-            rows: Some(rows),
+            rows: Some(row_times.when(t, end)),
             events: want.events.iter().map(|event| read_event(text, event)).collect::<Result<_, _>>()?,
             ..BodyMotion::new(
                 start.attitude.as_ref().map_or([1.0, 0.0, 0.0, 0.0], |x| **x),
@@ -199,7 +222,46 @@ impl BodyScene {
         };
         let columns = columns(text, want.rows.as_ref())?;
         let events = want.events.iter().map(|event| (*event.when).clone()).collect();
-        Ok(BodyScene { body, motion, events, columns, text: text.into(), spans, run: run.span() })
+        let swept = sweep::read_of_body(text, &file.sweep)?;
+        Ok(BodyScene {
+            body,
+            motion,
+            events,
+            columns,
+            swept,
+            rows: row_times,
+            text: text.into(),
+            spans,
+            run: run.span(),
+        })
+    }
+
+    /// The combinations of the swept values.
+    pub fn combinations(&self) -> Combinations<'_> {
+        Combinations::new(&self.swept)
+    }
+
+    /// The body and the motion of a member of the sweep, without rows.
+    pub fn member(&self, index: usize) -> (Body, BodyMotion) {
+        let (mut body, mut motion) = (self.body, BodyMotion { rows: None, ..self.motion.clone() });
+        for (swept, value) in self.combinations().at(index) {
+            if let Slot::Body(quantity) = swept.slot {
+                quantity.put(value, &mut body, &mut motion);
+            }
+        }
+        (body, motion)
+    }
+
+    /// A text of everything that determines the output, used to distinguish scenes.
+    pub fn fingerprint(&self) -> String {
+        let BodyScene { body, motion, events, columns, .. } = self;
+        let BodyMotion { t, attitude, omega, z, end, step_control, events: of_motion, .. } = motion;
+        let directions: Vec<_> = of_motion.iter().map(|event| (event.direction, event.terminal)).collect();
+        format!(
+            "{body:?} {t:?} {attitude:?} {omega:?} {z:?} {end:?} {step_control:?} {:?} {columns:?} {events:?} \
+             {directions:?}",
+            self.rows
+        )
     }
 
     /// The error with the position in the file that it concerns.

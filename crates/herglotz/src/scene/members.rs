@@ -1,5 +1,6 @@
 //! The members of a sweep: all combinations of the values of the swept quantities.
 
+use super::combinations::Combinations;
 use super::sweep::{Slot, SweptQuantity, put};
 use crate::runtime::Start;
 
@@ -15,23 +16,19 @@ impl<'s> Members<'s> {
         Members { swept, start }
     }
 
-    /// The number of members: 1 where nothing is swept.
-    pub fn count(&self) -> usize {
-        self.swept.iter().map(|quantity| quantity.values.len()).product()
+    /// The combinations of the swept values.
+    pub fn combinations(&self) -> Combinations<'s> {
+        Combinations::new(self.swept)
     }
 
-    /// The swept quantities with their values for a member.
-    fn quantities_of(&self, index: usize) -> impl Iterator<Item = (&'s SweptQuantity, f64)> {
-        let mut after = self.count();
-        self.swept.iter().filter_map(move |quantity| {
-            after /= quantity.values.len().max(1);
-            Some((quantity, *quantity.values.get(index / after.max(1) % quantity.values.len().max(1))?))
-        })
+    /// The number of members: 1 where nothing is swept.
+    pub fn count(&self) -> usize {
+        self.combinations().count()
     }
 
     /// The values of all swept quantities for a member, in their order.
     pub fn values(&self, index: usize) -> Vec<f64> {
-        self.quantities_of(index).map(|(_, value)| value).collect()
+        self.combinations().values(index)
     }
 
     /// The names of the swept parameters.
@@ -42,16 +39,14 @@ impl<'s> Members<'s> {
 
     /// The values of the swept parameters for a member.
     pub fn parameter_values(&self, index: usize) -> Vec<f64> {
-        self.quantities_of(index)
-            .filter(|(quantity, _)| quantity.slot == Slot::Parameter)
-            .map(|(_, value)| value)
-            .collect()
+        let of_parameters = self.combinations().at(index).filter(|(quantity, _)| quantity.slot == Slot::Parameter);
+        of_parameters.map(|(_, value)| value).collect()
     }
 
     /// The initial state of a member.
     pub fn start(&self, index: usize) -> Start {
         let mut start = self.start.clone();
-        for (quantity, value) in self.quantities_of(index) {
+        for (quantity, value) in self.combinations().at(index) {
             if let Slot::Start(part, entry) = quantity.slot {
                 put(&mut start, part, entry, value);
             }

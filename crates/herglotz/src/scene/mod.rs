@@ -1,7 +1,10 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
 mod body;
+mod body_overrides;
+mod body_quantity;
 mod checked;
+mod combinations;
 mod constraints;
 mod csv_file;
 mod ends;
@@ -25,6 +28,7 @@ mod system;
 mod tables;
 
 pub use body::BodyScene;
+pub use combinations::Combinations;
 pub use ends::EndsScene;
 pub use error::SceneError;
 pub use lattice::LatticeScene;

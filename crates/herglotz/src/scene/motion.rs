@@ -115,8 +115,8 @@ impl Scene {
             return Err(SceneError::at(text, lattice, message));
         }
         if let Some(body) = file::span_of_table(text, "body") {
-            let message = "a rigid body works only with `herglotz run`; the other commands are for systems given by \
-                           formulas";
+            let message = "a rigid body works only with `herglotz run`, `plan` and `sweep`; the other commands are for \
+                           systems given by formulas";
             return Err(SceneError::at(text, body, message));
         }
         if let Some(ends) = file::span_of_table(text, "ends") {

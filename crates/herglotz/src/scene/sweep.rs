@@ -1,6 +1,7 @@
 //! The swept quantities of a scene.
 
 use super::SceneError;
+use super::body_quantity::BodyQuantity;
 use super::checked::finite;
 use super::file::{RangeTable, Spacing, Values};
 use super::location::Location;
@@ -36,6 +37,8 @@ pub(crate) enum Slot {
     Parameter,
     /// A number of the initial state.
     Start(Part, usize),
+    /// A number of a rigid body or of its start.
+    Body(BodyQuantity),
 }
 
 /// A swept quantity, a parameter or a number of the initial state, with its values.
@@ -70,10 +73,35 @@ pub(crate) fn read(
     start: &Start,
     table: &Quantities<Values>,
 ) -> Result<Vec<SweptQuantity>, SceneError> {
+    quantities(text, table, |name| slot(text, formula, start, name, &SWEEP))
+}
+
+/// The swept quantities of a table of a rigid body.
+pub(super) fn read_of_body(text: &str, table: &Quantities<Values>) -> Result<Vec<SweptQuantity>, SceneError> {
+    quantities(text, table, |name| match BodyQuantity::named(name) {
+        Some(BodyQuantity::Time) => {
+            Err(SceneError::at(text, name.span(), format!("{}; {} another value", SWEEP.not_time, SWEEP.act)))
+        }
+        Some(quantity) => Ok(Slot::Body(quantity)),
+        None => {
+            let known = || BodyQuantity::ALL.iter().filter(|(_, of)| *of != BodyQuantity::Time).map(|(name, _)| *name);
+            let all = known().collect::<Vec<_>>().join(", ");
+            let message = format!("unknown name `{}` in [sweep]; the names that can be swept are {all}", **name);
+            Err(SceneError::unknown(text, name.span(), name, known(), message))
+        }
+    })
+}
+
+/// The quantities of a table with their values; `slot` is the kind of the one with a name.
+fn quantities(
+    text: &str,
+    table: &Quantities<Values>,
+    slot: impl Fn(&Location<String>) -> Result<Slot, SceneError>,
+) -> Result<Vec<SweptQuantity>, SceneError> {
     let mut swept = Vec::new();
     let mut members: usize = 1;
     for (name, values) in &table.0 {
-        let slot = slot(text, formula, start, name, &SWEEP)?;
+        let slot = slot(name)?;
         let values_of = values_of(text, values)?;
         members = members.saturating_mul(values_of.len());
         if members > MAX_MEMBERS {

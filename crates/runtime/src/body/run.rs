@@ -1,213 +1,35 @@
 //! Runs of rigid bodies.
 
-use super::integrator::{BodyIntegrator, DEFAULT};
-use super::{Body, BodyMotion};
+use super::integrator::BodyIntegrator;
+use super::observer::{EventValues, Halt, Observer, Rows};
+use super::resume_state::fingerprint;
+use super::steps::of_integrator;
+use super::{Body, BodyMotion, BodyOutcome, BodyResumeState};
 use crate::outcome::KeptRows;
-use crate::{Crossing, Direction, OutputTimes, RunMonitor, RuntimeError, StepControl};
-use contact_geom::groups::{GroupError, RigidBody, Rotation, Rotations, UniformGravity};
-use contact_geom::nalgebra::SVector;
-use discrete_herglotz::groups::{
-    GroupEvent, GroupMotion, GroupObserver, GroupRows, GroupRun, GroupState, GroupStatus, group_steps,
-};
-use discrete_herglotz::{AnyIntegrator, InputError, Steps};
-use std::ops::ControlFlow;
+use crate::{OutputTimes, RunMonitor, RuntimeError};
+use contact_geom::groups::{GroupError, Rotations};
+use discrete_herglotz::groups::{GroupEvent, GroupMotion, GroupRows, GroupRun, GroupStatus};
+use discrete_herglotz::{AnyIntegrator, InputError};
 
-/// The number of steps between two polls of the monitor.
-const STEPS_BETWEEN_POLLS: usize = 64;
-
-/// The number of steps of the first trial run for an accuracy.
-const FIRST_STEPS: usize = 8;
-
-/// The result of a motion of a rigid body. Where the motion was ended early, it describes the part that was computed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BodyOutcome {
-    /// How it ended.
-    pub status: GroupStatus,
-    /// The integrator.
+/// A motion with its steps, after the checks of its input.
+pub(super) struct Prepared {
+    pub rows: Rows,
+    pub state: GroupMotion<Rotations, 3>,
     pub by: AnyIntegrator,
-    /// The length of a step, negative where the motion runs backward.
-    pub step_size: f64,
-    /// The steps taken.
     pub steps: usize,
-    /// The time reached.
-    pub t: f64,
-    /// The attitude there, a unit quaternion with the real part first.
-    pub attitude: [f64; 4],
-    /// The momentum in the body there.
-    pub momentum: [f64; 3],
-    /// The angular velocity in the body there.
-    pub omega: [f64; 3],
-    /// The momentum in space there.
-    pub spatial_momentum: [f64; 3],
-    /// The [tip](Body::tip) in space there.
-    pub tip: [f64; 3],
-    /// The energy there.
-    pub energy: f64,
-    /// The action there.
-    pub z: f64,
-    /// A bound of the error of the attitude (in radians) and of the momentum (relative), where an accuracy was
-    /// requested.
+    pub step_size: f64,
+    pub integrator: BodyIntegrator,
     pub error_estimate: Option<f64>,
 }
 
-impl BodyOutcome {
-    /// The [columns](Body::COLUMNS) of the state that was reached.
-    pub fn row(&self) -> [f64; 19] {
-        let ([w, x, y, z], [p1, p2, p3], [o1, o2, o3]) = (self.attitude, self.momentum, self.omega);
-        let ([m1, m2, m3], [tx, ty, tz]) = (self.spatial_momentum, self.tip);
-        [self.t, w, x, y, z, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, self.energy, self.z]
-    }
-}
-
-/// A state of a rigid body as a row of the columns.
-#[derive(Clone, Copy)]
-struct Rows {
-    lagrangian: RigidBody<UniformGravity, 3>,
-    tip: [f64; 3],
-}
-
-impl Rows {
-    fn row(&self, t: f64, state: &GroupState<Rotations, 3>) -> [f64; 19] {
-        let [w, x, y, zz] = state.g.quaternion();
-        let [p1, p2, p3] = state.momentum.into();
-        let [o1, o2, o3] = self.lagrangian.velocity(&state.momentum).into();
-        let [m1, m2, m3] = state.spatial_momentum().into();
-        let [tx, ty, tz] = state.g.apply(&SVector::from(self.tip)).into();
-        let energy = self.lagrangian.energy::<Rotations>(&state.g, &state.momentum, state.z);
-        [t, w, x, y, zz, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, energy, state.z]
-    }
-}
-
-/// Passes rows and sign changes on to a monitor.
-struct Observer<'m> {
-    rows: Rows,
-    /// The number of steps.
-    count: usize,
-    /// The steps taken.
-    taken: usize,
-    monitor: &'m mut dyn RunMonitor,
-}
-
-impl GroupObserver<Rotations, 3> for Observer<'_> {
-    fn row(&mut self, t: f64, state: &GroupState<Rotations, 3>) -> ControlFlow<()> {
-        self.monitor.row(&self.rows.row(t, state))
-    }
-
-    fn crossing(&mut self, event: usize, t: f64, state: &GroupState<Rotations, 3>) -> ControlFlow<()> {
-        let columns = self.rows.row(t, state).to_vec();
-        let [q, p] = [state.g.quaternion().to_vec(), state.momentum.as_slice().to_vec()];
-        let v = self.rows.lagrangian.velocity(&state.momentum).as_slice().to_vec();
-        self.monitor.crossing(&Crossing { t, event, q, v, p, z: state.z, columns, after: None })
-    }
-
-    fn poll(&mut self, taken: usize) -> ControlFlow<()> {
-        self.taken = taken;
-        if taken.is_multiple_of(STEPS_BETWEEN_POLLS) {
-            self.monitor.poll(taken as f64 / self.count as f64)
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-}
-
-impl BodyMotion {
-    /// The number of steps and the integrator; for an accuracy, by trial runs, with the bound of the error.
-    fn steps(
-        &self,
-        lagrangian: &RigidBody<UniformGravity, 3>,
-        start: &GroupMotion<Rotations, 3>,
-    ) -> Result<(AnyIntegrator, usize, Option<f64>), RuntimeError> {
-        let span = self.end - self.t;
-        if !(span != 0.0 && span.is_finite()) {
-            let why = format!(
-                "ends at {}, and the motion starts at {}; give a finite end that is later or earlier than the start",
-                self.end, self.t
-            );
-            return Err(RuntimeError::argument("t", why));
-        }
-        match self.step_control {
-            StepControl::Accuracy { error, by } => {
-                let by = by.unwrap_or(DEFAULT);
-                BodyIntegrator::check(by)?;
-                if !(error > 0.0 && error.is_finite()) {
-                    return Err(RuntimeError::argument(
-                        "accuracy",
-                        format!("is {error}; it must be a positive number"),
-                    ));
-                }
-                let method = |h: f64| BodyIntegrator::new(*lagrangian, by, h);
-                let found = group_steps(start, span, error, FIRST_STEPS, method);
-                let found = found.map_err(|error| match error {
-                    GroupError::Accuracy { .. } => RuntimeError::argument("accuracy", format!("is refused: {error}")),
-                    error => of_integrator(&error),
-                })?;
-                Ok((by, found.steps, Some(found.error)))
-            }
-            StepControl::Steps { steps: Steps::Count(0), .. } => Err(InputError::NoSteps.into()),
-            StepControl::Steps { by, steps } => {
-                BodyIntegrator::check(by)?;
-                let count = match steps {
-                    Steps::Count(count) => count as f64,
-                    Steps::Size(h) if h > 0.0 && h.is_finite() => {
-                        // A quotient that differs from an integer by rounding only is taken for that integer.
-                        (span.abs() / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0)
-                    }
-                    Steps::Size(h) => {
-                        let why = format!("is {h}; it must be a positive number, since the end gives the direction");
-                        return Err(RuntimeError::argument("step", why));
-                    }
-                };
-                // Integers up to here are exact in floating point.
-                if count > 9e15 {
-                    let why = format!("gives {count:.1e} steps, more than can be counted; take a longer step");
-                    return Err(RuntimeError::argument("step", why));
-                }
-                Ok((by, count as usize, None))
-            }
-        }
-    }
-
-    /// The start, validated.
-    fn start(&self, lagrangian: &RigidBody<UniformGravity, 3>) -> Result<GroupMotion<Rotations, 3>, RuntimeError> {
-        if !self.t.is_finite() {
-            return Err(RuntimeError::NotFinite { what: "t".into(), value: self.t });
-        }
-        if !self.z.is_finite() {
-            return Err(RuntimeError::NotFinite { what: "z".into(), value: self.z });
-        }
-        if let Some((i, value)) = self.omega.iter().enumerate().find(|(_, x)| !x.is_finite()) {
-            return Err(RuntimeError::NotFinite { what: format!("omega[{i}]"), value: *value });
-        }
-        let of_attitude = |error: GroupError| RuntimeError::argument("attitude", format!("is refused: {error}"));
-        let g = Rotation::from_quaternion(self.attitude).map_err(of_attitude)?;
-        let momentum = lagrangian.momentum(&SVector::from(self.omega));
-        GroupMotion::new(self.t, GroupState { g, momentum, z: self.z }).map_err(of_attitude)
-    }
-}
-
-/// The error of an integrator or of its step.
-fn of_integrator(error: &GroupError) -> RuntimeError {
-    let argument = match error {
-        GroupError::NeedsComposition { .. } | GroupError::Stages { .. } => "integrator",
-        _ => "step",
-    };
-    RuntimeError::argument(argument, format!("is refused: {error}"))
-}
-
 impl Body {
-    /// Runs a motion. Each row has the [columns](Self::COLUMNS), and a crossing has them too, with the quaternion, the
-    /// angular velocity and the momentum in the body as position, velocity and momentum. A failure of a step is reported
-    /// in the status of the outcome.
-    ///
-    /// # Errors
-    /// [`RuntimeError::Argument`] and [`RuntimeError::NotFinite`] with the argument: a quaternion that is not a unit
-    /// quaternion, an inertia that violates the triangle inequality, a first step that turns the body beyond the chart
-    /// of the exponential map (with the largest step), an accuracy below round-off, an integrator that rigid bodies do
-    /// not have; [`RuntimeError::Input`] for times of rows that are not in order.
-    pub fn run(&self, motion: &BodyMotion, monitor: &mut dyn RunMonitor) -> Result<BodyOutcome, RuntimeError> {
+    /// Checks the input of a motion, and determines its steps.
+    pub(super) fn prepare(&self, motion: &BodyMotion) -> Result<Prepared, RuntimeError> {
         let lagrangian = self.lagrangian()?;
-        let rows = Rows { lagrangian, tip: self.tip() };
-        let mut state = motion.start(&lagrangian)?;
+        let state = motion.start(&lagrangian)?;
+        if let Some(OutputTimes::Every(0)) = motion.rows {
+            return Err(RuntimeError::argument("every", "is 0; it must be at least 1"));
+        }
         let (by, steps, error_estimate) = motion.steps(&lagrangian, &state)?;
         let step_size = (motion.end - motion.t) / steps as f64;
         let integrator = BodyIntegrator::new(lagrangian, by, step_size).map_err(|error| of_integrator(&error))?;
@@ -215,33 +37,106 @@ impl Body {
         if let Err(error @ GroupError::BeyondChart { .. }) = state.clone().advance(&integrator, 1) {
             return Err(of_integrator(&error));
         }
-        let event = |event: &'_ crate::BodyEvent| -> GroupEvent<'static, Rotations, 3> {
-            let own = event.clone();
-            let of = GroupEvent::new(move |t, state: &GroupState<Rotations, 3>| own.value(&rows.row(t, state)));
-            let of = match event.direction {
-                Direction::Rising => of.rising(),
-                Direction::Falling => of.falling(),
-                Direction::Both => of,
-            };
-            if event.terminal { of.terminal() } else { of }
+        let rows = Rows { lagrangian, tip: self.tip() };
+        Ok(Prepared { rows, state, by, steps, step_size, integrator, error_estimate })
+    }
+
+    /// Runs a motion. Each row has the [columns](Self::COLUMNS), and a crossing has them too, with the quaternion, the
+    /// angular velocity and the momentum in the body as position, velocity and momentum. A failure of a step is reported
+    /// in the status of the outcome.
+    ///
+    /// A motion that [`RunMonitor::poll`] ends is passed to [`RunMonitor::body_interrupted`], and checkpoints to
+    /// [`RunMonitor::body_checkpoint`].
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`] and [`RuntimeError::NotFinite`] with the argument: a quaternion that is not a unit
+    /// quaternion, an inertia that violates the triangle inequality, a first step that turns the body beyond the chart
+    /// of the exponential map (with the largest step), an accuracy below round-off, an integrator that rigid bodies do
+    /// not have; [`RuntimeError::Input`] for times of rows that are not in order.
+    pub fn run(&self, motion: &BodyMotion, monitor: &mut dyn RunMonitor) -> Result<BodyOutcome, RuntimeError> {
+        self.advance(motion, None, monitor)
+    }
+
+    /// Continues a motion from a saved state, with the same numbers to the last bit as a run that was not interrupted. If
+    /// the steps were found for an accuracy, they are found again; to save this work, give their number.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run); [`InputError::AnotherRun`](crate::InputError::AnotherRun) for the state of another motion.
+    pub fn resume(
+        &self,
+        motion: &BodyMotion,
+        from: BodyResumeState,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<BodyOutcome, RuntimeError> {
+        self.advance(motion, Some(from), monitor)
+    }
+
+    fn advance(
+        &self,
+        motion: &BodyMotion,
+        from: Option<BodyResumeState>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<BodyOutcome, RuntimeError> {
+        let Prepared { rows, mut state, by, steps, step_size, integrator, error_estimate } = self.prepare(motion)?;
+        let of_run = fingerprint(self, motion, by, steps);
+        let mut before = (0, 0);
+        if let Some(from) = from {
+            from.check(of_run)?;
+            let damaged = |error: GroupError| RuntimeError::argument("from", format!("is refused: {error}"));
+            state = GroupMotion::restore(&from.numbers).map_err(damaged)?;
+            before = (from.taken, from.rows);
+        }
+        let values: Vec<EventValues> = motion.events.iter().map(|_| EventValues::new(step_size.signum())).collect();
+        let events: Vec<GroupEvent<'_, Rotations, 3>> =
+            motion.events.iter().zip(&values).map(|(event, values)| values.event(rows, event)).collect();
+        let terminal: Vec<bool> = motion.events.iter().map(|event| event.terminal).collect();
+        let times = |before: usize, passed: usize| match &motion.rows {
+            None => GroupRows::Never,
+            // The observer counts the steps from the start of the motion.
+            Some(OutputTimes::Every(every)) => GroupRows::Every(if before == 0 { *every } else { 1 }),
+            Some(OutputTimes::At(times)) => GroupRows::At(times.get(passed..).unwrap_or_default().to_vec()),
         };
-        let run = GroupRun {
-            steps,
-            rows: match &motion.rows {
-                None => GroupRows::Never,
-                Some(OutputTimes::Every(0)) => {
-                    return Err(RuntimeError::argument("every", "is 0; it must be at least 1"));
+        let mut observer = Observer {
+            rows,
+            monitor,
+            t0: motion.t,
+            h: step_size,
+            count: steps,
+            before: before.0,
+            taken: before.0,
+            every: if let Some(OutputTimes::Every(every)) = &motion.rows { Some(*every) } else { None },
+            last_row: if let Some(OutputTimes::At(times)) = &motion.rows { times.last().copied() } else { None },
+            passed: before.1,
+            at_start: true,
+            at_end: false,
+            events: &values,
+            terminal: &terminal,
+            requested: None,
+            halted: None,
+        };
+        let mut run = GroupRun { steps, rows: GroupRows::Never, events };
+        let status = loop {
+            (run.steps, run.rows) = (steps - observer.taken.min(steps), times(observer.before, observer.passed));
+            let passed = observer.passed;
+            let status = run.run(&mut state, &integrator, &mut observer).map_err(|error| match error {
+                GroupError::Times { index, t, .. } => InputError::Times { index: passed + index, t }.into(),
+                error => of_integrator(&error),
+            })?;
+            let Some(halt) = observer.halted.take() else { break status };
+            let at = BodyResumeState::new(of_run, observer.taken, observer.passed, state.save());
+            match halt {
+                Halt::Interrupted => {
+                    observer.monitor.body_interrupted(at);
+                    break status;
                 }
-                Some(OutputTimes::Every(every)) => GroupRows::Every(*every),
-                Some(OutputTimes::At(times)) => GroupRows::At(times.clone()),
-            },
-            events: motion.events.iter().map(event).collect(),
+                Halt::Checkpoint if observer.monitor.body_checkpoint(observer.taken, at).is_break() => break status,
+                Halt::Checkpoint => (observer.before, observer.at_start) = (observer.taken, true),
+            }
         };
-        let mut observer = Observer { rows, count: steps, taken: 0, monitor };
-        let status = run.run(&mut state, &integrator, &mut observer).map_err(|error| match error {
-            GroupError::Times { index, t, .. } => InputError::Times { index, t }.into(),
-            error => of_integrator(&error),
-        })?;
+        let status = match status {
+            GroupStatus::Failed { step, t, cause } => GroupStatus::Failed { step: observer.before + step, t, cause },
+            status => status,
+        };
         let t = if status == GroupStatus::Completed { motion.end } else { state.t() };
         let at = state.state();
         let [_, w, x, y, zz, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, energy, z] = rows.row(t, &at);
