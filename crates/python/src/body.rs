@@ -3,8 +3,8 @@
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use crate::signals::Signals;
 use herglotz_runtime::{
-    AnyIntegrator, Body, BodyEvent, BodyMotion, BodyOutcome, Crossing, Direction, GroupStatus, OutputTimes, RunMonitor,
-    RuntimeError, StepControl, Steps,
+    AnyIntegrator, Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyTorque,
+    Crossing, Direction, GroupStatus, OutputTimes, RunMonitor, RuntimeError, StepControl, Steps,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -13,8 +13,18 @@ use std::ops::ControlFlow;
 /// An event: its function, its direction, and whether it ends the motion.
 type EventRequest = (String, String, bool);
 
-/// The body: inertia as three or nine numbers, mass, centre, gravity, gamma.
-type BodyRequest<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+/// The body: inertia as three or nine numbers, mass, centre, gravity, gamma, and the torque.
+type BodyRequest<'py> = (
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+    Option<[String; 3]>,
+);
+
+/// The initial attitude, angular velocity and action.
+type StartRequest<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// The accuracy; or the integrator, and the length or the number of its steps.
 type WayRequest<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<'py, PyAny>>, Option<usize>);
@@ -58,6 +68,8 @@ pub struct BodyRecord {
     steps: usize,
     error_estimate: Option<f64>,
     interrupted: Option<Py<PyAny>>,
+    /// The derivatives in the start and in the parameters, the logarithm of the conformal factor, and the contact defect.
+    derivatives: Option<(Py<PyArray2<f64>>, Py<PyArray2<f64>>, f64, f64)>,
 }
 
 /// Three numbers.
@@ -68,7 +80,7 @@ fn triple(name: &str, from: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
 }
 
 /// The body of a request.
-fn body_of((inertia, mass, centre, gravity, gamma): &BodyRequest<'_>) -> PyResult<Body> {
+fn body_of((inertia, mass, centre, gravity, gamma, torque): &BodyRequest<'_>) -> PyResult<Body> {
     let inertia = match numbers("inertia", inertia)?.as_slice() {
         [a, b, c] => Body::principal([*a, *b, *c]),
         [a, b, c, d, e, f, g, h, i] => [[*a, *b, *c], [*d, *e, *f], [*g, *h, *i]],
@@ -76,7 +88,9 @@ fn body_of((inertia, mass, centre, gravity, gamma): &BodyRequest<'_>) -> PyResul
             return Err(value_error(format!("`inertia` has {} numbers; it must have 3 or 3 times 3", other.len())));
         }
     };
+    let torque = torque.as_ref().map(|torque| BodyTorque::parse(torque.each_ref().map(String::as_str)));
     Ok(Body {
+        torque: torque.transpose().map_err(value_error)?,
         inertia,
         mass: number("mass", mass)?,
         centre: triple("centre", centre)?,
@@ -85,25 +99,8 @@ fn body_of((inertia, mass, centre, gravity, gamma): &BodyRequest<'_>) -> PyResul
     })
 }
 
-/// Runs a motion of a rigid body with the interpreter lock released.
-#[pyfunction]
-pub fn run_rigid_body(
-    py: Python<'_>,
-    body: BodyRequest<'_>,
-    start: (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>),
-    t: Bound<'_, PyAny>,
-    every: Option<usize>,
-    way: WayRequest<'_>,
-    events: Vec<EventRequest>,
-) -> PyResult<BodyRecord> {
-    let body = body_of(&body)?;
-    let (attitude, omega, z) = start;
-    let attitude = numbers("attitude", &attitude)?;
-    let count = attitude.len();
-    let attitude = <[f64; 4]>::try_from(attitude)
-        .map_err(|_| value_error(format!("`attitude` has {count} numbers; it must be a quaternion (w, x, y, z)")))?;
-    let times = crate::motion::times(&t)?;
-    let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
+/// The steps of a request.
+fn step_control(way: WayRequest<'_>) -> PyResult<StepControl> {
     let (accuracy, integrator, step, steps) = way;
     let by = integrator.map(|name| name.parse::<AnyIntegrator>()).transpose().map_err(value_error)?;
     let steps = match (step, steps) {
@@ -112,15 +109,30 @@ pub fn run_rigid_body(
         (None, Some(count)) => Some(Steps::Count(count)),
         (None, None) => None,
     };
-    let step_control = match (accuracy, by, steps) {
+    match (accuracy, by, steps) {
         (Some(_), _, Some(_)) => {
-            return Err(value_error("`accuracy` and steps are both given: the accuracy determines the step"));
+            Err(value_error("`accuracy` and steps are both given: the accuracy determines the step"))
         }
-        (Some(accuracy), by, None) => StepControl::Accuracy { error: number("accuracy", &accuracy)?, by },
-        (None, Some(by), Some(steps)) => StepControl::Steps { by, steps },
-        (None, None, Some(_)) => return Err(value_error("steps are given without an `integrator`: give one")),
-        (None, by, None) => StepControl::Accuracy { error: 1e-9, by },
-    };
+        (Some(accuracy), by, None) => Ok(StepControl::Accuracy { error: number("accuracy", &accuracy)?, by }),
+        (None, Some(by), Some(steps)) => Ok(StepControl::Steps { by, steps }),
+        (None, None, Some(_)) => Err(value_error("steps are given without an `integrator`: give one")),
+        (None, by, None) => Ok(StepControl::Accuracy { error: 1e-9, by }),
+    }
+}
+
+/// A motion of a request, with rows at the times.
+fn motion_of(
+    (attitude, omega, z): &StartRequest<'_>,
+    times: Vec<f64>,
+    every: Option<usize>,
+    step_control: StepControl,
+    events: Vec<EventRequest>,
+) -> PyResult<BodyMotion> {
+    let attitude = numbers("attitude", attitude)?;
+    let count = attitude.len();
+    let attitude = <[f64; 4]>::try_from(attitude)
+        .map_err(|_| value_error(format!("`attitude` has {count} numbers; it must be a quaternion (w, x, y, z)")))?;
+    let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
     let event = |(function, direction, terminal): EventRequest| {
         let mut event = crate::motion::named("the event", &function, BodyEvent::parse(&function))?;
         event.direction = match direction.as_str() {
@@ -131,22 +143,32 @@ pub fn run_rigid_body(
         event.terminal = terminal;
         Ok(event)
     };
-    let motion = BodyMotion {
+    Ok(BodyMotion {
         t: first,
-        z: number("z0", &z)?,
+        z: number("z0", z)?,
         rows: Some(every.map_or(OutputTimes::At(times), OutputTimes::Every)),
         events: events.into_iter().map(event).collect::<PyResult<_>>()?,
-        ..BodyMotion::new(attitude, triple("omega", &omega)?, end, step_control)
-    };
-    let signals = Signals::new();
-    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone() };
-    let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
-    let outcome = outcome.map_err(value_error)?;
-    let raised = signals.take();
+        ..BodyMotion::new(attitude, triple("omega", omega)?, end, step_control)
+    })
+}
+
+/// A matrix in the order of its rows.
+fn by_rows(py: Python<'_>, found: &herglotz_runtime::DMatrix<f64>) -> PyResult<Py<PyArray2<f64>>> {
+    matrix(py, found.transpose().as_slice().to_vec(), found.ncols())
+}
+
+/// The record of an outcome.
+fn record_of(
+    py: Python<'_>,
+    outcome: &BodyOutcome,
+    rows: Vec<f64>,
+    crossings: Vec<(usize, Vec<f64>)>,
+    raised: Option<PyErr>,
+) -> PyResult<BodyRecord> {
     Ok(BodyRecord {
-        rows: matrix(py, kept.rows, Body::COLUMNS.len())?,
+        rows: matrix(py, rows, Body::COLUMNS.len())?,
         end: vector(py, outcome.row().to_vec()),
-        crossings: kept.crossings,
+        crossings,
         status: outcome.status.to_string(),
         // A terminal event is a regular end.
         success: matches!(outcome.status, GroupStatus::Completed | GroupStatus::Event { .. }) && raised.is_none(),
@@ -155,5 +177,103 @@ pub fn run_rigid_body(
         steps: outcome.steps,
         error_estimate: outcome.error_estimate,
         interrupted: raised.map(|raised| raised.into_value(py).into_any()),
+        derivatives: None,
     })
+}
+
+/// Runs a motion of a rigid body with the interpreter lock released.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are those of the function of Python")]
+pub fn run_rigid_body(
+    py: Python<'_>,
+    body: BodyRequest<'_>,
+    start: StartRequest<'_>,
+    t: Bound<'_, PyAny>,
+    every: Option<usize>,
+    way: WayRequest<'_>,
+    events: Vec<EventRequest>,
+    sensitivity: bool,
+) -> PyResult<BodyRecord> {
+    let body = body_of(&body)?;
+    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
+    let signals = Signals::new();
+    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone() };
+    let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
+    let outcome = outcome.map_err(value_error)?;
+    let raised = signals.take();
+    let is_whole = raised.is_none() && outcome.status == GroupStatus::Completed;
+    let mut record = record_of(py, &outcome, kept.rows, kept.crossings, raised)?;
+    if sensitivity && is_whole {
+        // The steps are known.
+        let steps = StepControl::Steps { by: outcome.by, steps: Steps::Count(outcome.steps) };
+        let motion = BodyMotion { step_control: steps, ..motion };
+        let found: Result<BodyDerivatives, RuntimeError> = py.detach(|| body.derivatives(&motion));
+        let BodyDerivatives { in_start, in_parameters, log_factor, contact_defect } = found.map_err(value_error)?;
+        record.derivatives = Some((by_rows(py, &in_start)?, by_rows(py, &in_parameters)?, log_factor, contact_defect));
+    }
+    Ok(record)
+}
+
+/// The angular velocity at the start of a motion between two attitudes.
+#[pyfunction]
+pub fn rigid_body_between(
+    py: Python<'_>,
+    body: BodyRequest<'_>,
+    start: StartRequest<'_>,
+    t: Bound<'_, PyAny>,
+    way: WayRequest<'_>,
+    to: Bound<'_, PyAny>,
+) -> PyResult<[f64; 3]> {
+    let body = body_of(&body)?;
+    let motion = motion_of(&start, crate::motion::times(&t)?, None, step_control(way)?, Vec::new())?;
+    let to = numbers("to", &to)?;
+    let count = to.len();
+    let to = <[f64; 4]>::try_from(to)
+        .map_err(|_| value_error(format!("`to` has {count} numbers; it must be a quaternion (w, x, y, z)")))?;
+    py.detach(|| body.between(&motion, to)).map_err(value_error)
+}
+
+/// Runs many motions of rigid bodies on several threads with the interpreter lock released: one record for each, or the
+/// error of its input.
+#[pyfunction]
+pub fn run_rigid_bodies(
+    py: Python<'_>,
+    members: Vec<(BodyRequest<'_>, StartRequest<'_>)>,
+    t: Bound<'_, PyAny>,
+    way: WayRequest<'_>,
+    threads: Option<usize>,
+) -> PyResult<Vec<BodyRecord>> {
+    let (times, step_control) = (crate::motion::times(&t)?, step_control(way)?);
+    let mut all = Vec::with_capacity(members.len());
+    for (body, start) in &members {
+        all.push((body_of(body)?, motion_of(start, times.clone(), None, step_control, Vec::new())?));
+    }
+    let of = |index: usize| all.get(index).cloned();
+    let (first, signals) = (of(0), Signals::new());
+    let Some(first) = first else { return Err(value_error("there are no bodies: give at least one")) };
+    let member = |index: usize| of(index).unwrap_or_else(|| first.clone());
+    let ensemble = BodyEnsemble { count: all.len(), member: &member, threads, interrupt: Some(signals.interrupt()) };
+    let mut found: Vec<BodyMember> = Vec::with_capacity(all.len());
+    let tally = py.detach(|| {
+        ensemble.run(&mut |member| {
+            found.push(member);
+            signals.check()
+        })
+    });
+    tally.map_err(value_error)?;
+    if let Some(raised) = signals.take() {
+        return Err(raised);
+    }
+    let record = |member: BodyMember| {
+        let index = member.index;
+        let outcome = member.outcome.map_err(|error| value_error(format!("member {index}: {error}")))?;
+        record_of(py, &outcome, member.rows.concat(), Vec::new(), None)
+    };
+    found.into_iter().map(record).collect()
+}
+
+/// The names of the parameters of the derivatives.
+#[pyfunction]
+pub fn rigid_body_parameters() -> Vec<&'static str> {
+    Body::PARAMETERS.to_vec()
 }

@@ -31,7 +31,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use crate::body::{BodyRecord, run_rigid_body};
+    use crate::body::{BodyRecord, rigid_body_between, rigid_body_parameters, run_rigid_bodies, run_rigid_body};
     #[pymodule_export]
     use crate::checks::{check, compare, geometry, hamiltonian_geometry};
     #[pymodule_export]

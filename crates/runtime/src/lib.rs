@@ -44,7 +44,9 @@ mod sparse;
 mod symmetry;
 mod system;
 
-pub use body::{Body, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyResumeState};
+pub use body::{
+    Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyResumeState, BodyTorque,
+};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, NotContact, Sample, StatementResidual};
 pub use column::{Column, velocity_name};
@@ -66,6 +68,7 @@ pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem};
 pub use symmetry::FormulaSymmetry;
 pub use system::System;
 
+pub use contact_geom::nalgebra::DMatrix;
 pub use contact_geom::switching::Impact;
 pub use contact_geom::table::{Interpolation, Table, TableError};
 pub use contact_geom::{HamiltonianStructure, Statement, Structure};

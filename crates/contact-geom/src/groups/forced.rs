@@ -9,6 +9,24 @@ use nalgebra::SVector;
 pub trait GroupForce<G: LieGroup<N>, const N: usize> {
     /// The force `f(t, g, xi, z)`, an element of the dual of the algebra: its virtual work is `f . (g^-1 delta g)`.
     fn value<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N>;
+
+    /// Whether the force acts; one that does not is not evaluated.
+    fn acts(&self) -> bool {
+        true
+    }
+}
+
+/// A force that may be absent.
+impl<G: LieGroup<N>, F: GroupForce<G, N>, const N: usize> GroupForce<G, N> for Option<F> {
+    fn value<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> SVector<T, N> {
+        match self {
+            Some(force) => force.value(t, g, xi, z),
+            None => SVector::zeros(),
+        }
+    }
+    fn acts(&self) -> bool {
+        self.as_ref().is_some_and(F::acts)
+    }
 }
 
 /// A Lagrangian with a force, by the principle of Lagrange, d'Alembert and Herglotz:
@@ -60,7 +78,7 @@ where
         self.force.value(t, g, xi, z) + self.lagrangian.applied_force(t, g, xi, z)
     }
     fn is_forced(&self) -> bool {
-        true
+        self.force.acts() || self.lagrangian.is_forced()
     }
     #[inline]
     fn partials<T: Scalar>(&self, t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> GroupPartials<N, T> {

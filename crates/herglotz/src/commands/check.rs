@@ -5,8 +5,8 @@ use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
-use herglotz::Scene;
-use herglotz::runtime::{HamiltonianGeometry, MAX_CONTACT_DEFECT, NotContact, Status};
+use herglotz::runtime::{BodyMotion, HamiltonianGeometry, MAX_CONTACT_DEFECT, NotContact, Status};
+use herglotz::{BodyScene, Scene};
 
 #[derive(Args)]
 pub(crate) struct Check {
@@ -31,6 +31,10 @@ pub(crate) struct Check {
 
 impl Check {
     pub fn run(&self) -> Result<(), Failure> {
+        let text = self.scene.text()?;
+        if BodyScene::is_one(&text) {
+            return self.check_body(&text);
+        }
         let scene = self.scene.read()?;
         let checked = scene.system.check(&scene.bare_motion(), self.samples.into());
         let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
@@ -60,7 +64,7 @@ impl Check {
             }
             print_json(&value)?;
         } else {
-            let mut parts = vec![in_words(&check, &momenta)];
+            let mut parts = vec![in_words(&check, &momenta, "dz - p dq")];
             parts.extend(field.as_ref().map(|field| field_in_words(&scene, field)));
             parts.extend(modified.as_deref().map(super::modified::in_words));
             parts.extend(lyapunov.as_ref().map(super::lyapunov::in_words));
@@ -69,11 +73,35 @@ impl Check {
         if let Some(found) = lyapunov.filter(|found| found.status != Status::Completed) {
             return Err(Failure::Run(format!("the motion was not completed: {}", found.status)));
         }
-        match check.not_contact {
-            _ if check.is_as_expected() => Ok(()),
-            Some(_) => Err(Failure::Run("the contact defect of the steps is not the virtual work of the force".into())),
-            None => Err(Failure::Run("the steps are not contact".into())),
+        verdict(&check)
+    }
+
+    /// Checks a scene with `[body]`.
+    fn check_body(&self, text: &str) -> Result<(), Failure> {
+        if self.lyapunov || self.modified {
+            let why = "--lyapunov and --modified do not apply to a scene with [body]; check it without them";
+            return Err(Failure::Input(why.into()));
         }
+        let scene = self.scene.read_body(text)?;
+        let explain = |error| self.scene.explain(scene.explain(&error));
+        let motion = BodyMotion { rows: None, events: Vec::new(), ..scene.motion.clone() };
+        let check = scene.body.check(&motion, self.samples.into()).map_err(explain)?;
+        let momenta = scene.body.momenta().map_err(explain)?;
+        if self.json {
+            print_json(&of_json(&check, &momenta))?;
+        } else {
+            print(&in_words(&check, &momenta, "dz - Pi . (R^-1 dR)"))?;
+        }
+        verdict(&check)
+    }
+}
+
+/// A failure where the steps have not the contact defect that they are to have.
+fn verdict(check: &herglotz::runtime::Check) -> Result<(), Failure> {
+    match check.not_contact {
+        _ if check.is_as_expected() => Ok(()),
+        Some(_) => Err(Failure::Run("the contact defect of the steps is not the virtual work of the force".into())),
+        None => Err(Failure::Run("the steps are not contact".into())),
     }
 }
 
@@ -148,7 +176,8 @@ fn of_json(check: &herglotz::runtime::Check, momenta: &[String]) -> serde_json::
     })
 }
 
-fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
+/// The check in words; eta is the contact form.
+fn in_words(check: &herglotz::runtime::Check, momenta: &[String], eta: &str) -> String {
     let size = |x: f64| format!("{x:.1e}");
     let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     let mut header = words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"]);
@@ -177,7 +206,7 @@ fn in_words(check: &herglotz::runtime::Check, momenta: &[String]) -> String {
     };
     let mut parts = vec![
         format!(
-            "{verdict}: the pullback of dz - p dq by a step of {} with {integrator} is sigma_d (dz - p dq) with a defect of {defect:.1e}{allowed}",
+            "{verdict}: the pullback of {eta} by a step of {} with {integrator} is sigma_d ({eta}) with a defect of {defect:.1e}{allowed}",
             short(*step_size)
         ),
         table(&samples),

@@ -10,7 +10,7 @@ use super::output::{RowTimes, of_formula};
 use super::quantities::Quantities;
 use super::step_control::step_control;
 use super::sweep::{self, Slot, SweptQuantity};
-use crate::runtime::{Body, BodyEvent, BodyMotion, Direction, RuntimeError};
+use crate::runtime::{Body, BodyEvent, BodyMotion, BodyTorque, Direction, RuntimeError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -54,6 +54,9 @@ pub(crate) struct BodyTable {
     pub gravity: Option<Location<[f64; 3]>>,
     /// The rate of the linear drag, negative for dissipation: momenta scale by `e^(gamma t)`.
     pub gamma: Option<Location<f64>>,
+    /// A torque that has no potential: its components along the axes of the body, expressions in `t`, the attitude `q_w`,
+    /// `q_x`, `q_y`, `q_z`, the angular velocity in the body `omega1`, `omega2`, `omega3`, and `z`. It takes a Gauss method.
+    pub torque: Option<Location<[String; 3]>>,
 }
 
 /// An inertia tensor.
@@ -123,7 +126,7 @@ pub struct BodyScene {
     pub swept: Vec<SweptQuantity>,
     rows: RowTimes,
     text: String,
-    spans: [(&'static str, Span); 8],
+    spans: [(&'static str, Span); 9],
     run: Span,
 }
 
@@ -171,7 +174,7 @@ impl BodyScene {
             Some(x) => finite(text, x, name),
             None => Ok(0.0),
         };
-        let body = Body {
+        let mut body = Body {
             inertia: match *table.inertia {
                 InertiaTable::Principal(moments) => Body::principal(moments),
                 InertiaTable::Matrix(rows) => rows,
@@ -180,6 +183,7 @@ impl BodyScene {
             centre: table.centre.as_ref().map_or([0.0; 3], |x| **x),
             gravity: table.gravity.as_ref().map_or([0.0; 3], |x| **x),
             gamma: number(&table.gamma, "gamma")?,
+            torque: None,
         };
         let of = |x: Option<Span>, otherwise: Span| x.unwrap_or(otherwise);
         let step = run.step.as_ref().map(Location::span).or(run.steps.as_ref().map(Location::span));
@@ -192,8 +196,16 @@ impl BodyScene {
             ("omega", start.omega.span()),
             ("step", of(step, run.span())),
             ("accuracy", of(run.accuracy.as_ref().map(Location::span), run.span())),
+            ("torque", of(table.torque.as_ref().map(Location::span), table.span())),
         ];
         let explain = |error: RuntimeError| explain(text, &spans, run.span(), &error);
+        if let Some(torque) = &table.torque {
+            let components = torque.each_ref().map(String::as_str);
+            body.torque = Some(BodyTorque::parse(components).map_err(|error| match error {
+                RuntimeError::Formula(_) => SceneError::at(text, torque.span(), format!("`torque`: {error}")),
+                error => explain(error),
+            })?);
+        }
         // Invalid bodies are refused before all else.
         body.lagrangian().map_err(explain)?;
         if let Some(scales) = &run.scales {
@@ -243,7 +255,7 @@ impl BodyScene {
 
     /// The body and the motion of a member of the sweep, without rows.
     pub fn member(&self, index: usize) -> (Body, BodyMotion) {
-        let (mut body, mut motion) = (self.body, BodyMotion { rows: None, ..self.motion.clone() });
+        let (mut body, mut motion) = (self.body.clone(), BodyMotion { rows: None, ..self.motion.clone() });
         for (swept, value) in self.combinations().at(index) {
             if let Slot::Body(quantity) = swept.slot {
                 quantity.put(value, &mut body, &mut motion);

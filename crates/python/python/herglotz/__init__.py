@@ -31,7 +31,7 @@ __version__ = "0.1.0"
 
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
-    "_body": "RigidBodySolution RigidBodyStates rigid_body",
+    "_body": "RigidBodyDerivatives RigidBodySolution RigidBodyStates rigid_bodies rigid_body rigid_body_between",
     "_sparse": "SparseSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
@@ -90,6 +90,7 @@ __all__ = [
     "Plan",
     "Resets",
     "Retraction",
+    "RigidBodyDerivatives",
     "RigidBodySolution",
     "RigidBodyStates",
     "Sensitivity",
@@ -113,7 +114,9 @@ __all__ = [
     "lattice",
     "path",
     "retract",
+    "rigid_bodies",
     "rigid_body",
+    "rigid_body_between",
     "solve",
     "system",
     "table",

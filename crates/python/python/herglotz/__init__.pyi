@@ -314,6 +314,14 @@ class RigidBodyStates:
     energy: Vector
     z: Vector
 
+class RigidBodyDerivatives:
+    in_attitude: Vector
+    in_omega: Vector
+    in_z: Vector
+    in_parameters: dict[str, Vector]
+    log_factor: float
+    contact_defect: float
+
 class RigidBodySolution(RigidBodyStates):
     end: RigidBodyStates
     events: list[RigidBodyStates]
@@ -323,6 +331,7 @@ class RigidBodySolution(RigidBodyStates):
     step_size: float
     steps: int
     error_estimate: float | None
+    derivatives: RigidBodyDerivatives | None
     @property
     def t_end(self) -> float: ...
 
@@ -525,6 +534,7 @@ def rigid_body(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     gamma: float = 0.0,
+    torque: Sequence[str | float] | None = None,
     attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     omega: ArrayLike | None = None,
     z0: float = 0.0,
@@ -535,7 +545,43 @@ def rigid_body(
     steps: int | None = None,
     every: int | None = None,
     events: str | Event | Sequence[str | Event] = (),
+    sensitivity: bool = False,
 ) -> RigidBodySolution: ...
+def rigid_body_between(
+    inertia: ArrayLike,
+    *,
+    mass: float = 0.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    gamma: float = 0.0,
+    torque: Sequence[str | float] | None = None,
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    to: ArrayLike | None = None,
+    omega: ArrayLike | None = None,
+    z0: float = 0.0,
+    t: ArrayLike | None = None,
+    integrator: str = "gauss_4",
+    step: float | None = None,
+    steps: int | None = None,
+) -> RigidBodySolution: ...
+def rigid_bodies(
+    inertia: ArrayLike,
+    *,
+    mass: ArrayLike = 0.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    gamma: ArrayLike = 0.0,
+    torque: Sequence[str | float] | None = None,
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    omega: ArrayLike | None = None,
+    z0: ArrayLike = 0.0,
+    t: ArrayLike | None = None,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    threads: int | None = None,
+) -> list[RigidBodySolution]: ...
 def ensemble(
     L: Lagrangian,
     q0: ArrayLike,

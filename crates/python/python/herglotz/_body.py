@@ -47,6 +47,36 @@ class RigidBodyStates:
         return f"<{type(self).__name__}: {len(self.t)} states>"
 
 
+class RigidBodyDerivatives:
+    """The derivatives of the end of a motion, those of the discrete motion to round-off.
+
+    The end has seven coordinates: three of the turn R exp(turn) of the attitude in the body, in radians, three of the
+    momentum Pi in the body, and the action z.
+
+    Attributes
+    ----------
+    in_attitude : array of shape (7, 3)
+        With respect to a turn of the initial attitude in the body.
+    in_omega : array of shape (7, 3)
+        With respect to the initial angular velocity.
+    in_z : array of shape (7,)
+        With respect to the initial action.
+    in_parameters : dict of arrays of shape (7,)
+        With respect to "inertia11", "inertia12", ..., "mass", "centre1", ..., "gravity1", ... and "gamma", for a fixed
+        attitude and angular velocity at the start.
+    log_factor : float
+        The logarithm of the conformal factor.
+    contact_defect : float
+        The largest component of Phi* eta - sigma eta, relative to that of Phi* eta, for the contact form
+        eta = dz - Pi.(R^-1 dR): round-off unless there is a torque.
+    """
+
+    def __init__(self, in_start, in_parameters, log_factor, contact_defect):
+        self.in_attitude, self.in_omega, self.in_z = in_start[:, :3], in_start[:, 3:6], in_start[:, 6]
+        self.in_parameters = dict(zip(_core.rigid_body_parameters(), in_parameters.T))
+        self.log_factor, self.contact_defect = log_factor, contact_defect
+
+
 class RigidBodySolution(RigidBodyStates):
     """A motion of a rigid body with k rows; made by `rigid_body`.
 
@@ -67,15 +97,18 @@ class RigidBodySolution(RigidBodyStates):
     error_estimate : float or None
         A bound of the error of the attitude (in radians) and of the momentum (relative), where an accuracy was
         requested.
+    derivatives : RigidBodyDerivatives or None
+        The derivatives of the end, where they were requested and the run was completed.
     """
 
-    def __init__(self, record, events):
+    def __init__(self, record, events=0):
         super().__init__(record.rows)
         self.end = RigidBodyStates(record.end[np.newaxis])
         of = [[row for event, row in record.crossings if event == k] for k in range(events)]
         self.events = [RigidBodyStates(np.array(rows, dtype=float).reshape(-1, 19)) for rows in of]
         self.status, self.success, self.integrator = record.status, record.success, record.integrator
         self.step_size, self.steps, self.error_estimate = record.step_size, record.steps, record.error_estimate
+        self.derivatives = None if record.derivatives is None else RigidBodyDerivatives(*record.derivatives)
 
     @property
     def t_end(self):
@@ -93,6 +126,7 @@ def rigid_body(
     centre=(0.0, 0.0, 0.0),
     gravity=(0.0, 0.0, 0.0),
     gamma=0.0,
+    torque=None,
     attitude=(1.0, 0.0, 0.0, 0.0),
     omega=None,
     z0=0.0,
@@ -103,6 +137,7 @@ def rigid_body(
     steps=None,
     every=None,
     events=(),
+    sensitivity=False,
 ):
     """The motion of a rigid body about a fixed point, with gravity and linear drag, on the rotation group.
 
@@ -121,6 +156,9 @@ def rigid_body(
         The acceleration of gravity g in space, such as (0, 0, -9.81).
     gamma : float
         The rate of the drag, negative for dissipation.
+    torque : sequence of three str, optional
+        A torque that has no potential: its components along the axes of the body, such as ``("-0.1*omega1", "0", "0")``,
+        in the names t, q_w, q_x, q_y, q_z, omega1 to omega3, z. It takes a Gauss method.
     attitude : array of shape (4,)
         The initial attitude, a unit quaternion (w, x, y, z) that takes the body to space.
     omega : array of shape (3,)
@@ -143,6 +181,9 @@ def rigid_body(
     events : sequence, optional
         Functions whose sign changes are located: texts such as ``"tip_z - 0.5"``, or `Event` objects of a text, in
         the names t, q_w, q_x, q_y, q_z, Pi1 to Pi3, omega1 to omega3, M1 to M3, tip_x, tip_y, tip_z, z.
+    sensitivity : bool
+        Also compute the derivatives of the end in the start and in the parameters, `RigidBodySolution.derivatives`. It
+        takes a Gauss method, which is "gauss_4" where only an accuracy is given.
 
     Returns
     -------
@@ -165,26 +206,182 @@ def rigid_body(
     >>> sol.attitude.shape
     (101, 4)
     """
-    if omega is None:
-        raise ValueError("`omega` is not given: give the initial angular velocity in the body")
+    body, start = _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or the times of the rows")
-    inertia = _array("inertia", inertia)
-    if inertia.shape not in ((3,), (3, 3)):
-        raise ValueError(f"`inertia` has the shape {inertia.shape}; it must be (3,) or (3, 3)")
-    for name, x, shape in (("centre", centre, 3), ("gravity", gravity, 3), ("attitude", attitude, 4), ("omega", omega, 3)):
-        if _array(name, x).shape != (shape,):
-            raise ValueError(f"`{name}` has the shape {_array(name, x).shape}; it must be ({shape},)")
-    body = inertia.ravel(), mass, centre, gravity, gamma
     events = [_event(event) for event in ([events] if isinstance(events, (str, Event)) else events)]
+    if sensitivity and integrator is None and step is None and steps is None:
+        integrator = "gauss_4"
     way = accuracy, integrator, step, steps
-    record = _core.run_rigid_body(body, (attitude, omega, z0), copied(t), every, way, events)
+    record = _core.run_rigid_body(body, start, copied(t), every, way, events, bool(sensitivity))
     sol = RigidBodySolution(record, len(events))
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(sol)
         raise record.interrupted
     return sol
+
+
+def rigid_body_between(
+    inertia,
+    *,
+    mass=0.0,
+    centre=(0.0, 0.0, 0.0),
+    gravity=(0.0, 0.0, 0.0),
+    gamma=0.0,
+    torque=None,
+    attitude=(1.0, 0.0, 0.0, 0.0),
+    to=None,
+    omega=None,
+    z0=0.0,
+    t=None,
+    integrator="gauss_4",
+    step=None,
+    steps=None,
+):
+    """A motion of a rigid body between two attitudes, such as a reorientation in a given time.
+
+    The angular velocity at the start is found by Newton's method with the derivatives of the discrete motion. There may
+    be other motions, with more turns.
+
+    Parameters
+    ----------
+    inertia, mass, centre, gravity, gamma, torque, attitude, z0, t, integrator, step, steps
+        Those of `rigid_body`; by default there are 200 steps.
+    to : array of shape (4,)
+        The attitude at the end, a unit quaternion (w, x, y, z).
+    omega : array of shape (3,)
+        A guess of the angular velocity at the start.
+
+    Returns
+    -------
+    RigidBodySolution
+        The motion from the angular velocity that was found, ``sol.omega[0]``.
+
+    Raises
+    ------
+    ValueError
+        For an invalid argument, and where no motion is found.
+
+    Examples
+    --------
+    A turn by half a right angle about the second axis in two time units:
+
+    >>> import numpy as np, herglotz as hz
+    >>> to = np.cos(np.pi / 8), 0, np.sin(np.pi / 8), 0
+    >>> sol = hz.rigid_body_between((1, 2, 3), gamma=-0.1, to=to, omega=(0, 0.3, 0), t=[0, 2])
+    >>> bool(abs(sol.attitude[-1] - to).max() < 1e-12)
+    True
+    """
+    if to is None:
+        raise ValueError("`to` is not given: give the attitude at the end")
+    if t is None:
+        raise ValueError("`t` is not given: give the final time, or the times of the rows")
+    body, start = _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0)
+    if step is None and steps is None:
+        steps = 200
+    way = None, integrator, step, steps
+    found = _core.rigid_body_between(body, start, copied(t), way, copied(to))
+    start = start[0], np.array(found), start[2]
+    return RigidBodySolution(_core.run_rigid_body(body, start, copied(t), None, way, [], False))
+
+
+def rigid_bodies(
+    inertia,
+    *,
+    mass=0.0,
+    centre=(0.0, 0.0, 0.0),
+    gravity=(0.0, 0.0, 0.0),
+    gamma=0.0,
+    torque=None,
+    attitude=(1.0, 0.0, 0.0, 0.0),
+    omega=None,
+    z0=0.0,
+    t=None,
+    accuracy=None,
+    integrator=None,
+    step=None,
+    steps=None,
+    threads=None,
+):
+    """Motions of many rigid bodies, on several threads; the results do not depend on the number of threads.
+
+    Parameters
+    ----------
+    inertia, mass, centre, gravity, gamma, attitude, omega, z0
+        Those of `rigid_body`, or with one more axis in front, of m entries: one for each body. A matrix of shape (3, 3)
+        is one inertia tensor.
+    torque, t, accuracy, integrator, step, steps
+        Those of `rigid_body`, the same for all bodies.
+    threads : int, optional
+        The number of threads; by default that of the processors.
+
+    Returns
+    -------
+    list of RigidBodySolution
+
+    Raises
+    ------
+    ValueError
+        For an invalid argument, with the number of the body.
+
+    Examples
+    --------
+    >>> import herglotz as hz
+    >>> found = hz.rigid_bodies((1, 2, 3), gamma=[0, -0.1, -0.2], omega=(1, 0.5, 0.25), t=5.0)
+    >>> [sol.success for sol in found]
+    [True, True, True]
+    """
+    if omega is None:
+        raise ValueError("`omega` is not given: give the initial angular velocities in the bodies")
+    if t is None:
+        raise ValueError("`t` is not given: give the final time, or the times of the rows")
+    inertia = _array("inertia", inertia)
+    given = {
+        "inertia": (inertia, 2 if inertia.shape[-2:] == (3, 3) else 1),
+        "mass": (mass, 0),
+        "centre": (centre, 1),
+        "gravity": (gravity, 1),
+        "gamma": (gamma, 0),
+        "attitude": (attitude, 1),
+        "omega": (omega, 1),
+        "z0": (z0, 0),
+    }
+    counts, arrays = {}, {}
+    for name, (x, axes) in given.items():
+        arrays[name] = np.asarray(_array(name, x)) if axes else np.array(x, dtype=float)
+        if arrays[name].ndim == axes + 1:
+            counts[name] = len(arrays[name])
+        elif arrays[name].ndim != axes:
+            raise ValueError(f"`{name}` has the shape {arrays[name].shape}; it must have {axes} or {axes + 1} axes")
+    if len(set(counts.values())) > 1:
+        all_counts = ", ".join(f"`{name}` {count}" for name, count in counts.items())
+        raise ValueError(f"the numbers of bodies differ: {all_counts}")
+    count = next(iter(counts.values()), 1)
+    members = []
+    for k in range(count):
+        of = {name: x[k] if name in counts else x for name, x in arrays.items()}
+        members.append(_request(torque=torque, **of))
+    records = _core.run_rigid_bodies(members, copied(t), (accuracy, integrator, step, steps), threads)
+    return [RigidBodySolution(record) for record in records]
+
+
+def _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0):
+    """A body and its start as they are passed to the core."""
+    if omega is None:
+        raise ValueError("`omega` is not given: give the initial angular velocity in the body")
+    inertia = _array("inertia", inertia)
+    if inertia.shape not in ((3,), (3, 3)):
+        raise ValueError(f"`inertia` has the shape {inertia.shape}; it must be (3,) or (3, 3)")
+    for name, x, shape in (("centre", centre, 3), ("gravity", gravity, 3), ("attitude", attitude, 4), ("omega", omega, 3)):
+        if _array(name, x).shape != (shape,):
+            raise ValueError(f"`{name}` has the shape {_array(name, x).shape}; it must be ({shape},)")
+    if torque is not None:
+        torque = [torque] if isinstance(torque, str) else list(torque)
+        if len(torque) != 3 or not all(isinstance(component, (str, int, float)) for component in torque):
+            raise ValueError(f"`torque` is {torque!r}; it must be three texts, the components along the axes of the body")
+        torque = [str(component) for component in torque]
+    return (inertia.ravel(), mass, centre, gravity, gamma, torque), (attitude, omega, z0)
 
 
 def _array(name, x):

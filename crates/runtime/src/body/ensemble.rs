@@ -1,6 +1,6 @@
 //! Many motions of rigid bodies.
 
-use super::integrator::{BodyIntegrator, DEFAULT};
+use super::integrator::BodyIntegrator;
 use super::{Body, BodyMotion, BodyOutcome};
 use crate::{Crossing, Interrupt, RunMonitor, RuntimeError, StepControl};
 use discrete_herglotz::ensemble::{EnsembleError, Tally};
@@ -96,10 +96,13 @@ impl BodyEnsemble<'_> {
             return Err(EnsembleError::Threads.into());
         }
         // The integrator of all members is refused once.
-        BodyIntegrator::check(match (self.member)(0).1.step_control {
-            StepControl::Accuracy { by, .. } => by.unwrap_or(DEFAULT),
+        let (body, motion) = (self.member)(0);
+        let is_forced = body.torque.is_some();
+        let by = match motion.step_control {
+            StepControl::Accuracy { by, .. } => by.unwrap_or(BodyIntegrator::default_for(is_forced)),
             StepControl::Steps { by, .. } => by,
-        })?;
+        };
+        BodyIntegrator::check(by, is_forced)?;
         let (mut tally, mut first) = (Tally::default(), 0);
         while first < self.count {
             let members = first..self.count.min(first + MEMBERS_PER_THREAD * threads);

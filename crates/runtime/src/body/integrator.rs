@@ -1,38 +1,60 @@
 //! The integrators of rigid bodies.
 
+use super::BodyTorque;
 use crate::RuntimeError;
 use contact_geom::Scalar;
-use contact_geom::groups::{GroupError, RigidBody, Rotations, UniformGravity};
+use contact_geom::groups::{GroupError, GroupForced, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupState, GroupStep, RigidBodySplitting};
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{AnyIntegrator, SplittingScheme};
 
 /// The integrator where only an accuracy is given: explicit, of order 10, for any moments of inertia.
-pub(super) const DEFAULT: AnyIntegrator = AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10);
+const DEFAULT: AnyIntegrator = AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10);
+
+/// The integrator of a body with a torque where only an accuracy is given.
+const DEFAULT_FORCED: AnyIntegrator = AnyIntegrator::Gauss { stages: 5 };
+
+/// The body with its torque.
+pub(super) type ForcedBody = GroupForced<RigidBody<UniformGravity, 3>, Option<BodyTorque>>;
 
 /// Gauss collocation or a splitting of a rigid body, as one type, for which runs are compiled once.
 #[expect(clippy::large_enum_variant, reason = "a run has one")]
 pub(super) enum BodyIntegrator {
-    Gauss(GroupGauss<RigidBody<UniformGravity, 3>>),
+    Gauss(GroupGauss<ForcedBody>),
     Splitting(RigidBodySplitting<UniformGravity>),
 }
 
 impl BodyIntegrator {
     /// The integrator of this name with the step h.
-    pub fn new(body: RigidBody<UniformGravity, 3>, by: AnyIntegrator, h: f64) -> Result<Self, GroupError> {
+    pub fn new(body: &ForcedBody, by: AnyIntegrator, h: f64) -> Result<Self, GroupError> {
+        let split = |scheme| RigidBodySplitting::new(body.lagrangian, scheme, h).map(BodyIntegrator::Splitting);
         match by {
             AnyIntegrator::Gauss { stages } => {
-                GroupGauss::new::<Rotations, 3>(body, stages, h).map(BodyIntegrator::Gauss)
+                GroupGauss::new::<Rotations, 3>(body.clone(), stages, h).map(BodyIntegrator::Gauss)
             }
-            AnyIntegrator::Splitting(scheme) => RigidBodySplitting::new(body, scheme, h).map(BodyIntegrator::Splitting),
-            _ => RigidBodySplitting::new(body, SplittingScheme::STRANG, h).map(BodyIntegrator::Splitting),
+            AnyIntegrator::Splitting(scheme) => split(scheme),
+            _ => split(SplittingScheme::STRANG),
         }
     }
 
-    /// Refuses integrators that rigid bodies do not have.
-    pub fn check(by: AnyIntegrator) -> Result<(), RuntimeError> {
+    /// The integrator of a body for an accuracy, where none is named.
+    pub fn default_for(is_forced: bool) -> AnyIntegrator {
+        if is_forced { DEFAULT_FORCED } else { DEFAULT }
+    }
+
+    /// Refuses integrators that rigid bodies do not have, and splittings of a body with a torque.
+    pub fn check(by: AnyIntegrator, is_forced: bool) -> Result<(), RuntimeError> {
         match by {
+            AnyIntegrator::Splitting(_) | AnyIntegrator::Discrete(Method::Strang) if is_forced => {
+                Err(RuntimeError::argument(
+                    "integrator",
+                    format!(
+                        "is \"{by}\", a splitting, which takes no torque; a body with a torque is integrated by a \
+                         Gauss method such as \"gauss_5\""
+                    ),
+                ))
+            }
             AnyIntegrator::Gauss { .. } | AnyIntegrator::Splitting(_) | AnyIntegrator::Discrete(Method::Strang) => {
                 Ok(())
             }

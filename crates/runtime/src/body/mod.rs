@@ -1,5 +1,8 @@
 //! A rigid body about a fixed point.
 
+mod between;
+mod check;
+mod derivatives;
 mod ensemble;
 mod integrator;
 mod momenta;
@@ -11,9 +14,12 @@ mod resume_state;
 mod run;
 mod steps;
 mod system;
+mod torque;
 
+pub use derivatives::BodyDerivatives;
 pub use ensemble::{BodyEnsemble, BodyMember};
 pub use motion::{BodyEvent, BodyMotion};
 pub use outcome::BodyOutcome;
 pub use resume_state::BodyResumeState;
 pub use system::Body;
+pub use torque::BodyTorque;

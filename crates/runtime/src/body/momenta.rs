@@ -6,7 +6,7 @@ use crate::RuntimeError;
 impl Body {
     /// The momenta of the symmetries, which scale by `e^(gamma t)`: those in space about directions that gravity leaves
     /// unchanged, `M1`, `M2`, `M3` or `gravity . M`; and that in the body about an axis on which the centre of mass is
-    /// and about which the moments of inertia are equal, such as `Pi3`.
+    /// and about which the moments of inertia are equal, such as `Pi3`. With a torque there are none.
     ///
     /// ```
     /// use herglotz_runtime::Body;
@@ -20,6 +20,9 @@ impl Body {
     /// Those of [`lagrangian`](Self::lagrangian).
     pub fn momenta(&self) -> Result<Vec<String>, RuntimeError> {
         let lagrangian = self.lagrangian()?;
+        if self.torque.is_some() {
+            return Ok(Vec::new());
+        }
         let about_point = lagrangian.mass();
         let inertia = |i: usize, j: usize| about_point[(i, j)];
         let acts = self.mass != 0.0;

@@ -1,6 +1,6 @@
 //! Runs of rigid bodies.
 
-use super::integrator::BodyIntegrator;
+use super::integrator::{BodyIntegrator, ForcedBody};
 use super::observer::{EventValues, Halt, Observer, Rows};
 use super::resume_state::fingerprint;
 use super::steps::of_integrator;
@@ -30,9 +30,10 @@ impl Body {
         if let Some(OutputTimes::Every(0)) = motion.rows {
             return Err(RuntimeError::argument("every", "is 0; it must be at least 1"));
         }
-        let (by, steps, error_estimate) = motion.steps(&lagrangian, &state)?;
+        let body = ForcedBody { lagrangian, force: self.torque.clone() };
+        let (by, steps, error_estimate) = motion.steps(&body, &state)?;
         let step_size = (motion.end - motion.t) / steps as f64;
-        let integrator = BodyIntegrator::new(lagrangian, by, step_size).map_err(|error| of_integrator(&error))?;
+        let integrator = BodyIntegrator::new(&body, by, step_size).map_err(|error| of_integrator(&error))?;
         // A step that turns the body beyond the chart is refused before work starts.
         if let Err(error @ GroupError::BeyondChart { .. }) = state.clone().advance(&integrator, 1) {
             return Err(of_integrator(&error));

@@ -1,9 +1,9 @@
 //! The steps and the start of a motion of a rigid body.
 
 use super::BodyMotion;
-use super::integrator::{BodyIntegrator, DEFAULT};
+use super::integrator::{BodyIntegrator, ForcedBody};
 use crate::{RuntimeError, StepControl};
-use contact_geom::groups::{GroupError, RigidBody, Rotation, Rotations, UniformGravity};
+use contact_geom::groups::{GroupError, GroupForce, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::groups::{GroupMotion, GroupState, group_steps};
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
@@ -15,9 +15,10 @@ impl BodyMotion {
     /// The number of steps and the integrator; for an accuracy, by trial runs, with the bound of the error.
     pub(super) fn steps(
         &self,
-        lagrangian: &RigidBody<UniformGravity, 3>,
+        body: &ForcedBody,
         start: &GroupMotion<Rotations, 3>,
     ) -> Result<(AnyIntegrator, usize, Option<f64>), RuntimeError> {
+        let is_forced = body.force.acts();
         let span = self.end - self.t;
         if !(span != 0.0 && span.is_finite()) {
             let why = format!(
@@ -28,15 +29,15 @@ impl BodyMotion {
         }
         match self.step_control {
             StepControl::Accuracy { error, by } => {
-                let by = by.unwrap_or(DEFAULT);
-                BodyIntegrator::check(by)?;
+                let by = by.unwrap_or(BodyIntegrator::default_for(is_forced));
+                BodyIntegrator::check(by, is_forced)?;
                 if !(error > 0.0 && error.is_finite()) {
                     return Err(RuntimeError::argument(
                         "accuracy",
                         format!("is {error}; it must be a positive number"),
                     ));
                 }
-                let method = |h: f64| BodyIntegrator::new(*lagrangian, by, h);
+                let method = |h: f64| BodyIntegrator::new(body, by, h);
                 let found = group_steps(start, span, error, FIRST_STEPS, method);
                 let found = found.map_err(|error| match error {
                     GroupError::Accuracy { .. } => RuntimeError::argument("accuracy", format!("is refused: {error}")),
@@ -46,7 +47,7 @@ impl BodyMotion {
             }
             StepControl::Steps { steps: Steps::Count(0), .. } => Err(InputError::NoSteps.into()),
             StepControl::Steps { by, steps } => {
-                BodyIntegrator::check(by)?;
+                BodyIntegrator::check(by, is_forced)?;
                 let count = match steps {
                     Steps::Count(count) => count as f64,
                     Steps::Size(h) if h > 0.0 && h.is_finite() => {

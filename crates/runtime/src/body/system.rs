@@ -1,5 +1,6 @@
 //! A rigid body about a fixed point, with gravity and linear drag.
 
+use super::BodyTorque;
 use crate::RuntimeError;
 use contact_geom::groups::{Inertia, RigidBody, UniformGravity};
 use contact_geom::nalgebra::{Matrix3, Vector3};
@@ -10,6 +11,7 @@ use contact_geom::nalgebra::{Matrix3, Vector3};
 ///
 /// with the attitude R, the angular velocity omega in the body, and the inertia `J = I + m (|X|^2 1 - X X^T)` about the
 /// fixed point. Momenta scale by `e^(gamma t)` where they are conserved without drag; gamma is negative for dissipation.
+/// A torque that has no potential may act besides.
 ///
 /// ```
 /// use herglotz_runtime::{Body, BodyMotion, StepControl};
@@ -20,7 +22,7 @@ use contact_geom::nalgebra::{Matrix3, Vector3};
 /// assert!((outcome.momentum[0] - 0.32881708137).abs() < 1e-9);
 /// # Ok::<(), herglotz_runtime::RuntimeError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// The inertia tensor I about the centre of mass, in the body.
     pub inertia: [[f64; 3]; 3],
@@ -32,12 +34,21 @@ pub struct Body {
     pub gravity: [f64; 3],
     /// The rate gamma.
     pub gamma: f64,
+    /// A torque that has no potential.
+    pub torque: Option<BodyTorque>,
 }
 
 impl Default for Body {
     /// A ball with the moment of inertia 1 about its centre of mass, which is fixed.
     fn default() -> Self {
-        Body { inertia: Body::principal([1.0; 3]), mass: 0.0, centre: [0.0; 3], gravity: [0.0; 3], gamma: 0.0 }
+        Body {
+            inertia: Body::principal([1.0; 3]),
+            mass: 0.0,
+            centre: [0.0; 3],
+            gravity: [0.0; 3],
+            gamma: 0.0,
+            torque: None,
+        }
     }
 }
 
@@ -53,12 +64,12 @@ impl Body {
         if self.centre == [0.0; 3] { [0.0, 0.0, 1.0] } else { self.centre }
     }
 
-    /// The Lagrangian.
+    /// The Lagrangian, without the torque.
     ///
     /// # Errors
     /// [`RuntimeError::Argument`] and [`RuntimeError::NotFinite`] with the field.
     pub fn lagrangian(&self) -> Result<RigidBody<UniformGravity, 3>, RuntimeError> {
-        let Body { inertia, mass, centre, gravity, gamma } = *self;
+        let Body { inertia, mass, centre, gravity, gamma, .. } = *self;
         let numbers = |what: &str, x: &[f64; 3]| match x.iter().enumerate().find(|(_, x)| !x.is_finite()) {
             Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
             None => Ok(()),
