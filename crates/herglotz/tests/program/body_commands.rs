@@ -8,6 +8,9 @@ fn of_json(printed: &str) -> serde_json::Value {
     serde_json::from_str(printed).unwrap()
 }
 
+/// Values that are set, and the replacements in the file that they stand for.
+type Case<'c> = (&'c [&'c str], &'c [(&'c str, &'c str)]);
+
 /// The top for a second, without an event that ends it.
 fn whole_second() -> String {
     TOP.replace(", terminal = true", "")
@@ -26,7 +29,7 @@ fn values_of_bodies_are_set() {
         at.read(&format!("{name}/rows.csv"))
     };
     let original = rows_of("original", &file, &[]);
-    let cases: [(&[&str], &[(&str, &str)]); 8] = [
+    let cases: [Case<'_>; 8] = [
         (&["gamma=-0.2"], &[("gamma = -0.1", "gamma = -0.2")]),
         (&["mass=14"], &[("mass = 15.0", "mass = 14.0")]),
         (&["inertia2=0.4"], &[("0.46875", "0.4")]),
