@@ -22,19 +22,16 @@ pub(super) fn row_of_event(scene: &BodyScene, crossing: &Crossing) -> Vec<String
     [name].into_iter().chain(crossing.columns.iter().map(|x| exact(*x))).collect()
 }
 
-/// The first rows of rows.csv as rows of all columns; those that are not in the file are NaN.
-fn rows_before(scene: &BodyScene, directory: &Directory, count: usize) -> Result<Vec<Vec<f64>>, Failure> {
-    let read = read_numbers(&directory.file(ROWS))?;
-    let whole = |numbers: &Vec<f64>| {
-        let mut row = vec![f64::NAN; Body::COLUMNS.len()];
-        for (k, x) in scene.columns.iter().zip(numbers) {
-            if let Some(entry) = row.get_mut(*k) {
-                *entry = *x;
-            }
-        }
-        row
+/// The rows of a file as rows of all columns, where the file has all of them.
+fn whole_rows(scene: &BodyScene, directory: &Directory) -> Result<Vec<Vec<f64>>, Failure> {
+    let place = |k: usize| scene.columns.iter().position(|column| *column == k);
+    let Some(places) = (0..Body::COLUMNS.len()).map(place).collect::<Option<Vec<usize>>>() else {
+        eprintln!("warning: rows.csv has not all columns, so that the figures show the rest of the motion only");
+        return Ok(Vec::new());
     };
-    Ok(read.iter().take(count).map(whole).collect())
+    let read = read_numbers(&directory.file(ROWS))?;
+    let whole = |numbers: &Vec<f64>| places.iter().map(|k| numbers.get(*k).copied().unwrap_or(f64::NAN)).collect();
+    Ok(read.iter().map(whole).collect())
 }
 
 impl Run {
@@ -58,15 +55,16 @@ impl Run {
         let headers =
             Headers { rows: scene.columns.iter().filter_map(name).collect(), events: header_of_events(&scene) };
         let row_of_event = |crossing: &Crossing| row_of_event(&scene, crossing);
-        let before = match &saved {
-            Some(saved) if self.plot => rows_before(&scene, &directory, saved.written.rows)?,
-            _ => Vec::new(),
-        };
         let mut writer = RunWriter::new(&directory, &headers, saved.as_ref(), !self.json)?;
         writer.columns = Some(&scene.columns);
         writer.row_of_event = &row_of_event;
         writer.interrupt_at = self.interrupt_at;
-        writer.kept = self.plot.then_some(before);
+        // The file ends where the motion is resumed.
+        writer.kept = match &saved {
+            _ if !self.plot => None,
+            Some(_) => Some(whole_rows(&scene, &directory)?),
+            None => Some(Vec::new()),
+        };
         let every = Duration::from_secs(self.checkpoint_every.into());
         writer.checkpoints = Some(CheckpointWriter::new(&directory, scene.fingerprint(), &plan, every));
         if saved.is_none() {

@@ -159,9 +159,13 @@ impl GroupObserver<Rotations, 3> for Observer<'_> {
     fn poll(&mut self, taken: usize) -> ControlFlow<()> {
         self.taken = self.before + taken;
         // All of them begin the next step.
-        let is_clear = self.events.iter().fold(true, |clear, values| values.is_clear() && clear);
+        let is_clear = self.events.iter().filter(|values| !values.is_clear()).count() == 0;
         if self.taken.is_multiple_of(STEPS_BETWEEN_POLLS) {
             if self.monitor.poll(self.taken as f64 / self.count as f64).is_break() {
+                // None of the steps since the last poll could be saved: the run ends without a state.
+                if self.requested == Some(Halt::Interrupted) && self.taken < self.count {
+                    return ControlFlow::Break(());
+                }
                 self.requested = Some(Halt::Interrupted);
             } else if self.requested.is_none() && self.monitor.wants_checkpoint() {
                 self.requested = Some(Halt::Checkpoint);
