@@ -244,3 +244,48 @@ fn bodies_are_swept() {
     let (code, told) = fail(&["sweep", &scene("heavy_top"), "--out", &at.path("refused")]);
     assert!(code == Some(2) && told.contains("no swept values"), "{told}");
 }
+
+/// The steps of bodies are contact transformations, their momenta have their predictions, and a torque is told.
+#[test]
+fn bodies_are_checked() {
+    for (name, momenta) in [("heavy_top", 2), ("free_body", 3)] {
+        let check = of_json(&succeed(&["check", &scene(name), "--places", "5", "--json"]));
+        assert!(check["contact"] == true && check["places"].as_array().unwrap().len() == 5, "{check}");
+        assert!(check["contact_defect"].as_f64().unwrap() < 1e-11, "{check}");
+        assert!(check["momentum_defect"].as_f64().unwrap() < 1e-13, "{check}");
+        assert_eq!(check["places"][4]["momenta"].as_array().unwrap().len(), momenta, "{check}");
+    }
+    let told = succeed(&["check", &scene("free_body")]);
+    assert!(told.contains("contact: the pullback of dz - Pi . (R^-1 dR) by a step of"), "{told}");
+    let (code, told) = fail(&["check", &scene("free_body"), "--lyapunov"]);
+    assert!(code == Some(2) && told.contains("--lyapunov"), "{told}");
+}
+
+/// A torque in a scene: about a principal axis the angular velocity decays in closed form.
+#[test]
+fn torques_of_bodies() {
+    let at = Directory::new("body_torque");
+    let text = "[body]\ninertia = [1.0, 2.0, 3.0]\ngamma = -0.1\ntorque = [\"0\", \"0\", \"-0.6*omega3\"]\n\
+                [start]\nomega = [0.0, 0.0, 2.0]\n[run]\ntime = 3.0\naccuracy = 1e-11\n[want]\nrows = { every = 1.0 }\n";
+    let file = at.write("braked.toml", text);
+    succeed(&["run", &file, "--out", &at.path("out")]);
+    let rows = at.read("out/rows.csv");
+    for (t, omega) in column(&rows, "t").into_iter().zip(column(&rows, "omega3")) {
+        assert!((omega - 2.0 * (-0.3 * t).exp()).abs() < 1e-10, "{t}: {omega}");
+    }
+    let check = of_json(&succeed(&["check", &file, "--json"]));
+    assert!(check["contact"] == false && check["contact_defect"].as_f64().unwrap() > 1e-6, "{check}");
+    assert!(succeed(&["plan", &file]).contains("torque: 0, 0, -0.6*omega3 in the body"));
+    for (torque, expected) in [
+        ("[\"0\", \"0\", \"-0.6*omega4\"]", "`torque`"),
+        ("[\"0\", \"0\", \"energy\"]", "`energy`"),
+        ("[\"0\", \"0\"]", "torque"),
+    ] {
+        let wrong = at.write("wrong.toml", &text.replace("[\"0\", \"0\", \"-0.6*omega3\"]", torque));
+        let (code, told) = fail(&["run", &wrong, "--out", &at.path("wrong")]);
+        assert!(code == Some(2) && told.contains(expected), "{torque}: {told}");
+    }
+    let split = at.write("split.toml", &text.replace("accuracy = 1e-11", "integrator = \"suzuki_4\"\nsteps = 10"));
+    let (code, told) = fail(&["run", &split, "--out", &at.path("split")]);
+    assert!(code == Some(2) && told.contains("takes no torque"), "{told}");
+}
