@@ -5,10 +5,11 @@ use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::groups::{GroupError, Inertia, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, numbers::MaxAbsOrNan};
 use discrete_herglotz::SplittingScheme;
 use discrete_herglotz::groups::{
-    GroupEnds, GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun, GroupState, RigidBodySplitting,
-    group_steps,
+    DenseGroupMotion, GroupDerivatives, GroupEnds, GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun,
+    GroupState, RigidBodySplitting, group_steps,
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -26,6 +27,13 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest {
         entries: &[
+            "DenseGroupMotion::at",
+            "DenseGroupMotion::new",
+            "DenseGroupMotion::span",
+            "GroupDerivatives::contact_defect",
+            "GroupDerivatives::gradients",
+            "GroupDerivatives::new",
+            "GroupDerivatives::with_parameters",
             "GroupEnds::search",
             "GroupIntegrator::step_by",
             "GroupMotion::advance_by",
@@ -110,6 +118,12 @@ fn methods(report: &mut Report) {
     report.check(named, || "a Nyström scheme for a body without symmetry".into());
 }
 
+/// The momentum and the action of a state, which is checked.
+fn numbers_of(state: &GroupState<Rotations, 3>) -> Result<Vec<f64>, GroupError> {
+    state.check()?;
+    Ok(state.momentum.iter().copied().chain([state.z]).collect())
+}
+
 /// Steps of other lengths, times of rows, saved numbers, spans and accuracies.
 fn runs(report: &mut Report) {
     let method = |h: f64| body(-0.1).and_then(|body| GroupGauss::new::<Rotations, 3>(body, 3, h));
@@ -118,9 +132,9 @@ fn runs(report: &mut Report) {
         return report.check(false, || "good methods and starts are refused".into());
     };
     let numbers = |motion: &GroupMotion<Rotations, 3>| -> Result<Vec<f64>, GroupError> {
-        let end = motion.state();
-        end.check()?;
-        Ok(end.momentum.iter().copied().chain([end.z, motion.t()]).collect())
+        let mut all = numbers_of(&motion.state())?;
+        all.push(motion.t());
+        Ok(all)
     };
     for value in EXTREME {
         let mut moved = motion.clone();
@@ -143,6 +157,24 @@ fn runs(report: &mut Report) {
                 found.map(|found| vec![found.residual, found.start.momentum.sum(), found.end.z]),
             );
         }
+        for i in 0..8 {
+            let c: [f64; 8] = std::array::from_fn(|j| if i == j { value } else { GOOD[j] });
+            let numbers = |found: GroupDerivatives<Rotations, 3>| {
+                let (at_start, in_parameters) = found.gradients(&ChartVector::from_fn(|_| 1.0));
+                let all = found.in_start.iter().chain(in_parameters.iter()).copied();
+                all.chain([at_start.max_abs_or_nan(), found.contact_defect(), found.log_factor]).collect::<Vec<_>>()
+            };
+            let found = GroupDerivatives::with_parameters(&gauss, 0.0, &start(c), 3);
+            report.entry_point(&c.to_vec(), found.map(numbers));
+            let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(c), 3);
+            report.entry_point(&c.to_vec(), dense.and_then(|dense| numbers_of(&dense.at(0.07)?)));
+        }
+        let found = GroupDerivatives::new(&gauss, value, &start(GOOD), 3);
+        report.entry_point(&value, found.map(|found| found.in_start.iter().copied().collect::<Vec<_>>()));
+        let dense = DenseGroupMotion::new(gauss.clone(), value, &start(GOOD), 3);
+        report.entry_point(&value, dense.map(|dense| dense.span().to_vec()));
+        let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(GOOD), 3);
+        report.entry_point(&value, dense.and_then(|dense| numbers_of(&dense.at(value)?)));
         let ends = GroupEnds::<Rotations, 3> { t0: value, g0: start(GOOD).g, g1: start(GOOD).g, z0: 0.0, steps: 3 };
         report.entry_point(&value, ends.search(&gauss, &start(GOOD).momentum).map(|found| vec![found.residual]));
         // The last three numbers are a velocity, which need not be known.
