@@ -11,12 +11,12 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
 
 /// Constraints `omega(q) v = 0` on the velocities as an [`Integrator`] of a [`Problem`]: each step solves the discrete
-/// Lagrange-d'Alembert-Herglotz equations of [`Nonholonomic`] for a symmetric rule of order 2, composed by a scheme. The
-/// order is that of the scheme.
+/// Lagrange-d'Alembert-Herglotz equations of [`Nonholonomic`] for a symmetric rule of order 2, composed by a scheme.
+/// The order is that of the scheme.
 ///
-/// Runs have rows, events, dense output, checkpoints, a plan and an accuracy as without constraints. The velocity of the
-/// start lies in the distribution; [`Nonholonomic::new`] projects one that does not. An accuracy is met by runs with
-/// steps that are halved until they agree.
+/// Runs have rows, events, dense output, checkpoints, a plan and an accuracy as without constraints. The velocity of
+/// the start lies in the distribution; [`Nonholonomic::new`] projects one that does not. An accuracy is met by runs
+/// with steps that are halved until they agree.
 ///
 /// The motion is not conformally contact. The conformal factor of a run, `sigma = exp(integral of L_z)`, multiplies the
 /// energy of an autonomous L, and the momenta of horizontal symmetries, `omega(q) xi_Q = 0`, alone: those of other

@@ -29,6 +29,8 @@ use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoi
 /// - the energy follows `E' = L_z E` with the order of the method;
 /// - the flow is not conformally contact: no method for nonholonomic motions is, since the motions themselves are not.
 ///
+/// [`LagrangeDAlembert`](super::LagrangeDAlembert) makes runs of these steps.
+///
 /// Reference: paper, section 4; Cortes and Martinez, Nonlinearity 14 (2001) 1365-1392; McLachlan and Perlmutter,
 /// J. Nonlinear Sci. 16 (2006) 283-328, for reversible discrete constraints.
 ///

@@ -24,7 +24,7 @@ impl<const N: usize, T> Vary<N, T> for Unvaried {
     fn add(&mut self, _: f64, _: &VelocityPoint<N, T>, _: &mut T, _: &mut ChartVector<N, T>) {}
 }
 
-/// The Lagrangian with a variation of first order, if there is one: its value and its gradient are added to derivatives.
+/// The Lagrangian with a variation of first order, if there is one: its value and gradient are added to derivatives.
 pub(super) struct Varied<'v, const N: usize>(
     pub Option<&'v mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)>,
 );

@@ -29,8 +29,8 @@ pub struct MethodInfo {
     /// Whether the motion is under constraints, so that it is not the free motion of the Lagrangian.
     pub constrained: bool,
     /// Whether its steps are conformally contact, `Phi^* eta = sigma_d eta`, for a Lagrangian without forces. They are
-    /// not where the exact flow is not, under constraints on velocities: `sigma_d` multiplies the energy and some momenta
-    /// then, but not the contact form.
+    /// not where the exact flow is not, under constraints on velocities: `sigma_d` multiplies the energy and some
+    /// momenta then, but not the contact form.
     pub contact: bool,
     /// Whether it subdivides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
     pub divides: bool,
@@ -138,9 +138,9 @@ pub trait Integrator<'a, L, const N: usize> {
         Ok(None)
     }
 
-    /// The derivative of the state `(q, p, z)` at the end of a step, for a fixed start, along a variation `delta L` of the
-    /// Lagrangian, which is given by its value and its partial derivatives in `(q, v, z)` at points; those in q contain the
-    /// variation of an applied force. The step is given as in [`step_jacobian`](Self::step_jacobian). Derivatives in
+    /// The derivative of the state `(q, p, z)` at the end of a step, for a fixed start, along a variation `delta L` of
+    /// the Lagrangian, which is given by its value and its partial derivatives in `(q, v, z)` at points; those in q
+    /// contain the variation of an applied force. The step is given as in [`step_jacobian`](Self::step_jacobian). Derivatives in
     /// parameters follow, `delta L = L_theta`; in the time, `delta L = L_t`; and in the step size h, since a step with
     /// `(1 + e) h` is one with h of `L + e (L - v . L_v + (s - t) L_t)` at the times s. The default is `None`.
     ///

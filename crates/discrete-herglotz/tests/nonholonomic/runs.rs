@@ -1,5 +1,5 @@
-//! Nonholonomic motions as runs: an accuracy, rows, events, checkpoints, momenta, the force of the constraints, and what
-//! is refused.
+//! Nonholonomic motions as runs: an accuracy, rows, events, checkpoints, momenta, the force of the constraints, and
+//! what is refused.
 
 use super::sleigh;
 use contact_geom::constraints::Distribution;
@@ -10,8 +10,8 @@ use contact_geom::{Force, Forced, Scalar, Symmetry, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, LagrangeDAlembert, Nonholonomic};
 use discrete_herglotz::rules::{Method, Midpoint};
 use discrete_herglotz::{
-    Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Problem, ResumeState, Rows, SelectionFailure,
-    SplittingScheme, Status, StepView, Steps, Stop, Until,
+    Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Problem, ResumeState, Rows, SplittingScheme,
+    Status, StepView, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -70,8 +70,8 @@ fn edge_at(t: f64) -> [[f64; 3]; 2] {
     [[x, y, turned], [SLOPE * s * c / w, SLOPE * s * s / w, w]]
 }
 
-/// Runs meet their accuracy: at their end, at rows, and at events, where the edge crosses a line across the slope and where
-/// the sleigh has a given heading, by the closed forms.
+/// Runs meet their accuracy: at their end, at rows, and at events, where the edge crosses a line across the slope and
+/// where the sleigh has a given heading, by the closed forms.
 #[test]
 fn an_accuracy_is_met() {
     let until = Until::Time(4.0);
@@ -196,7 +196,8 @@ fn force_of_the_constraints() {
         let mu = across(&x.q, by.constraint_force(&blade, t, &x).unwrap());
         assert!((mu - 2.0 * SLOPE * q[2].sin()).abs() < 16.0 * f64::EPSILON, "{mu}");
 
-        // The acceleration across the blade of the centre of mass, at the distance 1, is w' + u w = u w/2, for any drag.
+        // The acceleration across the blade of the centre of mass, at the distance 1, is w' + u w = u w/2; drag, which
+        // adds to w' and to the force, cancels.
         let blade = damped_sleigh(-0.1);
         let by = LagrangeDAlembert::<_, 1>::new(&blade, SplittingScheme::STRANG);
         let [u, w, heading] = sleigh(-0.1, t, INVARIANT, PHASE);
@@ -226,8 +227,8 @@ fn what_does_not_apply_is_refused() {
         problem.by(LagrangeDAlembert::<_, 1>::new(&blade, scheme)).steps(Steps::Count(10)).run(Until::Time(0.5)).err()
     };
     let off = refused(VelocityPoint::new([0.0; 3], [0.0, 0.1, 1.0], 0.0), SCHEMES[0]);
-    let named = matches!(off, Some(InputError::Constraint(ConstraintError::OffVelocity { distance })) if (distance - 0.1).abs() < 1e-15);
-    assert!(named, "{off:?}");
+    let Some(InputError::Constraint(ConstraintError::OffVelocity { distance })) = off else { panic!("{off:?}") };
+    assert!((distance - 0.1).abs() < 1e-15, "{distance}");
     let nystrom = SplittingScheme::ALL.into_iter().find(SplittingScheme::is_nystrom).unwrap();
     assert!(matches!(refused(start(&blade), nystrom), Some(InputError::Hypothesis { .. })));
     // Compositions of a rule that is not symmetric have order one.
@@ -251,6 +252,5 @@ fn what_does_not_apply_is_refused() {
     let problem = Problem::new(&blade, 0.0, start(&blade)).unwrap();
     let by = LagrangeDAlembert::<_, 1>::new(&blade, SCHEMES[1]);
     let missed = problem.by(by).accuracy(1e-17).run(Until::Time(0.5)).err();
-    let round_off = |cause: &SelectionFailure| matches!(cause, SelectionFailure::RoundOff);
-    assert!(matches!(&missed, Some(InputError::Accuracy { cause, .. }) if round_off(cause)), "{missed:?}");
+    assert!(matches!(missed, Some(InputError::Accuracy { .. })), "{missed:?}");
 }

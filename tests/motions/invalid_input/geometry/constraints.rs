@@ -59,7 +59,7 @@ fn distribution(report: &mut Report) {
             let input = vec![c[2], c[3], c[4], c[5]];
             report.formula(&input, fine((rates, slopes)));
             let motion = nonholonomic_motion(&sleigh, &sleigh, 0.0, &VelocityPoint { q, v, z: 0.1 });
-            report.entry_point(&c.to_vec(), motion.map(|motion| (motion.acceleration, motion.multipliers)));
+            report.formula(&input, motion.map(|motion| (motion.acceleration, motion.multipliers)));
         }
     }
 }
