@@ -47,7 +47,7 @@ pub mod hamiltonian {
 pub mod constraints {
     pub use crate::dynamics::constraint::{
         ConstrainedMotion, Constraint, ConstraintDerivatives, Distribution, DistributionDerivatives, Redundancy,
-        constrained_motion,
+        constrained_motion, nonholonomic_motion,
     };
 }
 

@@ -5,6 +5,8 @@
 #![deny(clippy::disallowed_methods)]
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+#[path = "constraints/derivatives.rs"]
+mod derivatives;
 #[path = "constraints/runs.rs"]
 mod runs;
 

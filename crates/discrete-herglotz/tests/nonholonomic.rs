@@ -4,6 +4,9 @@
 #![deny(clippy::disallowed_methods)]
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+#[path = "nonholonomic/runs.rs"]
+mod runs;
+
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};

@@ -1,12 +1,13 @@
 //! Methods for holonomic constraints as integrators of runs.
 
 use super::drag_rattle::substeps;
+use super::variation::{Along, Varied};
 use super::{ConstrainedStart, ContactLobatto, DragRattle, OffConstraint};
 use crate::integration::{StepFormula, check_kicks};
 use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{ChartVector, Dual, Lagrangian, PhasePoint, VelocityPoint};
 
 /// A method for motions under holonomic constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +27,7 @@ pub enum ConstrainedMethod {
 /// The start of the problem satisfies the constraints: [`ConstrainedStart::resolved`] projects one that does not. An
 /// accuracy is met by runs with steps that are halved until they agree, since collocation, the reference for other
 /// integrators, knows no constraints. The derivative of the motion in its start holds along vectors that are tangent to
-/// the constraints.
+/// the constraints; those in parameters, in the time and in the step size hold for a start that satisfies them.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
@@ -56,9 +57,6 @@ impl<C, const M: usize> Constrained<C, M> {
         Constrained { constraint, method, redundancy: Redundancy::Refuse }
     }
 }
-
-/// A number with one derivative.
-type Along = Dual<f64, SVector<f64, 1>>;
 
 impl<C, const M: usize> Constrained<C, M> {
     /// The start of the steps of a problem.
@@ -134,7 +132,7 @@ where
     }
 
     fn step_formula(&self) -> Option<StepFormula> {
-        Some(StepFormula::Jacobian)
+        Some(StepFormula::Derivatives)
     }
 
     fn step_jacobian(
@@ -143,38 +141,70 @@ where
         h: f64,
         (t, from, _): (f64, &PhasePoint<N>, &PhasePoint<N>),
     ) -> Result<Option<DMatrix<f64>>, StepError> {
-        let x = crate::theory::legendre_inverse(problem.lagrangian, t, from, &problem.start.v)?;
-        let start = self.start(t, x);
-        let (of, constraint) = (crate::error::step_error, &self.constraint);
-        match self.method {
-            ConstrainedMethod::Rattle(scheme) => {
-                let motion = DragRattle::of(problem.lagrangian, constraint, &scheme, h, &start).map_err(of)?;
-                by_columns(from, |x| Ok(motion.step(t, x)?.end))
-            }
-            ConstrainedMethod::Lobatto { stages } => {
-                let motion = ContactLobatto::of(problem.lagrangian, constraint, stages, h, &start).map_err(of)?;
-                by_columns(from, |along| Ok(motion.step(t, along, &x.v)?.end))
-            }
+        let step = self.differentiated(problem, h, (t, from))?;
+        let mut jacobian = DMatrix::zeros(2 * N + 1, 2 * N + 1);
+        for k in 0..=2 * N {
+            let slope = step(Some(k), &mut Varied(None))?;
+            let entries = slope.x.iter().chain(&slope.y).chain([&slope.z]);
+            entries.enumerate().for_each(|(i, entry)| jacobian[(i, k)] = *entry);
         }
-        .map(Some)
+        Ok(Some(jacobian))
+    }
+
+    fn step_variation(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        (t, from, _): (f64, &PhasePoint<N>, &PhasePoint<N>),
+        variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
+    ) -> Result<Option<ChartVector<N>>, StepError> {
+        self.differentiated(problem, h, (t, from))?(None, &mut Varied(Some(variation))).map(Some)
     }
 }
 
-/// The derivative of a map of states, one column after the other.
-fn by_columns<const N: usize>(
-    at: &PhasePoint<N>,
-    map: impl Fn(&PhasePoint<N, Along>) -> Result<PhasePoint<N, Along>, StepError>,
-) -> Result<DMatrix<f64>, StepError> {
-    let mut jacobian = DMatrix::zeros(2 * N + 1, 2 * N + 1);
-    for k in 0..=2 * N {
-        let number = |i: usize, re: f64| Dual { re, d: SVector::<f64, 1>::new(if i == k { 1.0 } else { 0.0 }) };
-        let end = map(&PhasePoint {
-            q: SVector::from_fn(|i, _| number(i, at.q[i])),
-            p: SVector::from_fn(|i, _| number(N + i, at.p[i])),
-            z: number(2 * N, at.z),
-        })?;
-        let slopes = end.q.iter().chain(&end.p).chain([&end.z]).map(|x| x.d[0]);
-        slopes.enumerate().for_each(|(i, slope)| jacobian[(i, k)] = slope);
+/// The derivative of the end of a step along a coordinate of its start, in the order q, p, z, if one is given, and a
+/// variation of L.
+type StepDerivative<'s, const N: usize> =
+    Box<dyn Fn(Option<usize>, &mut Varied<'_, N>) -> Result<ChartVector<N>, StepError> + 's>;
+
+impl<C, const M: usize> Constrained<C, M> {
+    /// The derivative of a step that starts at a time and a state.
+    fn differentiated<'s, 'a: 's, L: Lagrangian<N>, const N: usize>(
+        &'s self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        (t, from): (f64, &'s PhasePoint<N>),
+    ) -> Result<StepDerivative<'s, N>, StepError>
+    where
+        C: Constraint<N, M>,
+    {
+        let x = crate::theory::legendre_inverse(problem.lagrangian, t, from, &problem.start.v)?;
+        let start = self.start(t, x);
+        let (of, constraint) = (crate::error::step_error, &self.constraint);
+        Ok(match self.method {
+            ConstrainedMethod::Rattle(scheme) => {
+                let motion = DragRattle::of(problem.lagrangian, constraint, &scheme, h, &start).map_err(of)?;
+                Box::new(move |k, vary| Ok(slope(&motion.step_varied(t, &moving(from, k), vary)?.end)))
+            }
+            ConstrainedMethod::Lobatto { stages } => {
+                let motion = ContactLobatto::of(problem.lagrangian, constraint, stages, h, &start).map_err(of)?;
+                Box::new(move |k, vary| Ok(slope(&motion.step_varied(t, &moving(from, k), &x.v, vary)?.end)))
+            }
+        })
     }
-    Ok(jacobian)
+}
+
+/// A state with the derivative one in a coordinate, if one is given.
+fn moving<const N: usize>(at: &PhasePoint<N>, k: Option<usize>) -> PhasePoint<N, Along> {
+    let number = |i: usize, re: f64| Dual { re, d: SVector::<f64, 1>::new(f64::from(u8::from(Some(i) == k))) };
+    PhasePoint {
+        q: SVector::from_fn(|i, _| number(i, at.q[i])),
+        p: SVector::from_fn(|i, _| number(N + i, at.p[i])),
+        z: number(2 * N, at.z),
+    }
+}
+
+/// The derivatives of a state.
+fn slope<const N: usize>(x: &PhasePoint<N, Along>) -> ChartVector<N> {
+    ChartVector { x: x.q.map(|q| q.d[0]), y: x.p.map(|p| p.d[0]), z: x.z.d[0] }
 }

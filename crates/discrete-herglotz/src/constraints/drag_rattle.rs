@@ -1,6 +1,7 @@
 //! RATTLE with a linear drag, and its compositions.
 
 use super::start::inverse_mass;
+use super::variation::{Unvaried, Vary};
 use super::{ConstrainedStart, Corrections, Progress};
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
@@ -10,7 +11,7 @@ use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivat
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
-use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// RATTLE between two halves of a linear drag, `D_(h/2) o RATTLE_h o D_(h/2)`, and its symmetric compositions of order
 /// up to 10, for `L = v.Mv/2 - V(t, q) + gamma z` on `c(q) = 0`, with the current state.
@@ -123,35 +124,70 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
     /// # Errors
     /// [`StepError`]: the multipliers are not found, the constraints are dependent, or a value is not finite.
     pub fn step<T: Scalar>(&self, t: f64, from: &PhasePoint<N, T>) -> Result<RattleStep<N, M, T>, StepError> {
+        self.step_varied(t, from, &mut Unvaried)
+    }
+
+    /// The same step of a Lagrangian whose variation has the same form: of M, V and gamma.
+    pub(super) fn step_varied<T: Scalar, V: Vary<N, T>>(
+        &self,
+        t: f64,
+        from: &PhasePoint<N, T>,
+        vary: &mut V,
+    ) -> Result<RattleStep<N, M, T>, StepError> {
         let mut step = RattleStep { end: *from, impulse: SVector::from_fn(|_, _| T::zero()) };
+        let mut gamma = T::from(self.gamma);
+        if const { V::VARIES } {
+            gamma += varied(vary, t, &rest(&from.q)).1.z;
+        }
         let mut time = t;
         for g in &self.substeps {
             let h = g * self.h;
-            self.drag(0.5 * h, &mut step.end);
-            self.rattle(time, h, &mut step)?;
-            self.drag(0.5 * h, &mut step.end);
+            drag(gamma * (0.5 * h), &mut step.end);
+            self.rattle(time, h, &mut step, vary)?;
+            drag(gamma * (0.5 * h), &mut step.end);
             time += h;
         }
         Ok(step)
     }
 
-    /// The flow of the drag.
-    fn drag<T: Scalar>(&self, h: f64, x: &mut PhasePoint<N, T>) {
-        let damping = (self.gamma * h).exp_m1();
-        x.p = x.p.map(|p| p + p * damping);
-        x.z += x.z * damping;
+    /// `-V` and `-V_q` at a position.
+    fn kick<T: Scalar, V: Vary<N, T>>(&self, t: f64, q: &SVector<T, N>, vary: &mut V) -> (T, SVector<T, N>) {
+        let at = rest(q);
+        let (mut value, mut force) = self.form.lagrangian.with_force(T::from(t), &at);
+        if const { V::VARIES } {
+            let (l, slope) = varied(vary, t, &at);
+            value += l;
+            force += slope.x;
+        }
+        (value, force)
     }
 
-    /// `-V` and `-V_q` at a position.
-    fn kick<T: Scalar>(&self, t: f64, q: &SVector<T, N>) -> (T, SVector<T, N>) {
-        let rest = VelocityPoint { q: *q, v: SVector::from_fn(|_, _| T::zero()), z: T::zero() };
-        self.form.lagrangian.with_force(T::from(t), &rest)
+    /// The velocity `M^-1 p` at a time and a position.
+    fn velocity<T: Scalar, V: Vary<N, T>>(
+        &self,
+        t: f64,
+        (q, p): (&SVector<T, N>, &SVector<T, N>),
+        vary: &mut V,
+    ) -> SVector<T, N> {
+        let mut v = times(&self.inverse, p);
+        if const { V::VARIES } {
+            // The variation of `M v = p` for a given p.
+            let of_momentum = varied(vary, t, &VelocityPoint { q: *q, v, z: T::zero() }).1.y;
+            v -= times(&self.inverse, &of_momentum);
+        }
+        v
     }
 
     /// RATTLE with the action.
-    fn rattle<T: Scalar>(&self, t: f64, h: f64, step: &mut RattleStep<N, M, T>) -> Result<(), StepError> {
+    fn rattle<T: Scalar, V: Vary<N, T>>(
+        &self,
+        t: f64,
+        h: f64,
+        step: &mut RattleStep<N, M, T>,
+        vary: &mut V,
+    ) -> Result<(), StepError> {
         let PhasePoint { q: q0, mut p, mut z } = step.end;
-        let (value, force) = self.kick(t, &q0);
+        let (value, force) = self.kick(t, &q0, vary);
         let half = T::from(0.5 * h);
         p += force * half;
         z += value * half;
@@ -163,7 +199,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         let mut corrections = Corrections::new();
         let (mut q, mut c, mut g);
         loop {
-            q = q0 + times(&self.inverse, &p) * T::from(h);
+            q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
             (c, g) = self.constraint.with_jacobian(&q);
             let matrix = inverted(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
             mask(&mut c, &kept);
@@ -177,17 +213,17 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
                 break;
             }
         }
-        let v = times(&self.inverse, &p);
+        let v = self.velocity(t, (&q0, &p), vary);
         z += p.dot(&v) * half;
         (_, g) = self.constraint.with_jacobian(&q);
-        let (value, force) = self.kick(t + h, &q);
+        let (value, force) = self.kick(t + h, &q, vary);
         p += force * half;
         z += value * half;
         let real = g.map(|e| e.re());
         let matrix = inverted(restricted(real * self.inverse * real.transpose(), &kept))?;
         // The second pass completes the derivatives of dual numbers, the third removes round-off.
         for _ in 0..3 {
-            let mut normal = g * times(&self.inverse, &p);
+            let mut normal = g * self.velocity(t, (&q, &p), vary);
             mask(&mut normal, &kept);
             let impulse = times(&matrix, &normal);
             p -= g.transpose() * impulse;
@@ -297,6 +333,30 @@ saved!([L, C, const N: usize, const M: usize] DragRattle<L, C, N, M> { taken, st
 pub(super) fn substeps(scheme: &SplittingScheme) -> Result<Vec<f64>, InputError> {
     let hypothesis = "a composition of symmetric steps, not a Nyström splitting";
     scheme.substeps().ok_or(InputError::Hypothesis { hypothesis })
+}
+
+/// The flow of the drag for a product of its rate with a time.
+fn drag<T: Scalar, const N: usize>(rate: T, x: &mut PhasePoint<N, T>) {
+    let damping = rate.exp_m1();
+    x.p = x.p.map(|p| p + p * damping);
+    x.z += x.z * damping;
+}
+
+/// A position at rest, where L is `-V`.
+fn rest<T: Scalar, const N: usize>(q: &SVector<T, N>) -> VelocityPoint<N, T> {
+    VelocityPoint { q: *q, v: SVector::from_fn(|_, _| T::zero()), z: T::zero() }
+}
+
+/// The variation of the value and the gradient of L at a point.
+fn varied<T: Scalar, const N: usize>(
+    vary: &mut impl Vary<N, T>,
+    t: f64,
+    x: &VelocityPoint<N, T>,
+) -> (T, ChartVector<N, T>) {
+    let none = SVector::from_fn(|_, _| T::zero());
+    let (mut value, mut slope) = (T::zero(), ChartVector { x: none, y: none, z: T::zero() });
+    vary.add(t, x, &mut value, &mut slope);
+    (value, slope)
 }
 
 /// The product of a real matrix with a vector of any numbers.

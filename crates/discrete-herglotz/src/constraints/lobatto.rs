@@ -1,14 +1,15 @@
 //! Contact Lobatto IIIA-IIIB methods under holonomic constraints.
 
-use super::linear_system::LinearSystem;
 use super::lobatto_tables::{LobattoTables, STAGES};
+use super::lobatto_workspace::Workspace;
+use super::variation::{Unvaried, Vary};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
 use crate::integration::check_unforced;
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::{InputError, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
-use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
@@ -66,70 +67,6 @@ pub struct LobattoStep<const N: usize, T = f64> {
     pub sigma: T,
 }
 
-/// One stage.
-#[derive(Clone, Copy, Debug)]
-struct Stage<const N: usize, const M: usize, T> {
-    v: SVector<T, N>,
-    rho: T,
-    z: T,
-    /// The impulse of the constraints.
-    y: SVector<T, M>,
-    q: SVector<T, N>,
-    value: T,
-    gradient: ChartVector<N, T>,
-    c: SVector<T, M>,
-    g: SMatrix<T, M, N>,
-    /// `h rho L_q + G^T Y`.
-    force: SVector<T, N>,
-}
-
-/// The memory of a step.
-#[derive(Clone, Debug)]
-struct Workspace<const N: usize, const M: usize, T = f64> {
-    stages: Vec<Stage<N, M, T>>,
-    residual: Vec<T>,
-    system: LinearSystem,
-    /// The residual and the system of the velocity at the end.
-    last_residual: Vec<T>,
-    last_system: LinearSystem,
-    evaluations: u64,
-}
-
-impl<const N: usize, const M: usize, T: Scalar> Workspace<N, M, T> {
-    /// Memory for no stages, which takes the place of that in use; it allocates nothing.
-    fn empty() -> Self {
-        let (system, last_system) = (LinearSystem::new(0), LinearSystem::new(0));
-        let (stages, residual, last_residual) = (Vec::new(), Vec::new(), Vec::new());
-        Workspace { stages, residual, system, last_residual, last_system, evaluations: 0 }
-    }
-
-    fn new(s: usize) -> Self {
-        let zero = T::zero();
-        let (x, y) = (SVector::from_fn(|_, _| zero), SVector::from_fn(|_, _| zero));
-        let stage = Stage {
-            v: x,
-            rho: T::one(),
-            z: zero,
-            y,
-            q: x,
-            value: zero,
-            gradient: ChartVector { x, y: x, z: zero },
-            c: y,
-            g: SMatrix::from_fn(|_, _| zero),
-            force: x,
-        };
-        let n = s * (N + 2) + (s - 1) * M;
-        Workspace {
-            stages: vec![stage; s],
-            residual: vec![zero; n],
-            system: LinearSystem::new(n),
-            last_residual: vec![zero; N + M],
-            last_system: LinearSystem::new(N + M),
-            evaluations: 0,
-        }
-    }
-}
-
 impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> ContactLobatto<L, C, N, M> {
     /// The motion with s stages and steps of the length h from a start.
     ///
@@ -146,7 +83,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     ) -> Result<Self, InputError> {
         let mut motion = Self::of(lagrangian, constraint, stages, h, start)?;
         let mut workspace = motion.workspace.clone();
-        let step = motion.solve(start.t, &motion.state, &motion.velocity, &mut workspace);
+        let step = motion.solve(start.t, &motion.state, &motion.velocity, &mut Unvaried, &mut workspace);
         motion.workspace = workspace;
         motion.workspace.evaluations = 0;
         step.map_err(InputError::FirstStep)?;
@@ -203,7 +140,18 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         from: &PhasePoint<N, T>,
         guess: &SVector<f64, N>,
     ) -> Result<LobattoStep<N, T>, StepError> {
-        self.solve(t, from, guess, &mut Workspace::new(self.tables.b.len()))
+        self.step_varied(t, from, guess, &mut Unvaried)
+    }
+
+    /// The same step of a varied Lagrangian.
+    pub(super) fn step_varied<T: Scalar>(
+        &self,
+        t: f64,
+        from: &PhasePoint<N, T>,
+        guess: &SVector<f64, N>,
+        vary: &mut impl Vary<N, T>,
+    ) -> Result<LobattoStep<N, T>, StepError> {
+        self.solve(t, from, guess, vary, &mut Workspace::new(self.tables.b.len()))
     }
 
     /// The current velocity, with the position and the action.
@@ -234,6 +182,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         t: f64,
         from: &PhasePoint<N, T>,
         guess: &SVector<f64, N>,
+        vary: &mut impl Vary<N, T>,
         work: &mut Workspace<N, M, T>,
     ) -> Result<LobattoStep<N, T>, StepError> {
         let jacobian = self.constraint.with_jacobian(&from.q.map(|q| q.re())).1;
@@ -245,7 +194,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         let mut corrections = Corrections::new();
         let mut progress = Progress::Slow;
         for k in 0.. {
-            self.evaluate(t, from, work);
+            self.evaluate(t, from, vary, work);
             self.residual(from, &kept, work);
             // Two evaluations of the matrix suffice, unless the iteration is slow.
             if k < 2 || progress == Progress::Slow {
@@ -258,12 +207,18 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
                 break;
             }
         }
-        self.evaluate(t, from, work);
-        self.last(t, from, &kept, work)
+        self.evaluate(t, from, vary, work);
+        self.last((t, from), &kept, vary, work)
     }
 
     /// Evaluates the positions of the stages, the Lagrangian and the constraints there.
-    fn evaluate<T: Scalar>(&self, t: f64, from: &PhasePoint<N, T>, work: &mut Workspace<N, M, T>) {
+    fn evaluate<T: Scalar>(
+        &self,
+        t: f64,
+        from: &PhasePoint<N, T>,
+        vary: &mut impl Vary<N, T>,
+        work: &mut Workspace<N, M, T>,
+    ) {
         for i in 0..work.stages.len() {
             let mut q = from.q;
             for (j, stage) in work.stages.iter().enumerate().filter(|(j, _)| self.tables.a[i][*j] != 0.0) {
@@ -272,7 +227,9 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             let stage = &mut work.stages[i];
             stage.q = q;
             let x = VelocityPoint { q, v: stage.v, z: stage.z };
-            (stage.value, stage.gradient) = self.lagrangian.with_gradient(T::from(t + self.tables.c[i] * self.h), &x);
+            let time = t + self.tables.c[i] * self.h;
+            (stage.value, stage.gradient) = self.lagrangian.with_gradient(T::from(time), &x);
+            vary.add(time, &x, &mut stage.value, &mut stage.gradient);
             (stage.c, stage.g) = self.constraint.with_jacobian(&q);
             stage.force = stage.gradient.x * (stage.rho * self.h) + stage.g.transpose() * stage.y;
         }
@@ -371,9 +328,9 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     /// The momentum and the velocity at the end, from the stages.
     fn last<T: Scalar>(
         &self,
-        t: f64,
-        from: &PhasePoint<N, T>,
+        (t, from): (f64, &PhasePoint<N, T>),
         kept: &[bool; M],
+        vary: &mut impl Vary<N, T>,
         work: &mut Workspace<N, M, T>,
     ) -> Result<LobattoStep<N, T>, StepError> {
         let (h, b) = (self.h, &self.tables.b);
@@ -394,8 +351,9 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         let real = end.g.map(|e| e.re());
         loop {
             let x = VelocityPoint { q: end.q, v, z: end.z };
-            let p = self.lagrangian.with_gradient(T::from(time), &x).1.y;
-            let defect = p * rho - momentum - end.g.transpose() * y;
+            let (mut value, mut slope) = self.lagrangian.with_gradient(T::from(time), &x);
+            vary.add(time, &x, &mut value, &mut slope);
+            let defect = slope.y * rho - momentum - end.g.transpose() * y;
             let normal = end.g * v;
             (0..N).for_each(|k| work.last_residual[k] = defect[k]);
             (0..M).for_each(|a| work.last_residual[N + a] = if kept[a] { normal[a] } else { y[a] });
@@ -472,7 +430,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let mut workspace = std::mem::replace(&mut self.workspace, Workspace::empty());
-            let step = self.solve(self.time(), &self.state, &self.velocity, &mut workspace);
+            let step = self.solve(self.time(), &self.state, &self.velocity, &mut Unvaried, &mut workspace);
             self.workspace = workspace;
             let step = step.map_err(|cause| StepFailure { taken, cause })?;
             (self.state, self.velocity, self.sigma) = (step.end, step.velocity, step.sigma);

@@ -7,20 +7,25 @@
 //! - [`Nonholonomic`]: the discrete Lagrange-d'Alembert-Herglotz equations of any symmetric discrete Lagrangian, of
 //!   order 2, and their compositions.
 //!
-//! [`Constrained`] makes an integrator of the first two, for runs with rows, events, checkpoints and an accuracy.
+//! [`Constrained`] makes an integrator of the first two, and [`LagrangeDAlembert`] of the third, for runs with rows,
+//! events, checkpoints and an accuracy.
 
 mod constrained;
 mod drag_rattle;
 mod error;
+mod lagrange_d_alembert;
 mod linear_system;
 mod lobatto;
 mod lobatto_tables;
+mod lobatto_workspace;
 mod nonholonomic;
 mod start;
+mod variation;
 
 pub use constrained::{Constrained, ConstrainedMethod};
 pub use drag_rattle::{DragRattle, RattleStep};
 pub use error::ConstraintError;
+pub use lagrange_d_alembert::LagrangeDAlembert;
 pub use lobatto::{ContactLobatto, LobattoStep};
 pub use nonholonomic::Nonholonomic;
 pub use start::{ConstrainedStart, OffConstraint};

@@ -4,6 +4,7 @@ use super::drag_rattle::substeps;
 use super::linear_system::LinearSystem;
 use super::start::{inverse_mass, round_off, tangent_velocity};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
+use crate::integration::check_unforced;
 use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{Distribution, DistributionDerivatives};
@@ -27,6 +28,8 @@ use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoi
 /// - a step with h and one with -h give the start again, to round-off;
 /// - the energy follows `E' = L_z E` with the order of the method;
 /// - the flow is not conformally contact: no method for nonholonomic motions is, since the motions themselves are not.
+///
+/// [`LagrangeDAlembert`](super::LagrangeDAlembert) makes runs of these steps.
 ///
 /// Reference: paper, section 4; Cortes and Martinez, Nonlinearity 14 (2001) 1365-1392; McLachlan and Perlmutter,
 /// J. Nonlinear Sci. 16 (2006) 283-328, for reversible discrete constraints.
@@ -57,6 +60,9 @@ pub struct Nonholonomic<L, W, D, const N: usize, const M: usize> {
     residual: Vec<f64>,
 }
 
+/// The equations, in errors.
+pub(super) const EQUATIONS: &str = "the discrete Lagrange-d'Alembert-Herglotz equations";
+
 /// What a step changes.
 #[derive(Clone, Copy, Debug)]
 struct Current<const N: usize, const M: usize> {
@@ -79,7 +85,8 @@ where
     ///
     /// # Errors
     /// [`InputError`]: a velocity outside of the distribution, dependent rows of omega, a scheme of
-    /// Runge-Kutta-Nystrom type, a step that is 0 or not finite, a first step that fails; those of `rule`.
+    /// Runge-Kutta-Nystrom type, an applied force, a step that is 0 or not finite, a first step that fails; those of
+    /// `rule`.
     pub fn new(
         lagrangian: L,
         distribution: W,
@@ -88,6 +95,23 @@ where
         h: f64,
         start: &ConstrainedStart<N>,
     ) -> Result<Self, InputError> {
+        let mut motion = Self::of(lagrangian, distribution, rule, scheme, h, start)?;
+        motion.step().map_err(InputError::FirstStep)?;
+        motion.evaluations = 0;
+        Ok(motion)
+    }
+
+    /// The motion, without the trial of its first step.
+    pub(super) fn of(
+        lagrangian: L,
+        distribution: W,
+        rule: impl FnMut(f64) -> Result<D, InputError>,
+        scheme: &SplittingScheme,
+        h: f64,
+        start: &ConstrainedStart<N>,
+    ) -> Result<Self, InputError> {
+        // Its equations contain no force.
+        check_unforced(&lagrangian, EQUATIONS)?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -101,11 +125,16 @@ where
             return Err(ConstraintError::RankDeficient { rank, expected: M }.into());
         }
         let inverse = inverse_mass(&lagrangian, start.t, &x)?;
-        x.v = tangent_velocity(&omega, &inverse, &[true; M], (x.v, round_off(&x.v)), start.off_constraint)?;
+        // As in `ConstrainedStart::resolved_for`.
+        let rounding = round_off(&x.v) + round_off(&x.q) / h.abs();
+        x.v = tangent_velocity(&omega, &inverse, &[true; M], (x.v, rounding), start.off_constraint)?;
         let state = PhasePoint { q: x.q, p: lagrangian.gradient(start.t, &x).y, z: x.z };
         let rules = substeps.iter().map(|g| g * h).map(rule).collect::<Result<Vec<_>, _>>()?;
+        if rules.iter().any(DiscreteLagrangian::has_forces) {
+            return Err(InputError::Forced { method: EQUATIONS });
+        }
         let current = Current { state, velocity: x.v, sigma: 1.0, impulse: SVector::zeros() };
-        let mut motion = Nonholonomic {
+        Ok(Nonholonomic {
             lagrangian,
             distribution,
             rules,
@@ -116,10 +145,7 @@ where
             evaluations: 0,
             system: LinearSystem::new(N + M),
             residual: vec![0.0; N + M],
-        };
-        motion.step().map_err(InputError::FirstStep)?;
-        motion.evaluations = 0;
-        Ok(motion)
+        })
     }
 
     /// The current velocity, with the position and the action.
@@ -259,6 +285,10 @@ where
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        Some(self.current.velocity)
     }
 
     fn save(&self) -> Option<Vec<u64>> {

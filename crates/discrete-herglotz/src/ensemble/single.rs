@@ -9,7 +9,7 @@ use crate::{
     integration::{BatchKernel, StepFormula},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The integrator of an ensemble, for the lifetime of the run of one member.
 pub(crate) struct OfMember<'i, 'a, L, const N: usize> {
@@ -62,6 +62,16 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         step: (f64, &PhasePoint<N>, &PhasePoint<N>),
     ) -> Result<Option<DMatrix<f64>>, StepError> {
         self.integrator.step_jacobian(&self.own(problem), h, step)
+    }
+
+    fn step_variation(
+        &self,
+        problem: &Problem<'p, L, N>,
+        h: f64,
+        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
+    ) -> Result<Option<ChartVector<N>>, StepError> {
+        self.integrator.step_variation(&self.own(problem), h, step, variation)
     }
 }
 

@@ -68,6 +68,7 @@ pub(crate) fn info(stages: usize, in_transformed_time: bool) -> MethodInfo {
         collocation: Some(stages),
         substeps: false,
         constrained: false,
+        contact: true,
         divides: false,
         cost_per_evaluation: 1,
         source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"

@@ -97,6 +97,7 @@ pub(super) fn info(scheme: &SplittingScheme) -> MethodInfo {
         collocation: None,
         substeps: scheme.stages() > 1,
         constrained: false,
+        contact: true,
         divides: false,
         cost_per_evaluation: 2,
         source: Cow::Borrowed(scheme.source()),

@@ -3,7 +3,7 @@
 use crate::rules::Node;
 use crate::{InputError, Problem, SplittingScheme, StepError, Stepper};
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{PhasePoint, VelocityPoint};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint};
 use std::borrow::Cow;
 
 /// The properties of an integrator.
@@ -28,6 +28,10 @@ pub struct MethodInfo {
     pub substeps: bool,
     /// Whether the motion is under constraints, so that it is not the free motion of the Lagrangian.
     pub constrained: bool,
+    /// Whether its steps are conformally contact, `Phi^* eta = sigma_d eta`, for a Lagrangian without forces. They are
+    /// not where the exact flow is not, under constraints on velocities: `sigma_d` multiplies the energy and some
+    /// momenta then, but not the contact form.
+    pub contact: bool,
     /// Whether it subdivides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
     pub divides: bool,
     /// The cost of one of its [evaluations](Stepper::evaluations), in units of an evaluation of L at a stage of Gauss
@@ -51,6 +55,7 @@ impl MethodInfo {
             collocation: None,
             substeps: false,
             constrained: false,
+            contact: true,
             divides: false,
             // Newton's method evaluates second derivatives.
             cost_per_evaluation: 32 * N as u64,
@@ -96,7 +101,7 @@ pub trait Integrator<'a, L, const N: usize> {
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 
-    /// The force `G^T lambda` of the constraints at a point of the motion, for an integrator that is
+    /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.
     ///
     /// # Errors
@@ -132,6 +137,24 @@ pub trait Integrator<'a, L, const N: usize> {
     ) -> Result<Option<DMatrix<f64>>, StepError> {
         Ok(None)
     }
+
+    /// The derivative of the state `(q, p, z)` at the end of a step, for a fixed start, along a variation `delta L` of
+    /// the Lagrangian, which is given by its value and its partial derivatives in `(q, v, z)` at points; those in q
+    /// contain the variation of an applied force. The step is given as in [`step_jacobian`](Self::step_jacobian). Derivatives in
+    /// parameters follow, `delta L = L_theta`; in the time, `delta L = L_t`; and in the step size h, since a step with
+    /// `(1 + e) h` is one with h of `L + e (L - v . L_v + (s - t) L_t)` at the times s. The default is `None`.
+    ///
+    /// # Errors
+    /// [`StepError`] where the step is not differentiable.
+    fn step_variation(
+        &self,
+        _problem: &Problem<'a, L, N>,
+        _h: f64,
+        _step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        _variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
+    ) -> Result<Option<ChartVector<N>>, StepError> {
+        Ok(None)
+    }
 }
 
 /// The sub-flows of which a step consists.
@@ -151,6 +174,9 @@ pub enum StepFormula {
     /// A step whose derivative in the state is the matrix [`Integrator::step_jacobian`]; that in parameters and in the step
     /// size is not known.
     Jacobian,
+    /// A step whose derivative in the state is the matrix [`Integrator::step_jacobian`], and along variations of the
+    /// Lagrangian, from which those in parameters, time and step size follow, [`Integrator::step_variation`].
+    Derivatives,
 }
 
 /// A kernel that takes the steps of an [`Integrator`] for many motions at once.

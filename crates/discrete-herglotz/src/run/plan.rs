@@ -18,6 +18,10 @@ const MAX_STEPS_CHECKED_FIRST: usize = 64;
 /// The reason why the steps of a run with a force keep no contact form.
 const FORCED: &str = "not contact: forced; the defect is the virtual work of the force";
 
+/// The reason why the steps of a run under constraints on velocities keep no contact form.
+const NONHOLONOMIC: &str = "not contact, as the motion: sigma_d multiplies the energy of an autonomous L and the momenta \
+                            of horizontal symmetries";
+
 /// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
 /// `Display` output lists what will be computed and what is skipped.
 pub struct Plan<'p, L, const N: usize> {
@@ -158,6 +162,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         });
         if self.steps.problem.lagrangian.has_force() {
             entries.push(PlanEntry::skipped("contact form", FORCED));
+        }
+        if !self.steps.info.contact {
+            entries.push(PlanEntry::skipped("contact form", NONHOLONOMIC));
         }
         let (what, autonomous) = ("time at the stages", structure.autonomous);
         let why = match (autonomous, self.steps.problem.lagrangian.has_force()) {

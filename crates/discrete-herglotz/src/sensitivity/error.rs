@@ -27,6 +27,17 @@ pub enum SensitivityError {
         /// In which case, if not always.
         case: &'static str,
     },
+    /// Derivatives under constraints that are not implemented.
+    #[error(
+        "{what} of runs by `{method}` are not implemented, and integrators without its constraints compute another motion; \
+         take differences of runs from nearby starts that satisfy the constraints"
+    )]
+    UnderConstraints {
+        /// The name of the method.
+        method: Cow<'static, str>,
+        /// What is not implemented.
+        what: &'static str,
+    },
     /// The integrator has no second derivatives.
     #[error(
         "second derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation` without impacts and \

@@ -158,7 +158,8 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     /// ```
     ///
     /// # Errors
-    /// Those of [`run`](Self::run), [`SensitivityError::NoTangent`], and [`SensitivityError::Step`] where the tangent of a
+    /// Those of [`run`](Self::run), [`SensitivityError::NoTangent`], [`SensitivityError::UnderConstraints`], and
+    /// [`SensitivityError::Step`] where the tangent of a
     /// step cannot be computed. A run that ends early is reported as the status of the outcome.
     pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents<N>, SensitivityError> {
         self.lyapunov_exponents_within(N, until)
@@ -182,6 +183,11 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
         }
         let run = self.differentiable()?.with_conformal_factor();
         let plan = run.plan(until)?;
+        if plan.steps.info.constrained {
+            // Of the 2n + 1 directions of the frame only those that are tangent to the constraints are of the motion.
+            let method = plan.steps.info.name.clone();
+            return Err(SensitivityError::UnderConstraints { method, what: "Lyapunov exponents" });
+        }
         let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
         let columns = initial_frame(coordinates);
         let (t0, state) = (plan.steps.problem.t0, plan.steps.problem.state);

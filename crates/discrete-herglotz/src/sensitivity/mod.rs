@@ -8,7 +8,8 @@
 //! `h sum_i b_i d(rho L_theta)[w_i]` summed over the steps. It is the exact gradient of the discrete run. See section 10
 //! of `docs/theory.md`.
 //!
-//! Splittings, quadrature rules and their compositions are differentiated sub-flow by sub-flow. [Lyapunov
+//! Splittings, quadrature rules and their compositions are differentiated sub-flow by sub-flow, and steps under constraints
+//! on positions by dual numbers, along the state and along variations of L. [Lyapunov
 //! exponents](crate::Run::lyapunov_exponents) are the growth rates of the tangent. An [`Ensemble`](crate::Ensemble) has the
 //! gradients of all its members.
 

@@ -67,7 +67,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     /// The tangent of the steps of a run.
     ///
     /// # Errors
-    /// [`SensitivityError::NoTangent`] for an integrator without tangent; those of the steps of a splitting.
+    /// [`SensitivityError::NoTangent`] and [`SensitivityError::UnderConstraints`] for an integrator without tangent; those of the steps of a splitting.
     pub fn new<L: Parametric<N>>(
         steps: &Discretization<'a, L, N>,
         direction: Direction,
@@ -89,6 +89,9 @@ impl<'a, const N: usize> StepTangent<'a, N> {
         match steps.integrator.step_formula() {
             Some(formula) => {
                 Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula, &steps.integrator)?)))
+            }
+            None if info.constrained => {
+                Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })
             }
             None => refused(""),
         }

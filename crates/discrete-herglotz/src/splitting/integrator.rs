@@ -22,6 +22,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             collocation: None,
             substeps: true,
             constrained: false,
+            contact: true,
             divides: false,
             cost_per_evaluation: 4,
             source: Cow::Borrowed(self.source()),

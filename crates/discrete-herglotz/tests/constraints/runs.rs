@@ -11,7 +11,7 @@ use discrete_herglotz::{
 };
 use std::ops::ControlFlow;
 
-const METHODS: [ConstrainedMethod; 4] = [
+pub const METHODS: [ConstrainedMethod; 4] = [
     ConstrainedMethod::Rattle(SplittingScheme::STRANG),
     ConstrainedMethod::Rattle(SplittingScheme::KAHAN_LI_8),
     ConstrainedMethod::Lobatto { stages: 3 },
@@ -27,7 +27,7 @@ fn order(method: ConstrainedMethod) -> i32 {
 }
 
 /// A pendulum of gravity 1 in the plane, through its highest point, from an angle to the vertical with a speed.
-fn swung(angle: f64, speed: f64) -> VelocityPoint<2> {
+pub fn swung(angle: f64, speed: f64) -> VelocityPoint<2> {
     let (s, c) = angle.sin_cos();
     VelocityPoint::new([s, -c], [speed * c, speed * s], 0.2)
 }

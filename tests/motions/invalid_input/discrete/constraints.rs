@@ -6,8 +6,8 @@ use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::systems::constrained::{KnifeEdge, RigidPendulum};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::constraints::{
-    Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, Nonholonomic,
-    OffConstraint,
+    Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, LagrangeDAlembert,
+    Nonholonomic, OffConstraint,
 };
 use discrete_herglotz::{InputError, Integrator, Problem, SplittingScheme, Stepper, Steps, Until, rules::Midpoint};
 
@@ -32,7 +32,12 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest { entries: &["ContactLobatto::step", "DragRattle::step"], run: steps },
     InputTest {
-        entries: &["Nonholonomic::impulse", "Nonholonomic::new", "Nonholonomic::velocity_point"],
+        entries: &[
+            "LagrangeDAlembert::new",
+            "Nonholonomic::impulse",
+            "Nonholonomic::new",
+            "Nonholonomic::velocity_point",
+        ],
         run: knife_edges,
     },
 ];
@@ -153,6 +158,16 @@ fn knife_edges(report: &mut Report) {
         let (q, p) = (motion.velocity_point().q, motion.state().p);
         Ok(q.iter().chain(p.iter()).copied().chain([motion.state().z, motion.impulse()[0]]).collect())
     };
+    // The end of a run, and the force of the constraint there.
+    let by_run = |h: f64, t: f64, at: VelocityPoint<3>| -> Result<Vec<f64>, String> {
+        let system = KnifeEdge { slope: 0.3, gamma: -0.1 };
+        let problem = Problem::new(&system, t, at).map_err(|e| e.to_string())?;
+        let by = LagrangeDAlembert::<_, 1>::new(&system, SplittingScheme::STRANG);
+        let run = problem.by(by).steps(Steps::Size(h.abs())).run(Until::After(10.0 * h)).map_err(|e| e.to_string())?;
+        let end = VelocityPoint { q: run.q, v: run.p, z: 0.0 };
+        let force = by.constraint_force(&system, run.t, &end).map_err(|e| e.to_string())?;
+        Ok(run.q.iter().chain(&run.p).chain(&force).copied().chain(run.z).collect())
+    };
     let at = |c: [f64; 7]| VelocityPoint::new([c[0], c[1], c[2]], [c[3], c[4], c[5]], c[6]);
     let system = KnifeEdge { slope: 0.3, gamma: -0.1 };
     let base = [0.1, -0.2, 0.0, 0.5, 0.0, 0.7, 0.2];
@@ -163,9 +178,12 @@ fn knife_edges(report: &mut Report) {
                 let start = ConstrainedStart { off_constraint, ..ConstrainedStart::new(at(c)) };
                 report.entry_point(&c.to_vec(), motion(system, 0.01, &start));
             }
+            report.entry_point(&c.to_vec(), by_run(0.01, 0.0, at(c)));
         }
         let start = ConstrainedStart::new(at(base));
         report.entry_point(&value, motion(system, value, &start));
+        report.entry_point(&value, by_run(value, 0.0, at(base)));
+        report.entry_point(&value, by_run(0.01, value, at(base)));
         report.entry_point(&value, motion(system, 0.01, &ConstrainedStart { t: value, ..start }));
         report.entry_point(&value, motion(KnifeEdge { gamma: value, ..system }, 0.01, &start));
     }

@@ -3,7 +3,9 @@
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report, fine};
 use contact_geom::VelocityPoint;
-use contact_geom::constraints::{ConstraintDerivatives, DistributionDerivatives, Redundancy, constrained_motion};
+use contact_geom::constraints::{
+    ConstraintDerivatives, DistributionDerivatives, Redundancy, constrained_motion, nonholonomic_motion,
+};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{independent_rows, least_norm, restricted};
 use contact_geom::systems::constrained::{ChaplyginSleigh, FourBar, ParallelCranks, RigidPendulum};
@@ -18,7 +20,7 @@ pub const TESTS: &[InputTest] = &[
         ],
         run: holonomic,
     },
-    InputTest { entries: &["DistributionDerivatives::rates"], run: distribution },
+    InputTest { entries: &["DistributionDerivatives::rates", "nonholonomic_motion"], run: distribution },
     InputTest { entries: &["independent_rows", "least_norm", "restricted", "Redundancy::imposed"], run: rows },
     InputTest { entries: &["FourBar::closed_at", "ParallelCranks::at"], run: mechanisms },
 ];
@@ -56,6 +58,8 @@ fn distribution(report: &mut Report) {
             // The condition depends on the direction and the velocity, not on the place of the blade.
             let input = vec![c[2], c[3], c[4], c[5]];
             report.formula(&input, fine((rates, slopes)));
+            let motion = nonholonomic_motion(&sleigh, &sleigh, 0.0, &VelocityPoint { q, v, z: 0.1 });
+            report.formula(&input, motion.map(|motion| (motion.acceleration, motion.multipliers)));
         }
     }
 }

@@ -5,7 +5,7 @@ mod holonomic;
 mod nonholonomic;
 mod redundancy;
 
-pub use field::{ConstrainedMotion, constrained_motion};
+pub use field::{ConstrainedMotion, constrained_motion, nonholonomic_motion};
 pub use holonomic::{Constraint, ConstraintDerivatives};
 pub use nonholonomic::{Distribution, DistributionDerivatives};
 pub use redundancy::{Redundancy, independent_rows, least_norm, restricted};

@@ -23,6 +23,10 @@ impl MomentumRow {
 }
 
 /// Observes the momentum of a one-parameter group along a run, and its predicted decay by the product of the `sigma_d`.
+///
+/// The prediction is that for a symmetry of L. Under constraints `c(q) = 0` the group must leave c unchanged as well, and
+/// under constraints `omega(q) v = 0` it must be horizontal, `omega xi_Q = 0`: the momenta of other groups change by the
+/// force of the constraints, and [`MomentumRow::defect`] is this change.
 #[derive(Clone, Debug)]
 pub struct MomentumDecay<G> {
     group: G,

@@ -1,23 +1,59 @@
-//! Steps of a custom discrete Lagrangian.
+//! Steps of a custom discrete Lagrangian, and steps under constraints.
 
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use super::{StepEnds, SubFlows};
-use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
 use crate::{Integrator, Problem, StepError};
-use contact_geom::ChartVector;
 use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
 use std::sync::Arc;
 
-/// Steps whose derivative in the state is that of the discrete Hamiltonian flow, by the implicit function theorem and the
-/// second jet of the discrete Lagrangian. How the discrete Lagrangian depends on parameters and on the step size is not
-/// known.
+/// Steps whose derivative in the state is computed by the integrator: for a custom discrete Lagrangian that of the discrete
+/// Hamiltonian flow, by the implicit function theorem and the second jet. How it depends on parameters and on the step
+/// size is known where the integrator computes derivatives along variations of the Lagrangian.
 pub(super) struct DiscreteSteps<'a, L, const N: usize> {
     pub problem: Problem<'a, L, N>,
     pub integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
+    /// Whether it computes these.
+    pub varies: bool,
 }
 
-impl<L, const N: usize> SubFlows<N> for DiscreteSteps<'_, L, N> {
+impl<L: Parametric<N>, const N: usize> DiscreteSteps<'_, L, N> {
+    /// The derivatives of a step in each parameter, in its time and in its length.
+    fn sources(&self, step: &StepEnds<N>, of: &mut ParameterDerivatives<N>) -> Result<Vec<ChartVector<N>>, StepError> {
+        let StepEnds { t, h, start, end } = step;
+        let lagrangian = self.problem.lagrangian;
+        let along = |variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)| {
+            let source = self.integrator.step_variation(&self.problem, *h, (*t, start, end), variation)?;
+            source.ok_or(StepError::NonFinite)
+        };
+        // The value with the gradient, which contains the force.
+        let varied = |of: &mut ParameterDerivatives<N>, quantity: Quantity, s: f64, x: &VelocityPoint<N>| {
+            let QuantityDerivatives { l, mut gradient, force } = of.at(lagrangian, quantity, s, x);
+            gradient.x += force;
+            (l, gradient)
+        };
+        let mut sources = Vec::with_capacity(of.count() + 2);
+        for quantity in (0..of.count()).map(Quantity::Parameter).chain([Quantity::Time]) {
+            sources.push(along(&mut |s, x| varied(of, quantity, s, x))?);
+        }
+        // In the length: see `Integrator::step_variation`.
+        let of_length = along(&mut |s, x| {
+            let (l, slope) = lagrangian.with_gradient_and_force(s, x);
+            let second = lagrangian.hessian(s, x);
+            let (of_time, slope_of_time) = varied(of, Quantity::Time, s, x);
+            let gradient =
+                ChartVector { x: slope.x - second.qv * x.v, y: -(second.vv * x.v), z: slope.z - second.vz.dot(&x.v) };
+            let later = s - t;
+            (l - x.v.dot(&slope.y) + later * of_time, gradient.plus(slope_of_time.scale(later)))
+        })?;
+        sources.push(of_length.scale(h.recip()));
+        Ok(sources)
+    }
+}
+
+impl<L: Parametric<N>, const N: usize> SubFlows<N> for DiscreteSteps<'_, L, N> {
     fn linearise(
         &self,
         step: &StepEnds<N>,
@@ -35,12 +71,16 @@ impl<L, const N: usize> SubFlows<N> for DiscreteSteps<'_, L, N> {
         }
         let unknown = SVector::from_element(f64::NAN);
         let unknown = ChartVector { x: unknown, y: unknown, z: f64::NAN };
-        let sources = of.map_or_else(Vec::new, |of| vec![unknown; of.count() + 2]);
+        let sources = match of {
+            None => Vec::new(),
+            Some(of) if self.varies => self.sources(step, of)?,
+            Some(of) => vec![unknown; of.count() + 2],
+        };
         flows.push(SubFlow { state, sources, start: 0.0, duration: 1.0 });
         Ok(())
     }
 
     fn only_in_start(&self) -> bool {
-        true
+        !self.varies
     }
 }

@@ -106,7 +106,15 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
                     return Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" });
                 }
             }
-            StepFormula::Jacobian => Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone() }),
+            StepFormula::Jacobian => {
+                Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone(), varies: false })
+            }
+            // The variation of a Lagrangian that is given by a contact Hamiltonian is that of its Legendre transform, which
+            // is not implemented.
+            StepFormula::Derivatives => {
+                let varies = const { !L::HINTS.hamiltonian };
+                Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone(), varies })
+            }
         };
         let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
         Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })

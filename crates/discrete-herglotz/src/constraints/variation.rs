@@ -1,0 +1,46 @@
+//! Variations of the Lagrangian in the derivative of a step.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Dual, VelocityPoint};
+
+/// A number with one derivative.
+pub(super) type Along = Dual<f64, SVector<f64, 1>>;
+
+/// What is added to the Lagrangian in a step over numbers T.
+pub(super) trait Vary<const N: usize, T> {
+    /// Whether something is added.
+    const VARIES: bool;
+
+    /// Adds the variation at a time and a point to the value and the gradient of L.
+    fn add(&mut self, t: f64, x: &VelocityPoint<N, T>, value: &mut T, gradient: &mut ChartVector<N, T>);
+}
+
+/// The Lagrangian itself.
+pub(super) struct Unvaried;
+
+impl<const N: usize, T> Vary<N, T> for Unvaried {
+    const VARIES: bool = false;
+
+    fn add(&mut self, _: f64, _: &VelocityPoint<N, T>, _: &mut T, _: &mut ChartVector<N, T>) {}
+}
+
+/// The Lagrangian with a variation of first order, if there is one: its value and gradient are added to derivatives.
+pub(super) struct Varied<'v, const N: usize>(
+    pub Option<&'v mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)>,
+);
+
+impl<const N: usize> Vary<N, Along> for Varied<'_, N> {
+    const VARIES: bool = true;
+
+    fn add(&mut self, t: f64, x: &VelocityPoint<N, Along>, value: &mut Along, gradient: &mut ChartVector<N, Along>) {
+        let Some(variation) = &mut self.0 else { return };
+        let at = VelocityPoint { q: x.q.map(|q| q.re), v: x.v.map(|v| v.re), z: x.z.re };
+        let (l, slope) = variation(t, &at);
+        value.d[0] += l;
+        for i in 0..N {
+            gradient.x[i].d[0] += slope.x[i];
+            gradient.y[i].d[0] += slope.y[i];
+        }
+        gradient.z.d[0] += slope.z;
+    }
+}
