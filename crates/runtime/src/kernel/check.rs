@@ -11,7 +11,7 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until, gauss::VirtualWork, hamiltonian,
+    AnyIntegrator, InputError, Problem, Run, Start, Steps, Stop, Until, gauss::VirtualWork, hamiltonian,
     hamiltonian::ModifiedDefect, theory::legendre_inverse,
 };
 use formula_lagrangian::FormulaLagrangian;
@@ -38,51 +38,90 @@ const DEFAULT_STAGES: usize = 4;
 /// The theorems are given up when the step has been halved six times without a discrete Lagrangian for its two points.
 const MAX_STEP_DIVISION: f64 = 64.0;
 
+/// The number of stages of collocation that stands for the most accurate method with constraints, of order 14.
+const MOST_STAGES_WITH_CONSTRAINTS: usize = 7;
+
 /// A sample of a motion: the time, the state, and the logarithm of the conformal factor.
 type State<const N: usize> = (f64, PhasePoint<N>, f64);
+
+/// The steps of a map: the integrator, or `None` for that which the constraints choose, the length of a step, and the
+/// number of steps.
+type MapOfSteps = (Option<AnyIntegrator>, f64, usize);
+
+/// The run of a number of steps by an integrator, or by the one for the constraints.
+fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
+    problem: &'p Problem<'p, L, N>,
+    by: Option<AnyIntegrator>,
+    count: usize,
+) -> Result<Run<'p, 'o, L, N>, RuntimeError> {
+    Ok(match (problem.lagrangian().constrained(by)?, by) {
+        (Some(method), _) => problem.by(method).steps(Steps::Count(count)),
+        (None, Some(by)) => problem.by(L::by(by)?).steps(Steps::Count(count)),
+        (None, None) => problem.steps(Steps::Count(count)),
+    })
+}
+
+/// The start, the end and the conformal factor of a map at a state, which is first moved to the constraints, if there are
+/// any.
+fn mapped<L: FormulaSystem<N>, const N: usize>(
+    lagrangian: &L,
+    (by, h, count): MapOfSteps,
+    t: f64,
+    from: &PhasePoint<N>,
+) -> Result<([PhasePoint<N>; 2], f64), RuntimeError> {
+    let mut problem = Problem::new(lagrangian, t, Start::from(*from))?;
+    if lagrangian.formula().constraints() > 0 {
+        problem = Problem::new(lagrangian, t, lagrangian.projected(t, *problem.start())?)?;
+    }
+    let plan = run_by(&problem, by, count)?.plan(Until::After(h))?;
+    let mut stepper = plan.stepper()?;
+    stepper.advance(count).map_err(|failure| failure.cause)?;
+    Ok(([*problem.state(), stepper.state()], stepper.sigma()))
+}
 
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
 fn step<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
-    (by, h, count): (AnyIntegrator, f64, usize),
+    map: MapOfSteps,
     t: f64,
     from: &PhasePoint<N>,
 ) -> Result<(PhasePoint<N>, f64), RuntimeError> {
-    let problem = Problem::new(lagrangian, t, Start::from(*from))?;
-    let plan = problem.by(L::by(by)?).steps(Steps::Count(count)).plan(Until::After(h))?;
-    let mut stepper = plan.stepper()?;
-    stepper.advance(count).map_err(|failure| failure.cause)?;
-    Ok((stepper.state(), stepper.sigma()))
+    let ([_, end], sigma) = mapped(lagrangian, map, t, from)?;
+    Ok((end, sigma))
 }
 
-/// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size.
+/// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size: by derivatives
+/// along curves of starts. With constraints these are curves in T\*N x R, whose tangent vectors are all of them.
 fn contact_defect<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
-    map: (AnyIntegrator, f64, usize),
+    map: MapOfSteps,
     t: f64,
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
-    let from = ChartVector::from(*at);
-    let (end, sigma) = step(lagrangian, map, t, at)?;
+    let center = ChartVector::from(*at);
+    let ([from, end], sigma) = mapped(lagrangian, map, t, at)?;
     let size = |x: f64| if x > 0.0 { x } else { 1.0 };
     let sizes = [size(at.q.amax()), size(at.p.amax()), size(at.z.abs())];
     let mut differences = Vec::with_capacity(2 * N + 1);
     for k in 0..=2 * N {
-        let distance = RELATIVE_DISTANCE * sizes[k / N.max(1)];
-        let moved = |by: f64| -> Result<ChartVector<N>, RuntimeError> {
-            let there = ChartVector::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
-            Ok(step(lagrangian, map, t, &there.into())?.0.into())
+        let unit = sizes[k / N.max(1)];
+        let distance = RELATIVE_DISTANCE * unit;
+        let moved = |by: f64| -> Result<[ChartVector<N>; 2], RuntimeError> {
+            let there = ChartVector::<N>::from_fn(|i| center.component(i) + if i == k { by * distance } else { 0.0 });
+            Ok(mapped(lagrangian, map, t, &there.into())?.0.map(ChartVector::from))
         };
-        let [near, middle, far] = [1.0, 2.0, 3.0].map(|by| Ok::<_, RuntimeError>(moved(by)?.minus(moved(-by)?)));
-        let derivative = near?.scale(45.0).minus(middle?.scale(9.0)).plus(far?).scale(1.0 / (60.0 * distance));
-        let pulled_back = derivative.z - end.p.dot(&derivative.x);
-        let eta = match k {
-            k if k < N => -at.p[k],
-            k if k < 2 * N => 0.0,
-            _ => 1.0,
-        };
+        let mut slopes = [ChartVector::<N>::from_fn(|_| 0.0); 2];
+        for (by, weight) in [(1.0, 45.0), (2.0, -9.0), (3.0, 1.0)] {
+            let (ahead, behind) = (moved(by)?, moved(-by)?);
+            for (slope, (ahead, behind)) in slopes.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                *slope = slope.plus(ahead.minus(behind).scale(weight / (60.0 * distance)));
+            }
+        }
+        let [source, image] = slopes;
+        let pulled_back = image.z - end.p.dot(&image.x);
+        let eta = source.z - from.p.dot(&source.x);
         // In units of the coordinates.
-        differences.push(((pulled_back - sigma * eta) * sizes[k / N.max(1)], pulled_back * sizes[k / N.max(1)]));
+        differences.push(((pulled_back - sigma * eta) * unit, pulled_back * unit));
     }
     let apart = max_abs_or_nan(differences.iter().map(|d| d.0));
     Ok(if apart == 0.0 { 0.0 } else { apart / max_abs_or_nan(differences.iter().map(|d| d.1)) })
@@ -91,11 +130,12 @@ fn contact_defect<L: FormulaSystem<N>, const N: usize>(
 /// The distance of a step from the exact motion, relative to the size of the state and per unit of time.
 fn herglotz_defect<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
-    map: (AnyIntegrator, f64, usize),
+    map: MapOfSteps,
     t: f64,
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
-    let exact = (AnyIntegrator::Gauss { stages: 16 }, map.1, 2);
+    let stages = if lagrangian.formula().constraints() > 0 { MOST_STAGES_WITH_CONSTRAINTS } else { 16 };
+    let exact = (Some(AnyIntegrator::Gauss { stages }), map.1, 2);
     let (a, b) =
         (ChartVector::from(step(lagrangian, map, t, at)?.0), ChartVector::from(step(lagrangian, exact, t, at)?.0));
     Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / map.1.abs())
@@ -117,11 +157,10 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     samples: usize,
 ) -> Result<(Check, Vec<State<N>>, Option<usize>), RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let by = integrator(motion, &plan)?;
+    let by = integrator(system, motion, &plan)?;
     let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
     let problem = system.problem_of(motion)?;
     let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
-    let steps = Steps::Count(plan.steps);
     let stride = plan.steps.div_ceil(samples.max(1));
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
@@ -136,7 +175,7 @@ fn along<L: FormulaSystem<N>, const N: usize>(
             ControlFlow::Continue(())
         }
     };
-    problem.by(L::by(by)?).steps(steps).with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
+    run_by(&problem, by, plan.steps)?.with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
     let map = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {
@@ -164,11 +203,16 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     Ok((check, states, plan.integrator.collocation))
 }
 
-/// The integrator of a motion.
-fn integrator(motion: &Motion, plan: &Plan) -> Result<AnyIntegrator, RuntimeError> {
+/// The integrator of a motion; `None` for that which the constraints choose.
+fn integrator<L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    motion: &Motion,
+    plan: &Plan,
+) -> Result<Option<AnyIntegrator>, RuntimeError> {
     Ok(match motion.step_control {
-        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
-        StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse()?,
+        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Some(by),
+        StepControl::Accuracy { by: None, .. } if system.0.formula().constraints() > 0 => None,
+        StepControl::Accuracy { by: None, .. } => Some(plan.integrator.name.parse()?),
     })
 }
 
@@ -179,7 +223,11 @@ pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
     most: usize,
 ) -> Result<Vec<ModifiedDefect>, RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let (by, h, problem) = (L::by(integrator(motion, &plan)?)?, plan.step_size, system.problem_of(motion)?);
+    let (by, h, problem) = (integrator(system, motion, &plan)?, plan.step_size, system.problem_of(motion)?);
+    // Constraints are refused before.
+    let Some(by) = by.map(L::by).transpose()? else {
+        return Err(RuntimeError::WithConstraints { what: "modified Hamiltonians" });
+    };
     let span = (motion.end - motion.start.t).abs().min(MODIFIED_STEPS * h.abs());
     Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?)
 }
@@ -190,6 +238,10 @@ pub(super) fn check<const N: usize>(
     samples: usize,
 ) -> Result<Check, RuntimeError> {
     let (mut check, states, collocation) = along(system, motion, samples)?;
+    if system.0.formula().constraints() > 0 {
+        // The theorems are about discrete Lagrangians on Q x Q x R.
+        return Ok(check);
+    }
     let (h, lagrangian) = (check.step_size, &system.0);
     let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
     let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
@@ -247,7 +299,7 @@ fn theorems_with<const N: usize>(
     let n = system.0.formula().dimension();
     let mut points = Vec::with_capacity(samples.len());
     for (t, x, _) in samples {
-        let q1 = step(&system.0, (AnyIntegrator::Gauss { stages }, h, 1), *t, x)?.0.q;
+        let q1 = step(&system.0, (Some(AnyIntegrator::Gauss { stages }), h, 1), *t, x)?.0.q;
         let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
         points.push(Points { t: *t, q0, q1, z0: x.z });
     }
