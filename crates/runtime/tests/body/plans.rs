@@ -11,6 +11,7 @@ fn heavy() -> Body {
         centre: [0.0, 1.0, 0.0],
         gravity: [0.0, 0.0, -9.81],
         gamma: 0.0,
+        torque: None,
     }
 }
 

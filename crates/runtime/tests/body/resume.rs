@@ -67,6 +67,7 @@ fn top() -> Body {
         centre: [0.0, 0.0, 0.5],
         gravity: [0.0, 0.0, -1.0],
         gamma: -0.1,
+        torque: None,
     }
 }
 
