@@ -76,12 +76,14 @@ fn digest(words: &[u64]) -> u64 {
     digest.0
 }
 
-/// A digest of the body, the motion and its steps.
+/// A digest of the body, the motion and its steps; of events it has their number, directions and ends.
 pub(super) fn fingerprint(body: &Body, motion: &BodyMotion, by: AnyIntegrator, count: usize) -> u64 {
     let mut digest = Digest::new();
     // The steps may be given, or have been found for an accuracy.
     let steps = StepControl::Steps { by, steps: Steps::Count(count) };
     let BodyMotion { t, attitude, omega, z, end, step_control: _, rows, events } = motion;
+    // An expression has no text that is the same in all processes.
+    let events: Vec<_> = events.iter().map(|event| (event.direction, event.terminal)).collect();
     // Writing to a digest does not fail.
     let _ = write!(digest, "{body:?} {t} {attitude:?} {omega:?} {z} {end} {steps:?} {rows:?} {events:?}");
     digest.0
