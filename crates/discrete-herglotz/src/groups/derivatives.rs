@@ -40,7 +40,7 @@ pub struct GroupDerivatives<G: LieGroup<N>, const N: usize> {
 }
 
 /// A number with its derivatives along 2N + 1 directions.
-type Along<const N: usize> = Dual<f64, ChartVector<N>>;
+pub(super) type Along<const N: usize> = Dual<f64, ChartVector<N>>;
 
 /// The number with derivative 1 in the direction of this index, if there is one.
 fn seeded<const N: usize>(value: f64, direction: Option<usize>) -> Along<N> {

@@ -1,13 +1,14 @@
 //! Contact Gauss collocation on Lie groups.
 
+use super::derivatives::{Along, check, lifted};
 use super::stages::{AtParameters, AtStages, Factors, Given, Own, Stages, Table};
 use super::{GroupIntegrator, GroupState, GroupStep};
 use crate::gauss::MAX_STAGES;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::extent::extent;
-use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, GroupLagrangian, LieGroup, ParametricGroupLagrangian};
 use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Scalar};
 use std::f64::consts::PI;
 
 /// Contact Gauss collocation with s stages, of order 2s, for a regular Lagrangian `l(t, g, xi, z)` on a Lie group.
@@ -33,6 +34,11 @@ pub struct GroupGauss<L> {
 /// The factors for a constant rate.
 fn constant_factors<T: Scalar>(gamma: T, h: f64, table: &Table) -> Factors<T> {
     (table.c.map(|c| (gamma * h * (1.0 - c)).exp()), (gamma * h).exp_m1())
+}
+
+/// Factors over another number type.
+fn over<T: Scalar>((rho, sigma_minus_one): Factors) -> Factors<T> {
+    (rho.map(T::from), T::from(sigma_minus_one))
 }
 
 /// The largest number of sweeps of the fixed-point iteration.
@@ -91,8 +97,9 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
             Some(gamma) if h != self.h => Some(constant_factors(gamma, h, &self.table)),
             _ => self.constant,
         };
-        let constant = constant.map(|(rho, sigma_minus_one)| (rho.map(T::from), T::from(sigma_minus_one)));
-        self.solve(&Own(&self.lagrangian), constant, (h, t), from, velocity)
+        let lagrangian = &Own(&self.lagrangian);
+        let given = self.given(lagrangian, constant.map(over), (h, t), from);
+        self.end(&given, self.solve(&given, velocity)?)
     }
 
     fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError> {
@@ -129,31 +136,61 @@ impl<L> GroupGauss<L> {
     {
         let rate = self.lagrangian.constant_rate_at(theta);
         let constant = rate.map(|gamma| constant_factors(gamma, self.h, &self.table));
-        self.solve(&AtParameters { lagrangian: &self.lagrangian, theta }, constant, (self.h, t), from, velocity)
+        let lagrangian = &AtParameters { lagrangian: &self.lagrangian, theta };
+        let given = self.given(lagrangian, constant, (self.h, t), from);
+        self.end(&given, self.solve(&given, velocity)?)
+    }
+
+    /// The virtual work `h sum_j b_j R_j f_j . (g_j^-1 dg_j)` of the applied force in a step from a state, a covector in body
+    /// coordinates at the state: the contact form is multiplied by `sigma_d` up to it, `Phi* eta = sigma_d eta - work`.
+    ///
+    /// # Errors
+    /// Those of the state and of the step.
+    pub fn virtual_work<G: LieGroup<N>, const N: usize>(
+        &self,
+        t: f64,
+        from: &GroupState<G, N>,
+    ) -> Result<ChartVector<N>, GroupError>
+    where
+        L: GroupLagrangian<G, N>,
+    {
+        check(t, from)?;
+        let velocity = GroupIntegrator::<G, N>::velocity(self, t, from)?.map(Along::<N>::constant);
+        let (lagrangian, from) = (&Own(&self.lagrangian), lifted(from, true));
+        let given = self.given(lagrangian, self.constant.map(over), (self.h, t), &from);
+        Ok(self.solve(&given, &velocity)?.virtual_work(&given))
+    }
+
+    /// What a step from a state is computed from.
+    fn given<'a, G: LieGroup<N>, V, const N: usize, T: Scalar>(
+        &'a self,
+        lagrangian: &'a V,
+        constant: Option<Factors<T>>,
+        (h, t): (f64, f64),
+        from: &GroupState<G, N, T>,
+    ) -> Given<'a, V, G::Element<T>, N, T> {
+        let (table, momentum) = (&self.table, from.momentum);
+        Given { lagrangian, table, constant, t, h, g0: from.g, momentum, z0: from.z }
     }
 
     /// Solves the stage equations by fixed-point iteration to round-off, from a constant body velocity.
     fn solve<G: LieGroup<N>, V: AtStages<G, N, T>, const N: usize, T: Scalar>(
         &self,
-        lagrangian: &V,
-        constant: Option<Factors<T>>,
-        (h, t): (f64, f64),
-        from: &GroupState<G, N, T>,
+        given: &Given<'_, V, G::Element<T>, N, T>,
         velocity: &SVector<T, N>,
-    ) -> Result<GroupStep<N, T>, GroupError> {
+    ) -> Result<Stages<G, N, T>, GroupError> {
+        let h = given.h;
         let angle = G::angle(&velocity.map(|x| x.re() * h));
         if angle >= PI {
             return Err(GroupError::BeyondChart { h, angle, largest: PI * h.abs() / angle });
         }
-        let (table, momentum) = (&self.table, from.momentum);
-        let given = Given { lagrangian, table, constant, t, h, g0: from.g, momentum, z0: from.z };
         let mut stages = Stages::<G, N, T>::guess(velocity);
-        if let Some((rho, sigma_minus_one)) = constant {
+        if let Some((rho, sigma_minus_one)) = given.constant {
             (stages.rho, stages.sigma_minus_one) = (rho, sigma_minus_one);
         }
         let (mut smallest, mut stagnant) = (f64::INFINITY, 0);
         for iterations in 1..=SWEEPS {
-            let change = stages.sweep(&given)?;
+            let change = stages.sweep(given)?;
             let size = stages.v[..self.table.s].iter().fold(f64::MIN_POSITIVE, |size, v| size.max(extent(v)));
             if !change.is_finite() {
                 return Err(GroupError::NotConverged { iterations, change });
@@ -165,7 +202,7 @@ impl<L> GroupGauss<L> {
             }
             let negligible = change <= 0.0625 * f64::EPSILON * size;
             if negligible || (change <= 64.0 * f64::EPSILON * size && stagnant >= STAGNANT) {
-                return self.end(&given, stages);
+                return Ok(stages);
             }
             if iterations == SWEEPS {
                 return Err(GroupError::NotConverged { iterations, change });

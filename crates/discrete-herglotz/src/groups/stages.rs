@@ -1,10 +1,11 @@
 //! The stage equations of contact Gauss collocation on a Lie group.
 
+use super::derivatives::Along;
 use crate::gauss::MAX_STAGES;
-use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, GroupLagrangian, GroupPartials, LieGroup, ParametricGroupLagrangian};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxOrNan;
+use contact_geom::{ChartVector, Scalar};
 use std::marker::PhantomData;
 
 /// The coefficients of Gauss collocation.
@@ -277,5 +278,31 @@ impl<G: LieGroup<N>, const N: usize, T: Scalar> Stages<G, N, T> {
     /// The body velocity at the end of the step, by the polynomial through the stages.
     pub fn end_velocity(&self, table: &Table) -> SVector<T, N> {
         combined(1.0, &table.end[..table.s], &self.omega)
+    }
+}
+
+impl<G: LieGroup<N>, const N: usize> Stages<G, N, Along<N>> {
+    /// `h sum_k b_k R_k f_k . (g_k^-1 dg_k)`, for stages with derivatives in the start.
+    pub fn virtual_work<V>(&self, given: &Given<'_, V, G::Element<Along<N>>, N, Along<N>>) -> ChartVector<N>
+    where
+        V: AtStages<G, N, Along<N>>,
+    {
+        let (table, h) = (given.table, given.h);
+        let mut work = ChartVector::from_fn(|_| 0.0);
+        for k in 0..table.s {
+            let point = G::compose(&given.g0, &G::exp(&combined(h, &table.a[k][..table.s], &self.v)));
+            let plain = G::lift(&point, |x: Along<N>| Along::<N>::constant(x.re));
+            let turned = G::log(&G::compose(&G::inverse(&plain), &point));
+            let z = match given.constant {
+                Some(_) => self.action_at(given, k),
+                None => (0..table.s).fold(given.z0, |z, j| z + self.value[j] * (h * table.a[k][j])),
+            };
+            let time = Along::<N>::constant(given.t + h * table.c[k]);
+            let force = given.lagrangian.applied_force(time, &point, &self.omega[k], z);
+            for i in 0..N {
+                work = work.plus(turned[i].d.scale(force[i].re * self.rho[k].re * h * table.b[k]));
+            }
+        }
+        work
     }
 }

@@ -6,7 +6,7 @@ use contact_geom::groups::{
     Rotations, UniformGravity,
 };
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::numbers::max_abs_or_nan;
+use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
 use contact_geom::{ChartVector, Scalar};
 use discrete_herglotz::SplittingScheme;
 use discrete_herglotz::groups::{
@@ -173,6 +173,19 @@ fn forced_bodies() {
     let gauss = GroupGauss::new::<Rotations, 3>(forced, 3, 0.05).unwrap();
     let found = in_the_start(&gauss, "forced");
     assert!(found.contact_defect() > 1e-2, "{:e}", found.contact_defect());
+    // The defect of a step is the virtual work of the force.
+    for h in [0.3, -0.1] {
+        let gauss = GroupGauss::new::<Rotations, 3>(forced, 2, h).unwrap();
+        let step = GroupDerivatives::new(&gauss, 0.2, &start(), 1).unwrap();
+        let form = |at: &GroupState<Rotations, 3>| ChartVector { x: -at.momentum, y: SVector::zeros(), z: 1.0 };
+        let pullback = step.gradients(&form(&step.end)).0;
+        let work = gauss.virtual_work(0.2, &start()).unwrap();
+        let defect = pullback.minus(form(&start()).scale(step.log_factor.exp())).plus(work);
+        assert!(work.max_abs_or_nan() > 1e-3, "{work:?}");
+        assert!(defect.max_abs_or_nan() < 64.0 * EPS * pullback.max_abs_or_nan(), "{defect:?} {work:?}");
+    }
+    let free = GroupGauss::new::<Rotations, 3>(General, 2, 0.3).unwrap();
+    assert_eq!(free.virtual_work(0.2, &start()).unwrap().max_abs_or_nan(), 0.0);
     let parameters = GroupDerivatives::with_parameters(&gauss, 0.2, &start(), 20).unwrap();
     assert_eq!(parameters.in_parameters.ncols(), 13);
     assert!(max_abs_or_nan(parameters.in_parameters.iter().copied()) > 1e-2);

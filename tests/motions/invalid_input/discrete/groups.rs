@@ -35,6 +35,7 @@ pub const TESTS: &[InputTest] = &[
             "GroupDerivatives::new",
             "GroupDerivatives::with_parameters",
             "GroupEnds::search",
+            "GroupGauss::virtual_work",
             "GroupIntegrator::step_by",
             "GroupMotion::advance_by",
             "GroupMotion::restore",
@@ -166,6 +167,8 @@ fn runs(report: &mut Report) {
             };
             let found = GroupDerivatives::with_parameters(&gauss, 0.0, &start(c), 3);
             report.entry_point(&c.to_vec(), found.map(numbers));
+            report.entry_point(&c.to_vec(), gauss.virtual_work(value, &start(GOOD)).map(|work| work.to_vector()));
+            report.entry_point(&c.to_vec(), gauss.virtual_work(0.0, &start(c)).map(|work| work.to_vector()));
             let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(c), 3);
             report.entry_point(&c.to_vec(), dense.and_then(|dense| numbers_of(&dense.at(0.07)?)));
         }
