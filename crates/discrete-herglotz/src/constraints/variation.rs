@@ -25,9 +25,10 @@ impl<const N: usize, T> Vary<N, T> for Unvaried {
 }
 
 /// The Lagrangian with a variation of first order, if there is one: its value and gradient are added to derivatives.
-pub(super) struct Varied<'v, const N: usize>(
-    pub Option<&'v mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)>,
-);
+pub(super) struct Varied<'v, const N: usize>(pub Option<&'v mut Variation<'v, N>>);
+
+/// The value and the gradient of a variation at a time and a point.
+type Variation<'v, const N: usize> = dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>) + 'v;
 
 impl<const N: usize> Vary<N, Along> for Varied<'_, N> {
     const VARIES: bool = true;

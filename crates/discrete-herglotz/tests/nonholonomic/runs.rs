@@ -224,7 +224,7 @@ fn what_does_not_apply_is_refused() {
     let blade = edge();
     let refused = |start: VelocityPoint<3>, scheme: SplittingScheme| {
         let problem = Problem::new(&blade, 0.0, start).unwrap();
-        problem.by(LagrangeDAlembert::<_, 1>::new(&blade, scheme)).steps(Steps::Count(10)).run(Until::Time(0.5)).err()
+        problem.by(LagrangeDAlembert::new(&blade, scheme)).steps(Steps::Count(10)).run(Until::Time(0.5)).err()
     };
     let off = refused(VelocityPoint::new([0.0; 3], [0.0, 0.1, 1.0], 0.0), SCHEMES[0]);
     let Some(InputError::Constraint(ConstraintError::OffVelocity { distance })) = off else { panic!("{off:?}") };
