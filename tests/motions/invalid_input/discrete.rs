@@ -25,6 +25,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Polynomial::coefficients", "the implementor's"),
     ("TypeTwo::*", "the implementor's; those of Euler are tested with the steps"),
     ("TypeThree::*", "the implementor's; those of Euler are tested with the steps"),
+    ("GroupDerivatives::contact_defect_beside", "arithmetic; contact_defect calls it"),
     ("GroupGauss::lagrangian", "takes no number"),
     ("GroupGauss::stages", "takes no number"),
     ("groups::group_distance", "arithmetic: a result that is not finite follows from input that is not"),

@@ -158,9 +158,15 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
     /// The largest component of `Phi* eta - sigma eta` for the contact form `eta = dz - Pi . (g^-1 dg)`, relative to that
     /// of `Phi* eta`, with the conformal factor sigma of the motion. It is round-off unless a force is applied.
     pub fn contact_defect(&self) -> f64 {
+        self.contact_defect_beside(&ChartVector::from_fn(|_| 0.0))
+    }
+
+    /// The same for `Phi* eta - sigma eta + work`, with the virtual work of a force: round-off for that of a step,
+    /// [`GroupGauss::virtual_work`].
+    pub fn contact_defect_beside(&self, work: &ChartVector<N>) -> f64 {
         let form = |at: &GroupState<G, N>| ChartVector { x: -at.momentum, y: SVector::zeros(), z: 1.0 };
         let (pullback, _) = self.gradients(&form(&self.end));
-        let expected = form(&self.start).scale(self.log_factor.exp());
+        let expected = form(&self.start).scale(self.log_factor.exp()).minus(*work);
         pullback.minus(expected).max_abs_or_nan() / pullback.max_abs_or_nan()
     }
 }

@@ -275,6 +275,8 @@ fn torques_of_bodies() {
     }
     let check = of_json(&succeed(&["check", &file, "--json"]));
     assert!(check["contact"] == false && check["contact_defect"].as_f64().unwrap() > 1e-6, "{check}");
+    // The defect is the virtual work of the torque.
+    assert!(check["statements"][0]["residual"].as_f64().unwrap() < 1e-13, "{check}");
     assert!(succeed(&["plan", &file]).contains("torque: 0, 0, -0.6*omega3 in the body"));
     for (torque, expected) in [
         ("[\"0\", \"0\", \"-0.6*omega4\"]", "`torque`"),

@@ -3,9 +3,10 @@
 use super::run::Prepared;
 use super::steps::of_integrator;
 use super::{Body, BodyMotion};
-use crate::{Check, MomentumSample, NotContact, RuntimeError, Sample};
+use crate::{Check, MomentumSample, NotContact, RuntimeError, Sample, Statement, StatementResidual};
 use contact_geom::groups::Rotations;
 use contact_geom::nalgebra::Vector3;
+use contact_geom::numbers::max_abs_or_nan;
 use discrete_herglotz::AnyIntegrator;
 use discrete_herglotz::groups::{GroupDerivatives, GroupMotion, GroupState, group_distance};
 
@@ -16,7 +17,7 @@ impl Body {
     /// Checks that the steps of a motion are contact transformations of T\*SO(3) x R: the pullback of
     /// `dz - Pi . (R^-1 dR)` by a step is `sigma_d` times it, by dual numbers through the step, at a number of places along
     /// the motion; with the [momenta](Self::momenta) and their predictions, and the rate at which the steps depart from the
-    /// equations of motion.
+    /// equations of motion. With a torque the statement is that the defect of a step is the virtual work of the torque.
     ///
     /// ```
     /// use herglotz_runtime::{Body, BodyMotion, StepControl};
@@ -49,13 +50,16 @@ impl Body {
         };
         let at_start = momenta(&state.state());
         let places = places.clamp(1, steps);
-        let (mut samples, mut taken) = (Vec::with_capacity(places), 0);
+        let (mut samples, mut residuals, mut taken) = (Vec::with_capacity(places), Vec::new(), 0);
         for place in 0..places {
             let next = place * (steps - 1) / (places - 1).max(1);
             state.advance(&integrator, next - taken).map_err(of)?;
             taken = next;
             let (t, from) = (state.t(), state.state());
             let step = GroupDerivatives::new(&integrator, t, &from, 1).map_err(of)?;
+            if let Some(work) = integrator.virtual_work(t, &from) {
+                residuals.push(step.contact_defect_beside(&work.map_err(of)?));
+            }
             let mut reference = GroupMotion::<Rotations, 3>::new(t, from).map_err(of)?;
             reference.advance(&fine, 2).map_err(of)?;
             let (end, size) = (reference.state(), 1.0 + from.z.abs());
@@ -72,6 +76,10 @@ impl Body {
             });
         }
         let not_contact = self.torque.as_ref().map(|_| NotContact::Forced);
-        Ok(Check { integrator: by.to_string(), step_size, samples, statements: Vec::new(), not_contact })
+        let residual = max_abs_or_nan(residuals);
+        let (statement, method) = (Statement::VirtualWork, by.to_string());
+        let of_force = not_contact.map(|_| StatementResidual { statement, method, step_size, residual });
+        let statements = of_force.into_iter().collect();
+        Ok(Check { integrator: by.to_string(), step_size, samples, statements, not_contact })
     }
 }

@@ -2,9 +2,9 @@
 
 use super::BodyTorque;
 use crate::RuntimeError;
-use contact_geom::Scalar;
 use contact_geom::groups::{GroupError, GroupForced, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Scalar};
 use discrete_herglotz::groups::{GroupGauss, GroupIntegrator, GroupState, GroupStep, RigidBodySplitting};
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{AnyIntegrator, SplittingScheme};
@@ -41,6 +41,14 @@ impl BodyIntegrator {
     /// The integrator of a body for an accuracy, where none is named.
     pub fn default_for(is_forced: bool) -> AnyIntegrator {
         if is_forced { DEFAULT_FORCED } else { DEFAULT }
+    }
+
+    /// The virtual work of the torque in a step; `None` for a splitting, which takes no torque.
+    pub fn virtual_work(&self, t: f64, from: &GroupState<Rotations, 3>) -> Option<Result<ChartVector<3>, GroupError>> {
+        match self {
+            BodyIntegrator::Gauss(gauss) => Some(gauss.virtual_work(t, from)),
+            BodyIntegrator::Splitting(_) => None,
+        }
     }
 
     /// Refuses integrators that rigid bodies do not have, and splittings of a body with a torque.
