@@ -115,7 +115,7 @@ impl Scene {
             return Err(SceneError::at(text, lattice, message));
         }
         if let Some(body) = file::span_of_table(text, "body") {
-            let message = "a rigid body works only with `herglotz run`, `plan` and `sweep`; the other commands are for \
+            let message = "a rigid body works only with `herglotz run`, `plan`, `check` and `sweep`; the other commands are for \
                            systems given by formulas";
             return Err(SceneError::at(text, body, message));
         }
