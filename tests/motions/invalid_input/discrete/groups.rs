@@ -167,8 +167,14 @@ fn runs(report: &mut Report) {
             };
             let found = GroupDerivatives::with_parameters(&gauss, 0.0, &start(c), 3);
             report.entry_point(&c.to_vec(), found.map(numbers));
-            report.entry_point(&c.to_vec(), gauss.virtual_work(value, &start(GOOD)).map(|work| work.to_vector()));
-            report.entry_point(&c.to_vec(), gauss.virtual_work(0.0, &start(c)).map(|work| work.to_vector()));
+            report.entry_point(
+                &c.to_vec(),
+                gauss.virtual_work(value, &start(GOOD)).map(|work| work.to_vector().as_slice().to_vec()),
+            );
+            report.entry_point(
+                &c.to_vec(),
+                gauss.virtual_work(0.0, &start(c)).map(|work| work.to_vector().as_slice().to_vec()),
+            );
             let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(c), 3);
             report.entry_point(&c.to_vec(), dense.and_then(|dense| numbers_of(&dense.at(0.07)?)));
         }
