@@ -60,7 +60,8 @@ impl<I: GroupIntegrator<G, N>, G: LieGroup<N>, const N: usize> DenseGroupMotion<
         let (h, last) = (self.integrator.step_size(), self.knots.len() - 1);
         let part = (t - self.t0) / h;
         // Times that differ from an end by round-off are that end.
-        let rounding = 4.0 * f64::EPSILON * (t.abs() + self.t0.abs()) / h.abs();
+        let [first, end] = self.span();
+        let rounding = 4.0 * f64::EPSILON * (first.abs() + end.abs()) / h.abs();
         if !(part >= -rounding && part <= last as f64 + rounding) {
             let [from, to] = self.span();
             return Err(GroupError::OutsideSpan { t, from, to });

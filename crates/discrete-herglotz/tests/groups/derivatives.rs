@@ -203,7 +203,7 @@ fn states_at_any_time() {
         // The error of order 8 of seven steps of 0.1, and not more between them.
         let at = dense.at(0.2 + 7.5 * h).unwrap();
         assert!(distance(&at, &end_by(&fine, start(), 15)) < 1e-10);
-        for t in [0.2 - 0.1 * h, 0.2 + 10.1 * h, f64::NAN] {
+        for t in [0.2 - 0.1 * h, 0.2 + 10.1 * h, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert!(matches!(dense.at(t), Err(GroupError::OutsideSpan { .. })), "{t}");
         }
     }
