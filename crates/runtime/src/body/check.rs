@@ -13,6 +13,9 @@ use discrete_herglotz::groups::{GroupDerivatives, GroupMotion, GroupState, group
 /// The collocation with which steps are compared.
 const REFERENCE: AnyIntegrator = AnyIntegrator::Gauss { stages: 16 };
 
+/// The largest angle by which a step of the reference turns the body: its iteration converges.
+const TURN_OF_REFERENCE: f64 = 0.4;
+
 impl Body {
     /// Checks that the steps of a motion are contact transformations of T\*SO(3) x R: the pullback of
     /// `dz - Pi . (R^-1 dR)` by a step is `sigma_d` times it, by dual numbers through the step, at a number of places along
@@ -31,9 +34,8 @@ impl Body {
     /// # Errors
     /// Those of [`run`](Self::run), and [`RuntimeError::Argument`] where a step fails.
     pub fn check(&self, motion: &BodyMotion, places: usize) -> Result<Check, RuntimeError> {
-        let Prepared { mut state, by, steps, step_size, integrator, .. } = self.prepare(motion)?;
+        let Prepared { rows, mut state, by, steps, step_size, integrator, .. } = self.prepare(motion)?;
         let of = |error| of_integrator(&error);
-        let fine = self.with_step(REFERENCE, 0.5 * step_size)?;
         let names = self.momenta()?;
         let momenta = |at: &GroupState<Rotations, 3>| -> Vec<f64> {
             let spatial = at.spatial_momentum();
@@ -61,7 +63,11 @@ impl Body {
                 residuals.push(step.contact_defect_beside(&work.map_err(of)?));
             }
             let mut reference = GroupMotion::<Rotations, 3>::new(t, from).map_err(of)?;
-            reference.advance(&fine, 2).map_err(of)?;
+            let turn = rows.lagrangian.velocity(&from.momentum).norm() * step_size.abs();
+            // The cast saturates.
+            let count = (turn / TURN_OF_REFERENCE).ceil().max(2.0) as usize;
+            let fine = self.with_step(REFERENCE, step_size / count as f64)?;
+            reference.advance(&fine, count).map_err(of)?;
             let (end, size) = (reference.state(), 1.0 + from.z.abs());
             let apart = group_distance(&step.end, &end) + (step.end.z - end.z).abs() / size;
             let predicted = at_start.iter().map(|start| start * state.log_factor().exp());

@@ -79,18 +79,18 @@ impl Body {
         } else {
             PlanEntry::computed(what, "the torque of m g at the centre of mass")
         });
+        let what = "drag";
+        entries.push(if self.gamma == 0.0 {
+            PlanEntry::skipped(what, "gamma = 0, so that sigma_d = 1")
+        } else {
+            PlanEntry::computed(what, format!("gamma = {}; sigma_d is the same in every step", self.gamma))
+        });
         let what = "torque";
         entries.push(match &self.torque {
             None => PlanEntry::skipped(what, "none is given"),
             Some(torque) => {
                 PlanEntry::computed(what, format!("{} in the body; steps are not contact", torque.text().join(", ")))
             }
-        });
-        let what = "drag";
-        entries.push(if self.gamma == 0.0 {
-            PlanEntry::skipped(what, "gamma = 0, so that sigma_d = 1")
-        } else {
-            PlanEntry::computed(what, format!("gamma = {}; sigma_d is the same in every step", self.gamma))
         });
         let what = "trial runs";
         entries.push(match motion.step_control {
