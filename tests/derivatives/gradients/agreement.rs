@@ -11,7 +11,7 @@ use discrete_herglotz::GaussCollocation;
 /// amplify by less than 1e3. Differences are limited by the round-off of the run, 2048 units of it, and by their order.
 #[test]
 fn forward_backward_and_differences_agree() {
-    struct Visit(u32);
+    struct Visit(u32, usize);
     impl SystemVisitor for Visit {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
             for draw in 0..8 {
@@ -29,9 +29,16 @@ fn forward_backward_and_differences_agree() {
                     steps: 3 + draw as usize % 3,
                     method: GaussCollocation { stages },
                 };
+                // An orbit that meets a centre has no derivatives.
+                if !case.is_resolved() {
+                    self.1 += 1;
+                    continue;
+                }
                 case.compare(&format!("{}, {stages} stages, from {start:?}", system.name()), 3e-13, 1e-8);
             }
         }
     }
-    visit_catalogue(&mut Visit(0));
+    let mut visitor = Visit(0, 0);
+    visit_catalogue(&mut visitor);
+    assert!(visitor.1 <= 2, "{} motions are not resolved", visitor.1);
 }

@@ -120,6 +120,20 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
         table[LEVELS - 1]
     }
 
+    /// Whether the motion is completed, with an end that differs by at most a twentieth from that of a run with twice as
+    /// many steps.
+    pub fn is_resolved(&self) -> bool {
+        let problem = self.problem();
+        let end = |steps: usize| {
+            let outcome = self.method.run(&problem).steps(Steps::Count(steps)).run(Until::Time(self.t_end)).ok()?;
+            (outcome.status == Status::Completed).then_some(outcome.q)
+        };
+        match (end(self.steps), end(2 * self.steps)) {
+            (Some(coarse), Some(fine)) => (coarse - fine).norm() <= 0.05 * (1.0 + fine.norm()),
+            _ => false,
+        }
+    }
+
     /// Compares tangents with gradients, and both with differences, for every variable; the tolerances are relative to
     /// the largest derivative.
     pub fn compare(&self, name: &str, adjoint: f64, difference: f64) {

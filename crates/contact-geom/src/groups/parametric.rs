@@ -35,6 +35,25 @@ pub trait ParametricGroupLagrangian<G: LieGroup<N>, const N: usize>: GroupLagran
     }
 }
 
+impl<G, L, const N: usize> ParametricGroupLagrangian<G, N> for &L
+where
+    G: LieGroup<N>,
+    L: ParametricGroupLagrangian<G, N>,
+{
+    fn parameter_names(&self) -> Vec<String> {
+        (**self).parameter_names()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        (**self).parameters()
+    }
+    fn value_at<T: Scalar>(&self, theta: &[T], t: T, g: &G::Element<T>, xi: &SVector<T, N>, z: T) -> T {
+        (**self).value_at(theta, t, g, xi, z)
+    }
+    fn constant_rate_at<T: Scalar>(&self, theta: &[T]) -> Option<T> {
+        (**self).constant_rate_at(theta)
+    }
+}
+
 /// The entries `M[i][j]` with `i <= j` of the mass matrix, the parameters of the potential, and `gamma`.
 impl<G, V, const N: usize> ParametricGroupLagrangian<G, N> for RigidBody<V, N>
 where

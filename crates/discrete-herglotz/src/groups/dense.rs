@@ -14,7 +14,8 @@ use contact_geom::nalgebra::SVector;
 /// use discrete_herglotz::groups::{DenseGroupMotion, GroupGauss, GroupState};
 /// let body = RigidBody::rotating(&Inertia::principal([1.0, 2.0, 3.0])?, NoPotential, -0.1)?;
 /// let start = GroupState { g: Rotations::identity(), momentum: SVector::from([1.0, 1.0, 1.0]), z: 0.0 };
-/// let motion = DenseGroupMotion::new(GroupGauss::new::<Rotations, 3>(&body, 4, 0.5)?, 0.0, &start, 20)?;
+/// let gauss = GroupGauss::new::<Rotations, 3>(&body, 4, 0.5)?;
+/// let motion = DenseGroupMotion::<_, Rotations, 3>::new(gauss, 0.0, &start, 20)?;
 /// println!("{:?}", motion.at(3.21)?.momentum);
 /// # Ok::<(), contact_geom::groups::GroupError>(())
 /// ```

@@ -20,7 +20,7 @@ use contact_geom::{ChartVector, Dual, Scalar};
 /// let top = RigidBody::rotating(&Inertia::principal([1.0, 2.0, 2.5])?, gravity, -0.1)?;
 /// let start = GroupState { g: Rotations::identity(), momentum: SVector::from([0.5, 1.0, 2.0]), z: 0.0 };
 /// let gauss = GroupGauss::new::<Rotations, 3>(&top, 3, 0.05)?;
-/// let found = GroupDerivatives::with_parameters(&gauss, 0.0, &start, 40)?;
+/// let found = GroupDerivatives::<Rotations, 3>::with_parameters(&gauss, 0.0, &start, 40)?;
 /// println!("d Pi_1/d gamma = {}", found.in_parameters[(3, 12)]); // 6 entries of J, 3 + 3 of the gravity, gamma
 /// assert!((found.log_factor + 0.2).abs() < 1e-15 && found.contact_defect() < 1e-13);
 /// # Ok::<(), contact_geom::groups::GroupError>(())
