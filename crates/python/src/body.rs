@@ -52,6 +52,10 @@ impl RunMonitor for Kept {
     }
 }
 
+/// The derivatives of the end in the start and in the parameters, the logarithm of the conformal factor, and the contact
+/// defect.
+type DerivativesRecord = (Py<PyArray2<f64>>, Py<PyArray2<f64>>, f64, f64);
+
 /// The record of a motion of a rigid body.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
 pub struct BodyRecord {
@@ -68,8 +72,8 @@ pub struct BodyRecord {
     steps: usize,
     error_estimate: Option<f64>,
     interrupted: Option<Py<PyAny>>,
-    /// The derivatives in the start and in the parameters, the logarithm of the conformal factor, and the contact defect.
-    derivatives: Option<(Py<PyArray2<f64>>, Py<PyArray2<f64>>, f64, f64)>,
+    /// The derivatives, where they were requested and the run was completed.
+    derivatives: Option<DerivativesRecord>,
 }
 
 /// Three numbers.
