@@ -59,20 +59,17 @@ impl<I: GroupIntegrator<G, N>, G: LieGroup<N>, const N: usize> DenseGroupMotion<
     /// [`GroupError::OutsideSpan`]; those of a step.
     pub fn at(&self, t: f64) -> Result<GroupState<G, N>, GroupError> {
         let (h, last) = (self.integrator.step_size(), self.knots.len() - 1);
+        let [from, to] = self.span();
         let part = (t - self.t0) / h;
         // Times that differ from an end by round-off are that end.
-        let [first, end] = self.span();
-        let rounding = 4.0 * f64::EPSILON * (first.abs() + end.abs()) / h.abs();
-        if !(part >= -rounding && part <= last as f64 + rounding) {
-            let [from, to] = self.span();
-            return Err(GroupError::OutsideSpan { t, from, to });
-        }
+        let rounding = 4.0 * f64::EPSILON * (from.abs() + to.abs()) / h.abs();
+        // Not true of a NaN.
+        let is_within = part >= -rounding && part <= last as f64 + rounding;
         let k = (part.max(0.0) as usize).min(last);
-        let rest = t - self.time(k);
-        let Some((state, velocity)) = self.knots.get(k) else {
-            let [from, to] = self.span();
+        let (Some((state, velocity)), true) = (self.knots.get(k), is_within) else {
             return Err(GroupError::OutsideSpan { t, from, to });
         };
+        let rest = t - self.time(k);
         // Round-off of the time is no step.
         if rest.abs() <= rounding * h.abs() {
             return Ok(*state);

@@ -77,8 +77,8 @@ fn wrong_values_of_bodies_are_refused() {
     ];
     for (change, expected) in cases {
         for command in ["run", "plan"] {
-            let (code, told) = fail(&[command, &file, "--set", change]);
-            assert!(code == Some(2) && told.contains(expected), "{command} {change}: {told}");
+            let (code, message) = fail(&[command, &file, "--set", change]);
+            assert!(code == Some(2) && message.contains(expected), "{command} {change}: {message}");
         }
     }
 }
@@ -139,8 +139,8 @@ fn bodies_are_resumed() {
         let (whole, parts, saved) = (format!("whole_{i}"), format!("parts_{i}"), format!("saved_{i}"));
         let said = succeed(&["run", &file, "--out", &at.path(&whole), "--plot"]);
         assert!(said.starts_with("completed: 2000 steps of 5.000000e-4 by strang"), "{said}");
-        let (code, told) = fail(&["run", &file, "--out", &at.path(&parts), "--interrupt-at", "0.3"]);
-        assert!(code == Some(1) && told.contains("--resume"), "{told}");
+        let (code, message) = fail(&["run", &file, "--out", &at.path(&parts), "--interrupt-at", "0.3"]);
+        assert!(code == Some(1) && message.contains("--resume"), "{message}");
         let rest = ["run", &file, "--out", &at.path(&parts), "--resume", "--plot"];
         assert_eq!(fail(&[rest.as_slice(), &["--interrupt-at", "0.7"]].concat()).0, Some(1));
         // Output that a killed program has written after its last checkpoint.
@@ -164,14 +164,14 @@ fn bodies_are_resumed() {
         for out in [&parts, &saved] {
             assert!(!Path::new(&at.path(out)).join("checkpoint.json").exists(), "{rows}");
         }
-        let (code, told) = fail(&rest);
-        assert!(code == Some(2) && told.contains("there is no interrupted run"), "{told}");
+        let (code, message) = fail(&rest);
+        assert!(code == Some(2) && message.contains("there is no interrupted run"), "{message}");
     }
     // A different scene is not resumed, and the steps for an accuracy are those of the interrupted run.
     let file = at.path("0.toml");
     fail(&["run", &file, "--out", &at.path("parts_0"), "--interrupt-at", "0.3"]);
-    let (code, told) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
-    assert!(code == Some(2) && told.contains("the scene differs from that of the interrupted run"), "{told}");
+    let (code, message) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
+    assert!(code == Some(2) && message.contains("the scene differs from that of the interrupted run"), "{message}");
     let accuracy = "run.accuracy=1e-6";
     let of = |out: &str, more: &[&str]| {
         let out = at.path(out);
@@ -224,8 +224,8 @@ fn bodies_are_swept() {
     // A member that cannot start, members that an event ends, and an override.
     let ended = at.write("ended.toml", &(TOP.to_owned() + "[sweep]\nmass = [15.0, -1.0, 14.0]\n"));
     let arguments = ["sweep", &ended, "--out", &at.path("ended"), "--json", "--set", "gamma=0"];
-    let told = of_json(&succeed(&arguments));
-    assert_eq!([&told["members"], &told["stopped"], &told["failed"]], [3, 2, 1], "{told}");
+    let message = of_json(&succeed(&arguments));
+    assert_eq!([&message["members"], &message["stopped"], &message["failed"]], [3, 2, 1], "{message}");
     let rows = at.read("ended/sweep.csv");
     let rows: Vec<&str> = rows.lines().collect();
     assert!(
@@ -238,14 +238,14 @@ fn bodies_are_swept() {
         ("gamma = []", "the list of values is empty"),
     ] {
         let file = at.write("refused.toml", &format!("{TOP}[sweep]\n{sweep}\n"));
-        let (code, told) = fail(&["sweep", &file, "--out", &at.path("refused")]);
-        assert!(code == Some(2) && told.contains(expected), "{sweep}: {told}");
+        let (code, message) = fail(&["sweep", &file, "--out", &at.path("refused")]);
+        assert!(code == Some(2) && message.contains(expected), "{sweep}: {message}");
     }
-    let (code, told) = fail(&["sweep", &scene("heavy_top"), "--out", &at.path("refused")]);
-    assert!(code == Some(2) && told.contains("no swept values"), "{told}");
+    let (code, message) = fail(&["sweep", &scene("heavy_top"), "--out", &at.path("refused")]);
+    assert!(code == Some(2) && message.contains("no swept values"), "{message}");
 }
 
-/// The steps of bodies are contact transformations, their momenta have their predictions, and a torque is told.
+/// The steps of bodies are contact transformations, their momenta have their predictions, and a torque is message.
 #[test]
 fn bodies_are_checked() {
     for (name, momenta) in [("heavy_top", 2), ("free_body", 3)] {
@@ -255,10 +255,10 @@ fn bodies_are_checked() {
         assert!(check["momentum_defect"].as_f64().unwrap() < 1e-13, "{check}");
         assert_eq!(check["places"][4]["momenta"].as_array().unwrap().len(), momenta, "{check}");
     }
-    let told = succeed(&["check", &scene("free_body")]);
-    assert!(told.contains("contact: the pullback of dz - Pi . (R^-1 dR) by a step of"), "{told}");
-    let (code, told) = fail(&["check", &scene("free_body"), "--lyapunov"]);
-    assert!(code == Some(2) && told.contains("--lyapunov"), "{told}");
+    let message = succeed(&["check", &scene("free_body")]);
+    assert!(message.contains("contact: the pullback of dz - Pi . (R^-1 dR) by a step of"), "{message}");
+    let (code, message) = fail(&["check", &scene("free_body"), "--lyapunov"]);
+    assert!(code == Some(2) && message.contains("--lyapunov"), "{message}");
 }
 
 /// A torque in a scene: about a principal axis the angular velocity decays in closed form.
@@ -284,10 +284,10 @@ fn torques_of_bodies() {
         ("[\"0\", \"0\"]", "torque"),
     ] {
         let wrong = at.write("wrong.toml", &text.replace("[\"0\", \"0\", \"-0.6*omega3\"]", torque));
-        let (code, told) = fail(&["run", &wrong, "--out", &at.path("wrong")]);
-        assert!(code == Some(2) && told.contains(expected), "{torque}: {told}");
+        let (code, message) = fail(&["run", &wrong, "--out", &at.path("wrong")]);
+        assert!(code == Some(2) && message.contains(expected), "{torque}: {message}");
     }
     let split = at.write("split.toml", &text.replace("accuracy = 1e-11", "integrator = \"suzuki_4\"\nsteps = 10"));
-    let (code, told) = fail(&["run", &split, "--out", &at.path("split")]);
-    assert!(code == Some(2) && told.contains("takes no torque"), "{told}");
+    let (code, message) = fail(&["run", &split, "--out", &at.path("split")]);
+    assert!(code == Some(2) && message.contains("takes no torque"), "{message}");
 }
