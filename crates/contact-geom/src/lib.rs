@@ -51,10 +51,11 @@ pub mod constraints {
     };
 }
 
-/// Vector spaces of dual parts, and maxima that propagate NaN.
+/// Vector spaces of dual parts, vectors from functions of the index, and maxima that propagate NaN.
 pub mod numbers {
     pub use crate::number::{
         AugmentedVector, Coefficient, MaxAbsOrNan, MaxOrNan, ScalarOver, TangentVector, max_abs_or_nan, max_or_nan,
+        vector_of,
     };
 }
 

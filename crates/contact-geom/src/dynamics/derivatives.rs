@@ -5,6 +5,7 @@ use crate::{
     ChartVector, Dual, Lagrangian, Scalar, VelocityPoint,
     numbers::TangentVector,
     support::{KernelDual, seed},
+    vector,
 };
 use nalgebra::{SMatrix, SVector};
 use num_traits::One;
@@ -145,14 +146,14 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         }
         let time = KernelDual::constant(t);
         if let Some(gradient) = self.closed_gradient(time, &y) {
-            return SMatrix::from_fn(|i, j| gradient.y[i].d[j]);
+            return matrix(&gradient.y);
         }
         let mut v = still::<_, SVector<KernelDual<T, SVector<T, N>>, N>, N>(&y.v);
         for i in 0..N {
             v[i].d[i] = KernelDual::one();
         }
         let l = self.value(KernelDual::constant(time), &still(&y.q), &v, KernelDual::constant(y.z));
-        SMatrix::from_fn(|i, j| l.d[i].d[j])
+        matrix(&l.d)
     }
 
     #[inline]
@@ -188,7 +189,19 @@ fn missing<T: Scalar, const N: usize>() -> ChartVector<N, T> {
 /// The coordinates as constants, whose differentials vanish.
 #[inline(always)]
 fn still<T: Scalar, D: TangentVector<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
-    SVector::from_array_storage(nalgebra::ArrayStorage([std::array::from_fn(|i| KernelDual::constant(x[i]))]))
+    vector!(|i| KernelDual::constant(x[i]))
+}
+
+/// The matrix of the derivatives of a vector, by rows.
+#[inline(always)]
+fn matrix<T: Scalar, const N: usize>(x: &SVector<KernelDual<T, SVector<T, N>>, N>) -> SMatrix<T, N, N> {
+    let mut columns = [[T::zero(); N]; N];
+    for (j, column) in columns.iter_mut().enumerate() {
+        for (i, entry) in column.iter_mut().enumerate() {
+            *entry = x[i].d[j];
+        }
+    }
+    SMatrix::from_array_storage(nalgebra::ArrayStorage(columns))
 }
 
 /// The second partial derivatives of a Lagrangian in `(q, v, z)`; `W = vv` in the paper's notation.

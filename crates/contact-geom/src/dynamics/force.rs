@@ -1,7 +1,7 @@
 //! Forces that no Lagrangian contains.
 
 use crate::dynamics::lagrangian::forward_lagrangian;
-use crate::{Hints, Lagrangian, Scalar, Structure, VelocityPoint};
+use crate::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, vector};
 use nalgebra::{SMatrix, SVector};
 
 /// A force on a motion, in the Lagrange-d'Alembert-Herglotz equations
@@ -115,10 +115,10 @@ impl<const N: usize> Force<N> for VelocityDrag<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         if self.quadratic == 0.0 {
-            return SVector::from_fn(|i, _| -(x.v[i] * self.linear[i]));
+            return vector!(|i| -(x.v[i] * self.linear[i]));
         }
         let speed = x.v.dot(&x.v).sqrt() * self.quadratic;
-        SVector::from_fn(|i, _| -(x.v[i] * (speed + self.linear[i])))
+        vector!(|i| -(x.v[i] * (speed + self.linear[i])))
     }
     fn structure(&self) -> ForceStructure<N> {
         ForceStructure::Drag { linear: self.linear, quadratic: self.quadratic }
@@ -155,7 +155,7 @@ impl<const N: usize, L: Lagrangian<N>, F: Force<N>> Lagrangian<N> for Forced<L, 
         let force = self.force.value(t, x);
         if const { L::HINTS.forced } {
             let other = self.lagrangian.applied_force(t, x);
-            return SVector::from_fn(|i, _| force[i] + other[i]);
+            return vector!(|i| force[i] + other[i]);
         }
         force
     }

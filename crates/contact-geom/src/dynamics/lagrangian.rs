@@ -1,7 +1,7 @@
 //! Lagrangians L(t, q, v, z).
 
 use crate::switching::Control;
-use crate::{ChartVector, Defect, ForceStructure, Hessian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::{ChartVector, Defect, ForceStructure, Hessian, PhasePoint, Scalar, Structure, VelocityPoint, vector};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -159,7 +159,7 @@ pub trait Lagrangian<const N: usize> {
     /// there is none.
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        SVector::from_fn(|_, _| T::zero())
+        vector!(|_| T::zero())
     }
 
     /// What integrators may rely on about the applied force. By default nothing, if [`Hints::forced`] is set, and

@@ -11,6 +11,7 @@ mod num_dual;
 mod operators;
 pub(crate) mod rounded;
 mod scalar;
+mod vector;
 
 pub use coefficient::{Coefficient, ScalarOver};
 pub use dual::{Dual, KernelDual};
@@ -18,3 +19,4 @@ pub use legendre_polynomials::legendre_polynomials;
 pub use max_or_nan::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan, max_or_nan};
 pub use module::{AugmentedVector, TangentVector};
 pub use scalar::Scalar;
+pub use vector::vector_of;

@@ -10,7 +10,7 @@ use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, SplittingScheme};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, vector};
 use pulp::{Simd, WithSimd};
 use std::borrow::Cow;
 
@@ -139,8 +139,8 @@ struct Pack<S: Simd, const K: usize, const N: usize> {
 }
 
 impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
-    /// The pack of some motions; lanes beyond the last motion repeat it.
-    #[inline(always)]
+    /// The pack of some motions; lanes beyond the last motion repeat it. Not inlined: it is called once for many steps.
+    #[inline(never)]
     fn from_lanes(members: &[Lane<N>]) -> Self {
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
             SimdBatch::from_lanes(|i| members.get(i).or(members.last()).map_or(0.0, |lane| f(&lane.state)))
@@ -151,11 +151,12 @@ impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
 
     #[inline(always)]
     fn zero() -> Self {
-        let (zero, still) = (SimdBatch::splat(0.0), SVector::from_fn(|_, _| SimdBatch::splat(0.0)));
+        let (zero, still) = (SimdBatch::splat(0.0), vector!(|_| SimdBatch::splat(0.0)));
         Pack { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, suspect: zero }
     }
 
-    /// The state in a lane.
+    /// The state in a lane. Not inlined: it is called for rows alone.
+    #[inline(never)]
     fn state(&self, i: usize) -> PhasePoint<N> {
         let of = |x: &SVector<SimdBatch<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
         PhasePoint { q: of(&self.q), p: of(&self.p), z: self.z.lanes()[i] }
@@ -270,7 +271,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     #[inline(always)]
     fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Pack<S, K, N>, t: f64) {
         let zero = SimdBatch::splat(0.0);
-        let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
+        let rest = VelocityPoint { q: m.q, v: vector!(|_| zero), z: zero };
         let (value, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &rest);
         m.force = force;
         // A stored value is always computed: it is stored only if it is used.
@@ -320,7 +321,7 @@ pub(crate) fn velocity<L, S: Simd, const K: usize, const N: usize>(
     p: &SVector<SimdBatch<S, K>, N>,
 ) -> SVector<SimdBatch<S, K>, N> {
     let Some(inverse) = &form.inverse else { return *p };
-    SVector::from_fn(|i, _| {
+    vector!(|i| {
         let mut sum = p[0] * inverse[(i, 0)];
         for j in 1..N {
             sum += p[j] * inverse[(i, j)];

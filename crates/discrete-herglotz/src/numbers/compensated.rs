@@ -87,13 +87,19 @@ impl From<Quad> for Unevaluated {
 /// makes their sum not finite.
 #[inline(always)]
 pub(crate) fn finite<const N: usize>(dq: &[Unevaluated; N], dy: &[Unevaluated; N], dz: Unevaluated) -> bool {
-    (0..N).fold(dz.head, |sum, d| sum + (dq[d].head + dy[d].head)).is_finite()
+    let mut sum = dz.head;
+    for d in 0..N {
+        sum += dq[d].head + dy[d].head;
+    }
+    sum.is_finite()
 }
 
 /// Adds increments to compensated sums.
 #[inline(always)]
 pub(crate) fn add<const N: usize>(x: &mut [CompensatedSum; N], changes: &[Unevaluated; N]) {
-    x.iter_mut().zip(changes).for_each(|(x, change)| x.add(*change));
+    for d in 0..N {
+        x[d].add(changes[d]);
+    }
 }
 
 saved!([] CompensatedSum { value, rest });

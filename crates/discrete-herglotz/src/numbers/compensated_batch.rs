@@ -38,7 +38,7 @@ impl<S: Simd, const K: usize> CompensatedBatch<S, K> {
     /// `c x`, up to the round-off of the rest.
     #[inline(always)]
     pub fn product([head, tail]: Pair, x: Self) -> Self {
-        let [head, tail] = [head, tail].map(SimdBatch::splat);
+        let (head, tail) = (SimdBatch::splat(head), SimdBatch::splat(tail));
         let value = head * x.value;
         CompensatedBatch { value, rest: head.mul_add(x.value, -value) + tail.mul_add(x.value, head * x.rest) }
     }

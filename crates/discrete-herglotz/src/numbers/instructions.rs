@@ -57,7 +57,9 @@ macro_rules! only {
                 unsafe { $set::new_unchecked() }
             }
 
-            #[inline(always)]
+            // Not inlined, as in builds for any processor, so that each kernel is a function of its own: `.ci/kernel_calls`
+            // lists what they call.
+            #[inline(never)]
             pub fn run<K: WithSimd>(set: Set, kernel: K) -> K::Output {
                 Simd::vectorize(set, kernel)
             }

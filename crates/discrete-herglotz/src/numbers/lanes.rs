@@ -1,7 +1,6 @@
 //! The lanes of a SIMD register as a scalar type over which a Lagrangian can be evaluated.
 
 use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
-use contact_geom::nalgebra::SVector;
 use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
@@ -47,17 +46,6 @@ pub(crate) fn note_branch() {
 #[inline(always)]
 pub(crate) fn forget_branches() {
     ASKED.set(false);
-}
-
-/// A vector of registers. It is filled by a loop, since nalgebra's `from_fn` may be compiled as a separate function
-/// without vector instructions.
-#[inline(always)]
-pub(crate) fn vector<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
-    let mut x = [T::from(0.0); N];
-    for (d, x) in x.iter_mut().enumerate() {
-        *x = of(d);
-    }
-    x.into()
 }
 
 impl<S: Simd> Lanes<S> {

@@ -2,7 +2,8 @@
 
 use crate::numbers::lanes::{Lanes, note_branch};
 use crate::numbers::registers::{MAX_STAGES, Stages};
-use contact_geom::{Scalar, scalar_operators};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Scalar, scalar_operators, vector};
 use pulp::Simd;
 use std::ops::Neg;
 
@@ -61,6 +62,12 @@ impl<S: Simd, T: Registers<S>> Registers<S> for Pair<T> {
     fn register(&self, i: usize) -> Lanes<S> {
         if i < T::COUNT { self.0.register(i) } else { self.1.register(i - T::COUNT) }
     }
+}
+
+/// The i-th register of each component of a vector.
+#[inline(always)]
+pub(crate) fn register<S: Simd, T: Registers<S>, const N: usize>(x: &SVector<T, N>, i: usize) -> SVector<Lanes<S>, N> {
+    vector!(|d| x[d].register(i))
 }
 
 /// The common value of two numbers; records a branch and returns NaN if they differ.

@@ -121,15 +121,47 @@ macro_rules! over_groups {
 
 pub(crate) use over_groups;
 
-/// K registers from the r-th on. It uses a loop, since a closure in `from_fn` may be compiled as a separate function
-/// without vector instructions.
-#[inline(always)]
-fn group<S: Simd, const K: usize>(of: &impl Fn(usize) -> Lanes<S>, r: usize) -> [Lanes<S>; K] {
-    let mut group = [Lanes::splat(0.0); K];
-    for (i, lanes) in group.iter_mut().enumerate() {
-        *lanes = of(r + i);
+/// The terms to which a product is added. They are no closures, which may be compiled as separate functions without vector
+/// instructions.
+pub(crate) trait Terms<S: Simd>: Copy {
+    /// The r-th register.
+    fn register(self, r: usize) -> Lanes<S>;
+
+    /// K registers from the r-th on.
+    #[inline(always)]
+    fn group<const K: usize>(self, r: usize) -> [Lanes<S>; K] {
+        let mut group = [Lanes::splat(0.0); K];
+        for (i, lanes) in group.iter_mut().enumerate() {
+            *lanes = self.register(r + i);
+        }
+        group
     }
-    group
+}
+
+/// The same number at all stages.
+impl<S: Simd> Terms<S> for Lanes<S> {
+    #[inline(always)]
+    fn register(self, _r: usize) -> Lanes<S> {
+        self
+    }
+}
+
+impl<S: Simd> Terms<S> for &Stages {
+    #[inline(always)]
+    fn register(self, r: usize) -> Lanes<S> {
+        self.block(r)
+    }
+}
+
+/// Values at the stages times a number.
+#[derive(Clone, Copy)]
+pub(crate) struct Scaled<'a, S: Simd>(pub &'a Stages, pub Lanes<S>);
+
+impl<S: Simd> Terms<S> for Scaled<'_, S> {
+    #[inline(always)]
+    fn register(self, r: usize) -> Lanes<S> {
+        self.0.block(r) * self.1
+    }
 }
 
 /// A linear map between stage values, by columns.
@@ -148,9 +180,9 @@ impl StageMap {
 
     /// `y = start + M x`.
     #[inline(always)]
-    pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Fn(usize) -> Lanes<S>) {
+    pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Terms<S>) {
         over_groups!(S, blocks::<S>(s), r, K => {
-            let [sums] = self.rows::<S, K, 1>([x], s, [group(&start, r)], r);
+            let [sums] = self.rows::<S, K, 1>([x], s, [start.group(r)], r);
             y.set_group(r, sums);
         });
     }
@@ -176,17 +208,17 @@ impl StageMap {
         x: &[Stages; N],
         s: usize,
         y: &mut [Stages; N],
-        start: impl Fn(usize, usize) -> Lanes<S>,
+        start: &[Stages; N],
     ) {
         for (i, (x, y)) in x.chunks(2).zip(y.chunks_mut(2)).enumerate() {
             match (x, y) {
                 ([a, b], [c, d]) => over_groups!(S, blocks::<S>(s), r, K at most 2 => {
-                    let starts = [group(&|r| start(2 * i, r), r), group(&|r| start(2 * i + 1, r), r)];
+                    let starts = [(&start[2 * i]).group(r), (&start[2 * i + 1]).group(r)];
                     let [first, second] = self.rows::<S, K, 2>([a, b], s, starts, r);
                     c.set_group(r, first);
                     d.set_group(r, second);
                 }),
-                ([a], [c]) => self.apply(a, s, c, |r| start(2 * i, r)),
+                ([a], [c]) => self.apply::<S>(a, s, c, &start[2 * i]),
                 _ => {}
             }
         }

@@ -16,6 +16,26 @@ use std::ops::Neg;
 #[repr(align(64))] // A register that crosses a cache line is slow to read after it was written.
 pub(crate) struct SimdBatch<S: Simd, const K: usize>(pub [S::f64s; K]);
 
+/// The registers from a function of their index, for [`registers`](macro@registers).
+#[inline(always)]
+fn registers_of<S: Simd, const K: usize>(of: impl Fn(usize) -> S::f64s) -> SimdBatch<S, K> {
+    let mut x = [token::<S>().splat_f64s(0.0); K];
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = of(k);
+    }
+    SimdBatch(x)
+}
+
+/// The registers `|k| ...`. The closure is always inlined, which those of `std::array::from_fn` and `map` are not.
+macro_rules! registers {
+    (|$k:pat_param| $of:expr) => {
+        registers_of(
+            #[inline(always)]
+            |$k| $of,
+        )
+    };
+}
+
 impl<S: Simd, const K: usize> SimdBatch<S, K> {
     /// The number of lanes of all registers.
     pub const COUNT: usize = S::F64_LANES * K;
@@ -35,10 +55,12 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
         pack
     }
 
+    #[inline(always)]
     pub fn lanes(&self) -> &[f64] {
         bytemuck::cast_slice(&self.0)
     }
 
+    #[inline(always)]
     fn lanes_mut(&mut self) -> &mut [f64] {
         bytemuck::cast_slice_mut(&mut self.0)
     }
@@ -47,12 +69,7 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
         let set = token::<S>();
-        SimdBatch(std::array::from_fn(|k| set.mul_add_f64s(self.0[k], b.0[k], c.0[k])))
-    }
-
-    #[inline(always)]
-    fn map(self, f: impl Fn(S::f64s) -> S::f64s) -> Self {
-        SimdBatch(self.0.map(f))
+        registers!(|k| set.mul_add_f64s(self.0[k], b.0[k], c.0[k]))
     }
 
     /// Applies a function of one number lane by lane.
@@ -66,16 +83,14 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
     #[inline(always)]
     pub fn at_most(self, b: Self, then: Self, otherwise: Self) -> Self {
         let set = token::<S>();
-        SimdBatch(std::array::from_fn(|k| {
-            set.select_f64s(set.less_than_or_equal_f64s(self.0[k], b.0[k]), then.0[k], otherwise.0[k])
-        }))
+        registers!(|k| { set.select_f64s(set.less_than_or_equal_f64s(self.0[k], b.0[k]), then.0[k], otherwise.0[k]) })
     }
 
     /// The lane-wise maximum. If one value is NaN, the result may be either of them.
     #[inline(always)]
     pub fn max(self, b: Self) -> Self {
         let set = token::<S>();
-        SimdBatch(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
+        registers!(|k| set.max_f64s(self.0[k], b.0[k]))
     }
 
     /// Whether any lane is not 0.
@@ -93,9 +108,9 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
     fn within_range(self, argument: Self) -> Self {
         let set = token::<S>();
         let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
-        SimdBatch(std::array::from_fn(|k| {
+        registers!(|k| {
             set.select_f64s(set.less_than_f64s(Lanes::<S>(argument.0[k]).abs().0, range), self.0[k], none)
-        }))
+        })
     }
 }
 
@@ -111,7 +126,7 @@ impl<S: Simd, const K: usize> Register for SimdBatch<S, K> {
     }
     #[inline(always)]
     fn turned(self, of: Self) -> Self {
-        SimdBatch(std::array::from_fn(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0))
+        registers!(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0)
     }
 }
 
@@ -139,15 +154,15 @@ impl<S: Simd, const K: usize> Neg for SimdBatch<S, K> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|x| token::<S>().neg_f64s(x))
+        registers!(|k| token::<S>().neg_f64s(self.0[k]))
     }
 }
 
 scalar_operators! { [S: Simd, const K: usize] SimdBatch<S, K>;
-    a + b = SimdBatch(std::array::from_fn(|k| token::<S>().add_f64s(a.0[k], b.0[k])));
-    c - d = SimdBatch(std::array::from_fn(|k| token::<S>().sub_f64s(c.0[k], d.0[k])));
-    e * f = SimdBatch(std::array::from_fn(|k| token::<S>().mul_f64s(e.0[k], f.0[k])));
-    g / h = SimdBatch(std::array::from_fn(|k| token::<S>().div_f64s(g.0[k], h.0[k])));
+    a + b = registers!(|k| token::<S>().add_f64s(a.0[k], b.0[k]));
+    c - d = registers!(|k| token::<S>().sub_f64s(c.0[k], d.0[k]));
+    e * f = registers!(|k| token::<S>().mul_f64s(e.0[k], f.0[k]));
+    g / h = registers!(|k| token::<S>().div_f64s(g.0[k], h.0[k]));
 }
 
 impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
@@ -165,15 +180,15 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
         let set = token::<S>();
         let unordered = set.splat_f64s(f64::NAN);
-        SimdBatch(std::array::from_fn(|k| {
+        registers!(|k| {
             let less = set.less_than_f64s(self.0[k], than.0[k]);
             let not_less = set.less_than_or_equal_f64s(than.0[k], self.0[k]);
             set.select_f64s(less, then.0[k], set.select_f64s(not_less, otherwise.0[k], unordered))
-        }))
+        })
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        self.map(|x| Lanes::<S>(x).abs().0)
+        registers!(|k| Lanes::<S>(self.0[k]).abs().0)
     }
     #[inline(always)]
     fn recip(self) -> Self {
@@ -181,7 +196,7 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        self.map(|x| token::<S>().sqrt_f64s(x))
+        registers!(|k| token::<S>().sqrt_f64s(self.0[k]))
     }
     /// The products of `f64::powi`, in the same order.
     #[inline(always)]

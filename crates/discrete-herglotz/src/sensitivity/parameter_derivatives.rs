@@ -1,12 +1,12 @@
 //! Derivatives of L and of the force with respect to parameters and time, at a point.
 
-use crate::numbers::lanes::{Lanes, branched, forget_branches, vector};
+use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{Stages, blocks};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use contact_geom::nalgebra::{ArrayStorage, SVector};
 use contact_geom::support::{KernelDual, seed};
-use contact_geom::{ChartVector, Derivatives, Dual, Parametric, PhasePoint, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Dual, Parametric, PhasePoint, VelocityPoint, vector};
 use num_traits::{One, Zero};
 use pulp::Simd;
 
@@ -233,21 +233,24 @@ impl<const N: usize> ParameterDerivatives<N> {
         }
         let mut sum = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(at.s) {
-            let moving = |re: &Stages, d: &Stages| {
-                Nested::<S>::constant(KernelDual { re: re.block::<S>(r), d: vector(|_| d.block::<S>(r)) })
-            };
-            let q = vector::<Nested<S>, N>(|d| moving(&at.q[d], &w.q[d]));
-            let v = vector::<Nested<S>, N>(|d| moving(&at.v[d], &w.v[d]));
+            let q: SVector<Nested<S>, N> = vector!(|d| moving(&at.q[d], &w.q[d], r));
+            let v: SVector<Nested<S>, N> = vector!(|d| moving(&at.v[d], &w.v[d], r));
             let mut time = Nested::<S>::constant(KernelDual::constant(at.times.block::<S>(r)));
             if quantity == Quantity::Time {
                 time.d[0] = KernelDual::one();
             }
-            let l = lagrangian.value_at(&theta[..self.theta.len()], time, &q, &v, moving(&at.z, &w.z)).d[0];
+            let l = lagrangian.value_at(&theta[..self.theta.len()], time, &q, &v, moving(&at.z, &w.z, r)).d[0];
             let along = w.r.block::<S>(r) * l.re + at.rho.block::<S>(r) * l.d[0];
             sum = weights.block::<S>(r).mul_add(along, sum);
         }
         (!branched()).then(|| sum.sum())
     }
+}
+
+/// A block of stage values with their derivatives along a tangent.
+#[inline(always)]
+fn moving<S: Simd>(re: &Stages, d: &Stages, r: usize) -> Nested<S> {
+    Nested::<S>::constant(KernelDual { re: re.block::<S>(r), d: vector!(|_| d.block::<S>(r)) })
 }
 
 /// The largest number of parameters whose numbers with derivatives, in SIMD lanes, are on the stack.

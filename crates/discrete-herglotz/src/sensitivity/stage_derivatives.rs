@@ -7,14 +7,16 @@ use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::integration::depends_on_action;
-use crate::numbers::lanes::{Lanes, branched, forget_branches, vector};
+use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use crate::sensitivity::SolvedStages;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{KernelDual, linear};
-use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, VelocityPoint};
+use contact_geom::{
+    ChartVector, Derivatives, Hessian, Lagrangian, Scalar, VelocityPoint, numbers::TangentVector, vector,
+};
 use num_traits::{One, Zero};
 use pulp::Simd;
 
@@ -145,7 +147,7 @@ impl<const N: usize> StageDerivatives<N> {
         }
         if let (false, Some(actions)) = (step.knows_l, actions) {
             let without = stage_values::<S>(forward, &self.l, step.start.z);
-            actions.apply::<S>(&without, s, &mut self.z, |_| Lanes::splat(0.0));
+            actions.apply::<S>(&without, s, &mut self.z, Lanes::<S>::splat(0.0));
             for i in 0..MAX_STAGES {
                 self.l.0[i] += self.l_z.0[i] * self.z.0[i];
             }
@@ -167,8 +169,7 @@ impl<const N: usize> StageDerivatives<N> {
         }
         for r in 0..blocks::<S>(self.s) {
             let t = self.times.block::<S>(r);
-            let at = |x: &StageVector<N>| vector::<Lanes<S>, N>(|d| x[d].block(r));
-            let x = VelocityPoint { q: at(&self.q), v: at(&self.v), z: self.z.block(r) };
+            let x = VelocityPoint { q: block(&self.q, r), v: block(&self.v, r), z: self.z.block(r) };
             let (l, gradient) = lagrangian.with_gradient(t, &x);
             self.l.set(r, l);
             self.l_z.set(r, gradient.z);
@@ -206,8 +207,7 @@ impl<const N: usize> StageDerivatives<N> {
         r: usize,
     ) -> bool {
         type Along<S, const N: usize> = KernelDual<Lanes<S>, SVector<Lanes<S>, N>>;
-        let still = |x: &SVector<Lanes<S>, N>| vector::<Along<S, N>, N>(|d| KernelDual::constant(x[d]));
-        let mut y = VelocityPoint { q: still(&x.q), v: still(&x.v), z: KernelDual::constant(x.z) };
+        let mut y = VelocityPoint::<N, Along<S, N>> { q: still(&x.q), v: still(&x.v), z: KernelDual::constant(x.z) };
         for d in 0..N {
             y.q[d].d[d] = Lanes::one();
         }
@@ -224,8 +224,7 @@ impl<const N: usize> StageDerivatives<N> {
             return false;
         }
         type Nested<S, const N: usize> = KernelDual<Along<S, N>, SVector<Along<S, N>, N>>;
-        let still = |x: &SVector<Along<S, N>, N>| vector::<Nested<S, N>, N>(|d| KernelDual::constant(x[d]));
-        let mut q = still(&y.q);
+        let mut q: SVector<Nested<S, N>, N> = still(&y.q);
         for d in 0..N {
             q[d].d[d] = KernelDual::one();
         }
@@ -248,8 +247,7 @@ impl<const N: usize> StageDerivatives<N> {
         r: usize,
     ) -> bool {
         type Along<S, const N: usize> = KernelDual<Lanes<S>, ChartVector<N, Lanes<S>>>;
-        let still = |x: &SVector<Lanes<S>, N>| vector::<Along<S, N>, N>(|d| KernelDual::constant(x[d]));
-        let mut y = VelocityPoint { q: still(&x.q), v: still(&x.v), z: KernelDual::constant(x.z) };
+        let mut y = VelocityPoint::<N, Along<S, N>> { q: still(&x.q), v: still(&x.v), z: KernelDual::constant(x.z) };
         for d in 0..N {
             y.q[d].d.x[d] = Lanes::one();
             y.v[d].d.y[d] = Lanes::one();
@@ -278,7 +276,7 @@ impl<const N: usize> StageDerivatives<N> {
             return true;
         }
         for j in 0..N {
-            let mut column = vector::<Lanes<S>, N>(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
+            let mut column: SVector<Lanes<S>, N> = vector!(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
             if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
                 return false;
             }
@@ -346,7 +344,7 @@ impl<const N: usize> StageDerivatives<N> {
 #[inline(always)]
 pub(crate) fn stage_values<S: Simd>(maps: &StepMaps, rates: &Stages, start: f64) -> Stages {
     let (mut values, start) = (Stages::ZERO, Lanes::<S>::splat(start));
-    maps.to_stages.apply::<S>(rates, maps.s, &mut values, |_| start);
+    maps.to_stages.apply::<S>(rates, maps.s, &mut values, start);
     values
 }
 
@@ -358,4 +356,16 @@ pub(crate) fn end_value<S: Simd>(maps: &StepMaps, rates: &Stages) -> f64 {
         sum = maps.weights.block::<S>(r).mul_add(rates.block(r), sum);
     }
     sum.sum()
+}
+
+/// A block of the stages of a vector.
+#[inline(always)]
+fn block<S: Simd, const N: usize>(x: &StageVector<N>, r: usize) -> SVector<Lanes<S>, N> {
+    vector!(|d| x[d].block(r))
+}
+
+/// The coordinates as constants, whose differentials vanish.
+#[inline(always)]
+fn still<T: Scalar, D: TangentVector<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
+    vector!(|d| KernelDual::constant(x[d]))
 }

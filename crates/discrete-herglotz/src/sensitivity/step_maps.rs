@@ -64,7 +64,7 @@ impl StepMaps {
     #[inline(always)]
     pub fn extrapolated<S: Simd>(&self, x: &Stages) -> Stages {
         let mut next = Stages::ZERO;
-        self.extrapolation.apply::<S>(x, self.s, &mut next, |_| Lanes::splat(0.0));
+        self.extrapolation.apply::<S>(x, self.s, &mut next, Lanes::<S>::splat(0.0));
         next
     }
 

@@ -1,7 +1,7 @@
 //! The derivatives of contact Hamiltonians.
 
 use crate::support::{KernelDual, seed};
-use crate::{ChartVector, ContactHamiltonian, Dual, Hessian, PhasePoint, Scalar};
+use crate::{ChartVector, ContactHamiltonian, Dual, Hessian, PhasePoint, Scalar, vector};
 use nalgebra::{SMatrix, SVector};
 
 /// The derivatives of a contact Hamiltonian: in closed form where it provides them, otherwise by automatic
@@ -33,8 +33,8 @@ impl<H: ContactHamiltonian<N> + ?Sized, const N: usize> HamiltonianDerivatives<N
             return (none, ChartVector { x: missing, y: missing, z: none });
         }
         type D<T, const N: usize> = KernelDual<T, ChartVector<N, T>>;
-        let mut q = SVector::<D<T, N>, N>::from_fn(|i, _| KernelDual::constant(x.q[i]));
-        let mut p = SVector::<D<T, N>, N>::from_fn(|i, _| KernelDual::constant(x.p[i]));
+        let mut q: SVector<D<T, N>, N> = vector!(|i| KernelDual::constant(x.q[i]));
+        let mut p: SVector<D<T, N>, N> = vector!(|i| KernelDual::constant(x.p[i]));
         let mut z = D::<T, N>::constant(x.z);
         for i in 0..N {
             q[i].d.x[i] = T::one();

@@ -1,7 +1,7 @@
 //! Vector fields as contact Hamiltonians.
 
 use crate::support::KernelDual;
-use crate::{ChartVector, ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
+use crate::{ChartVector, ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar, vector};
 use nalgebra::SVector;
 
 /// A vector field `q' = X(t, q)` on `R^N`, written once as a generic function.
@@ -57,7 +57,7 @@ impl<const N: usize, X: VectorField<N>> ContactHamiltonian<N> for Lifted<X> {
     /// With derivatives in the positions alone, half as many as those of H.
     #[inline(always)]
     fn closed_with_gradient<T: Scalar>(&self, t: T, x: &PhasePoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
-        let mut q = SVector::<KernelDual<T, SVector<T, N>>, N>::from_fn(|i, _| KernelDual::constant(x.q[i]));
+        let mut q: SVector<KernelDual<T, SVector<T, N>>, N> = vector!(|i| KernelDual::constant(x.q[i]));
         for i in 0..N {
             q[i].d[i] = T::one();
         }

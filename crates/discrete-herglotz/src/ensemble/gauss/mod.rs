@@ -138,8 +138,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// The pack of some motions; lanes beyond the last motion repeat it.
-    #[inline(always)]
+    /// The pack of some motions; lanes beyond the last motion repeat it. Not inlined: it is called once for many steps.
+    #[inline(never)]
     fn start<S: Simd, const K: usize>(&self, members: &[Lane<N>]) -> Pack<S, K, N> {
         let zero = SimdBatch::zero();
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
@@ -166,7 +166,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
     }
 
-    /// The state in a lane.
+    /// The state in a lane. Not inlined: it is called for rows alone.
+    #[inline(never)]
     fn state<S: Simd, const K: usize>(&self, m: &Pack<S, K, N>, i: usize) -> PhasePoint<N> {
         let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
         PhasePoint {

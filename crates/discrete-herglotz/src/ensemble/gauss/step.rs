@@ -14,7 +14,7 @@ use crate::resolution::thresholds::{
     FEW_STAGES, MAX_LAST_COEFFICIENT_IN_LANES, MAX_TURN_IN_LANES, POSITION_ROUND_OFF, STAGE_ROUND_OFF,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint, vector};
 use num_traits::Zero;
 use pulp::Simd;
 
@@ -99,7 +99,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     ) {
         let zero = SimdBatch::zero();
         let sum = combined(row, &m.a, self.table.s);
-        let x: [SimdBatch<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
+        let x = vector!(|d| m.base[i][d] + sum[d]);
         let a = self.accelerations(t + self.table.times[i], &x);
         for d in 0..N {
             let before = m.a[i][d];
@@ -160,7 +160,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     #[inline(always)]
     fn begin<S: Simd, const K: usize>(&self, m: &mut Pack<S, K, N>, s: usize, tails: bool) {
         for i in 0..s {
-            let [u, u_tail] = self.table.u[i].map(SimdBatch::splat);
+            let [u, u_tail] = self.table.u[i];
+            let (u, u_tail) = (SimdBatch::splat(u), SimdBatch::splat(u_tail));
             let of_tails = if tails { combined(&self.table.b_tail[i], &m.a, s) } else { [SimdBatch::zero(); N] };
             for d in 0..N {
                 let (q, v) = (m.q[d], m.v[d]);
@@ -173,9 +174,13 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
 
     /// `M^-1 L_q` at a stage.
     #[inline(always)]
-    fn accelerations<S: Simd, const K: usize>(&self, t: f64, x: &[SimdBatch<S, K>; N]) -> SVector<SimdBatch<S, K>, N> {
+    fn accelerations<S: Simd, const K: usize>(
+        &self,
+        t: f64,
+        x: &SVector<SimdBatch<S, K>, N>,
+    ) -> SVector<SimdBatch<S, K>, N> {
         let zero = SimdBatch::zero();
-        let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_fn(|_, _| zero), z: zero };
+        let at = VelocityPoint { q: *x, v: vector!(|_| zero), z: zero };
         let (_, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &at);
         crate::ensemble::splitting::velocity(&self.form, &force)
     }
@@ -189,8 +194,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
             for i in 0..s {
                 let sum = combined(&velocities[i], &m.a, s);
                 let rho = SimdBatch::splat(inverse_rho[i]);
-                let v = SVector::from_fn(|d, _| rho.mul_add(m.v[d].value, sum[d]));
-                let q = SVector::from_fn(|d, _| m.x[i][d]);
+                let v = vector!(|d| rho.mul_add(m.v[d].value, sum[d]));
+                let q = vector!(|d| m.x[i][d]);
                 let action = self.form.lagrangian.value(SimdBatch::splat(t + times[i]), &q, &v, SimdBatch::zero());
                 dz = dz.plus(end_v[i], action);
             }
@@ -230,5 +235,8 @@ fn combined<S: Simd, const K: usize, const N: usize>(
             odd[d] = SimdBatch::splat(c[1]).mul_add(value[1][d], odd[d]);
         }
     }
-    std::array::from_fn(|d| sum[d] + odd[d])
+    for d in 0..N {
+        sum[d] += odd[d];
+    }
+    sum
 }

@@ -8,14 +8,15 @@ use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::parametrization::Parametrization;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
 use crate::gauss::tables::condensed::Condensed;
-use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
-use crate::numbers::registers::{StageMap, Stages, blocks};
+use crate::numbers::registers::{Scaled, StageMap, Stages, blocks};
 use crate::resolution::thresholds::{MIN_EXACT_PRODUCT, VALUE_ROUND_OFF};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
+    vector,
 };
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
@@ -156,7 +157,7 @@ impl<const N: usize> Curve<N> {
         (self.acts, self.z) = (false, 0.0);
         for d in 0..N {
             let v0 = Lanes::<S>::splat(v0[d]);
-            table.d.apply(&a[d], table.s, &mut self.v[d], |r| table.inverse_rho.block(r) * v0);
+            table.d.apply(&a[d], table.s, &mut self.v[d], Scaled(&table.inverse_rho, v0));
         }
         for r in 0..blocks::<S>(table.s) {
             let rho = table.inverse_rho.block::<S>(r).recip();
@@ -203,13 +204,13 @@ impl Between {
     /// The values of a polynomial at the sample points.
     #[inline(always)]
     fn value<S: Simd>(&self, s: usize, y: &Stages, out: &mut Stages) {
-        self.value.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+        self.value.apply(y, s, out, Lanes::<S>::splat(0.0));
     }
 
     /// The integral of a polynomial up to the sample points, plus the value at the start of the step.
     #[inline(always)]
     fn grown<S: Simd>(&self, s: usize, h: f64, y: &Stages, from: f64, out: &mut Stages) {
-        self.integral.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+        self.integral.apply(y, s, out, Lanes::<S>::splat(0.0));
         for r in 0..blocks::<S>(s) {
             out.set(r, out.block::<S>(r) * h + from);
         }
@@ -294,8 +295,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
         let mut other: Option<(Lanes<S>, ChartVector<N, Lanes<S>>)> = None;
         for r in 0..blocks::<S>(s) {
             let mut x = VelocityPoint {
-                q: vector(|d| q[d].block::<S>(r)),
-                v: vector(|d| v[d].block::<S>(r)),
+                q: vector!(|d| q[d].block::<S>(r)),
+                v: vector!(|d| v[d].block::<S>(r)),
                 z: z.block::<S>(r),
             };
             // The factors from transformed time to t.
@@ -309,13 +310,13 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
             let (value, g) = match other.take() {
                 Some(other) => other,
                 None if const { L::HINTS.hamiltonian } => {
-                    let p = vector(|d| y[d].block::<S>(r) * inverse);
+                    let p = vector!(|d| y[d].block::<S>(r) * inverse);
                     of_hamiltonian(lagrangian, between.points.block::<S>(r) * h + t, &x, &p)
                 }
                 None if const { L::HINTS.interpreted && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
                     let pair = VelocityPoint {
-                        q: vector(|d| Two::<S>::of(&q[d], r)),
-                        v: vector(|d| Two::of(&v[d], r)),
+                        q: vector!(|d| Two::<S>::of(&q[d], r)),
+                        v: vector!(|d| Two::of(&v[d], r)),
                         z: Two::of(&z, r),
                     };
                     let (l, g) = lagrangian.with_gradient_and_force(Two::of(&between.points, r) * h + t, &pair);

@@ -171,7 +171,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
     #[inline(always)]
     fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
         let start = (self.q, self.v, self.z);
-        (1..steps).for_each(|_| self.step());
+        for _ in 1..steps {
+            self.step();
+        }
         let last = self.start();
         self.step();
         if self.is_finite() {

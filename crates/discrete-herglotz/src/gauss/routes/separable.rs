@@ -14,13 +14,15 @@ use crate::gauss::stages::simplified_newton::SlopeNewton;
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
 use crate::numbers::instructions::Instructions;
-use crate::numbers::lanes::{Lanes, branched, vector};
+use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::pair::{Registers, over_registers};
-use crate::numbers::registers::{Stages, blocks};
+use crate::numbers::registers::{Scaled, Stages, blocks};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding};
+use contact_geom::{
+    Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding, vector,
+};
 use pulp::Simd;
 use std::sync::Arc;
 
@@ -164,10 +166,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     /// block.
     #[inline(always)]
     fn take_forces<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
-        let x = VelocityPoint { q: vector(|d| T::of(&self.x[d], r)), v: vector(|_| T::zero()), z: T::zero() };
+        let x = VelocityPoint { q: vector!(|d| T::of(&self.x[d], r)), v: vector!(|_| T::zero()), z: T::zero() };
         let force = self.lagrangian.force(T::of(&self.table.times, r) + t, &x);
         for i in 0..T::COUNT {
-            self.take(r + i, vector(|d| force[d].register(i)), most);
+            self.take(r + i, vector!(|d| force[d].register(i)), most);
         }
         r + T::COUNT
     }
@@ -179,7 +181,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         match &self.inverse_mass {
             None => force,
             Some(inverse) => {
-                let mut accelerations = vector(|_| zero);
+                let mut accelerations = vector!(|_| zero);
                 for i in 0..N {
                     for j in 0..N {
                         accelerations[i] += force[j] * inverse[(i, j)];
@@ -204,7 +206,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if predicts {
             for d in 0..N {
                 let before = self.rest[d];
-                self.table.extrapolation.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
+                self.table.extrapolation.apply(&before, s, &mut self.rest[d], Lanes::<S>::splat(0.0));
             }
         } else if !solved {
             self.rest = [Stages::ZERO; N];
@@ -239,7 +241,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 (small, again) = (Some(weight), self.newton.is_some());
             }
             let base = &self.base;
-            self.left.head.b.apply_to_each(&self.rest, s, &mut self.x, |d, r| base[d].block::<S>(r));
+            self.left.head.b.apply_to_each::<S, N>(&self.rest, s, &mut self.x, base);
             if aside {
                 aside = false;
                 self.begin::<S>(small);
@@ -413,7 +415,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let mut velocities = [Stages::ZERO; N];
         for d in 0..N {
             let v = Lanes::<S>::splat(self.v[d].value);
-            table.d.apply(&self.a[d], s, &mut velocities[d], |r| table.inverse_rho.block(r) * v);
+            table.d.apply(&self.a[d], s, &mut velocities[d], Scaled(&table.inverse_rho, v));
         }
         StageValues { lagrangian: self.lagrangian, times: &table.times, t, x: &self.x, v: &velocities }.all::<S>(s)
     }

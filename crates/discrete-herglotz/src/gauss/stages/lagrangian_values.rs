@@ -1,9 +1,8 @@
 //! The values of a Lagrangian at the stages of a condensed step.
 
-use crate::numbers::lanes::vector;
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{Stages, blocks};
-use contact_geom::Lagrangian;
+use contact_geom::{Lagrangian, vector};
 use pulp::Simd;
 
 /// `L(t, q, v, 0)` at the stages of a step that begins at the time t.
@@ -29,7 +28,7 @@ impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
     /// Evaluates the blocks of stages that T holds, from the r-th on; returns the index of the next block.
     #[inline(always)]
     fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {
-        let (q, v) = (vector(|d| T::of(&self.x[d], r)), vector(|d| T::of(&self.v[d], r)));
+        let (q, v) = (vector!(|d| T::of(&self.x[d], r)), vector!(|d| T::of(&self.v[d], r)));
         let l = self.lagrangian.value(T::of(self.times, r) + self.t, &q, &v, T::zero());
         for i in 0..T::COUNT {
             values.set(r + i, l.register(i));

@@ -3,11 +3,11 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
-use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Structure, support::linear};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Structure, support::linear, vector};
 use pulp::Simd;
 
 /// The inverse mass matrix, which maps momentum residuals to changes of velocity.
@@ -33,7 +33,7 @@ impl<const N: usize> Mass<N> {
     pub fn invert<S: Simd>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
         let Mass::Stages(stored) = self else { return true };
         for j in 0..N {
-            let mut column = vector::<Lanes<S>, N>(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
+            let mut column: SVector<Lanes<S>, N> = vector!(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
             if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
                 return false;
             }

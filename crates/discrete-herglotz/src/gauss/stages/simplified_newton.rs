@@ -73,6 +73,24 @@ struct CorrectSlope<'a, const N: usize> {
     found: &'a mut [Stages; N],
 }
 
+/// The corrections of the accelerations and of the positions, in the coordinates of the modes. Not inlined, since complex
+/// numbers gain nothing from vector instructions.
+#[inline(never)]
+fn solve_modes<const N: usize>(
+    modes: &Modes,
+    inverses: &[(Matrix<N>, Complex<f64>)],
+    found: &mut [Stages; N],
+    moved: &mut [Stages; N],
+) {
+    for (mode, (inverse, b)) in modes.iter().zip(inverses) {
+        let change = *inverse * Vector::<N>::from_fn(|d, _| mode.of(&found[d]));
+        for d in 0..N {
+            mode.set(&mut found[d], change[d]);
+            mode.set(&mut moved[d], change[d] * *b);
+        }
+    }
+}
+
 impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
     type Output = (f64, f64);
 
@@ -86,13 +104,7 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
             modes.enter::<S>(found);
         }
         let mut moved = [Stages::ZERO; N];
-        for (mode, (inverse, b)) in modes.iter().zip(inverses) {
-            let change = *inverse * Vector::<N>::from_fn(|d, _| mode.of(&found[d]));
-            for d in 0..N {
-                mode.set(&mut found[d], change[d]);
-                mode.set(&mut moved[d], change[d] * *b);
-            }
-        }
+        solve_modes(modes, inverses, found, &mut moved);
         let mut far = Lanes::<S>::splat(0.0);
         for moved in &mut moved {
             modes.leave::<S>(moved);
@@ -214,6 +226,15 @@ impl<const N: usize> StageNewton<N> {
         for x in v.iter_mut().chain([&mut *z, &mut *rho]) {
             self.modes.enter::<S>(x);
         }
+        self.solve_modes(v, z, rho);
+        for x in v.iter_mut().chain([z, rho]) {
+            self.modes.leave::<S>(x);
+        }
+    }
+
+    /// The same in the coordinates of the modes. Not inlined, since complex numbers gain nothing from vector instructions.
+    #[inline(never)]
+    fn solve_modes(&self, v: &mut [Stages; N], z: &mut Stages, rho: &mut Stages) {
         for (mode, block) in self.modes.iter().zip(&self.blocks) {
             let r_v = Vector::<N>::from_fn(|d, _| mode.of(&v[d]));
             let (dv, dz, drho) = block.solve(r_v, mode.of(z), mode.of(rho));
@@ -222,9 +243,6 @@ impl<const N: usize> StageNewton<N> {
             }
             mode.set(z, dz);
             mode.set(rho, drho);
-        }
-        for x in v.iter_mut().chain([z, rho]) {
-            self.modes.leave::<S>(x);
         }
     }
 }
@@ -273,10 +291,10 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
         let (s, m) = (table.s, blocks::<S>(table.s));
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
         let (mut dv, mut dz, mut drho) = ([Stages::ZERO; N], Stages::ZERO, Stages::ZERO);
-        table.m.apply(rate, s, &mut drho, |_| zero);
-        table.m.apply(l, s, &mut dz, |_| Lanes::<S>::splat(z0));
+        table.m.apply(rate, s, &mut drho, zero);
+        table.m.apply(l, s, &mut dz, Lanes::<S>::splat(z0));
         for d in 0..N {
-            table.m.apply(&force[d], s, &mut dv[d], |_| Lanes::<S>::splat(p0[d]));
+            table.m.apply(&force[d], s, &mut dv[d], Lanes::<S>::splat(p0[d]));
         }
         for r in 0..m {
             let one_minus_rho_stages = one_minus_rho_stages.block::<S>(r);
@@ -311,7 +329,7 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             for r in 0..m {
                 moved[d].set(r, table.weights.block::<S>(r) * v[d].block(r));
             }
-            table.m.apply(&moved[d], s, &mut x[d], |_| Lanes::<S>::splat(q0[d]));
+            table.m.apply(&moved[d], s, &mut x[d], Lanes::<S>::splat(q0[d]));
             for r in 0..m {
                 let now = x[d].block::<S>(r);
                 far = far.max((now - before.block(r)).abs());

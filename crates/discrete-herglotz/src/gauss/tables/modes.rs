@@ -79,14 +79,14 @@ impl Modes {
     #[inline(always)]
     pub fn enter<S: Simd>(&self, x: &mut Stages) {
         let stages = *x;
-        self.into.apply(&stages, self.s, x, |_| Lanes::<S>::splat(0.0));
+        self.into.apply(&stages, self.s, x, Lanes::<S>::splat(0.0));
     }
 
     /// Transforms coefficients of the modes to stage values.
     #[inline(always)]
     pub fn leave<S: Simd>(&self, x: &mut Stages) {
         let modes = *x;
-        self.back.apply(&modes, self.s, x, |_| Lanes::<S>::splat(0.0));
+        self.back.apply(&modes, self.s, x, Lanes::<S>::splat(0.0));
     }
 }
 

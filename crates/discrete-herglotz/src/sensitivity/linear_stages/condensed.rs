@@ -38,11 +38,11 @@ impl<const N: usize> LinearStages<N> {
         (x.r, x.r_rate) = (Stages::ZERO, Stages::ZERO);
         if given.has_r {
             let mut without = Stages::ZERO;
-            maps.to_stages.apply::<S>(&given.r_source, s, &mut without, |_| zero);
+            maps.to_stages.apply::<S>(&given.r_source, s, &mut without, zero);
             for i in 0..MAX_STAGES {
                 without.0[i] = given.r.0[i] - without.0[i];
             }
-            condensed.r.apply::<S>(&without, s, &mut x.r, |_| zero);
+            condensed.r.apply::<S>(&without, s, &mut x.r, zero);
             for i in 0..MAX_STAGES {
                 x.r_rate.0[i] = -gamma * x.r.0[i] - given.r_source.0[i];
             }
@@ -59,7 +59,7 @@ impl<const N: usize> LinearStages<N> {
             }
         }
         for d in 0..N {
-            maps.to_stages.apply::<S>(&u[d], s, &mut q0[d], |r| given.q[d].block(r));
+            maps.to_stages.apply::<S>(&u[d], s, &mut q0[d], &given.q[d]);
         }
         let mut fixed = [Stages::ZERO; N];
         for d in 0..N {
@@ -77,7 +77,7 @@ impl<const N: usize> LinearStages<N> {
                     }
                 }
                 let mut q = Stages::ZERO;
-                condensed.positions.apply::<S>(&a[d], s, &mut q, |r| q0[d].block(r));
+                condensed.positions.apply::<S>(&a[d], s, &mut q, &q0[d]);
                 for r in 0..blocks::<S>(s) {
                     let new = q.block::<S>(r);
                     change = change.max((new - x.q[d].block::<S>(r)).abs());
@@ -103,7 +103,7 @@ impl<const N: usize> LinearStages<N> {
             }
         }
         for d in 0..N {
-            maps.to_stages.apply::<S>(&x.p_rate[d], s, &mut x.p[d], |r| given.p[d].block(r));
+            maps.to_stages.apply::<S>(&x.p_rate[d], s, &mut x.p[d], &given.p[d]);
         }
         let mut z_rate = given.z_source;
         let mut finite = 0.0;
@@ -124,8 +124,8 @@ impl<const N: usize> LinearStages<N> {
             }
         }
         let mut without = Stages::ZERO;
-        maps.to_stages.apply::<S>(&z_rate, s, &mut without, |r| given.z.block(r));
-        condensed.z.apply::<S>(&without, s, &mut x.z, |_| zero);
+        maps.to_stages.apply::<S>(&z_rate, s, &mut without, &given.z);
+        condensed.z.apply::<S>(&without, s, &mut x.z, zero);
         for i in 0..MAX_STAGES {
             z_rate.0[i] += gamma * x.z.0[i];
         }

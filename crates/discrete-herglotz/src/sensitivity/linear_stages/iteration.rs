@@ -52,23 +52,16 @@ impl<const N: usize> LinearStages<N> {
     ) -> f64 {
         let Kinds { motion, z, r } = kinds;
         let s = maps.s;
-        let sum = |rates: &Stages, start: Option<&Stages>| {
-            let mut values = stage_values::<S>(maps, rates, 0.0);
-            if let Some(start) = start {
-                add(&mut values, start);
-            }
-            values
-        };
         if r {
-            x.r = sum(&x.r_rate, given.map(|g| &g.r));
+            x.r = summed::<S>(maps, &x.r_rate, given.map(|g| &g.r));
         }
         if z {
-            x.z = sum(&x.z_rate, given.map(|g| &g.z));
+            x.z = summed::<S>(maps, &x.z_rate, given.map(|g| &g.z));
         }
         let mut worst = 0.0;
         if motion {
             for d in 0..N {
-                x.q[d] = sum(&x.v[d], given.map(|g| &g.q[d]));
+                x.q[d] = summed::<S>(maps, &x.v[d], given.map(|g| &g.q[d]));
             }
             for d in 0..N {
                 let mut rate = product(&x.r, &self.p_r[d]);
@@ -85,7 +78,7 @@ impl<const N: usize> LinearStages<N> {
                     add(&mut rate, &given.p_source[d]);
                 }
                 x.p_rate[d] = rate;
-                x.p[d] = sum(&x.p_rate[d], given.map(|g| &g.p[d]));
+                x.p[d] = summed::<S>(maps, &x.p_rate[d], given.map(|g| &g.p[d]));
             }
             let mut momentum = [Stages::ZERO; N];
             for d in 0..N {
@@ -154,6 +147,16 @@ impl<const N: usize> LinearStages<N> {
         }
         worst
     }
+}
+
+/// The values at the stages from their rates, with inhomogeneous terms where there are some.
+#[inline(always)]
+fn summed<S: Simd>(maps: &StepMaps, rates: &Stages, start: Option<&Stages>) -> Stages {
+    let mut values = stage_values::<S>(maps, rates, 0.0);
+    if let Some(start) = start {
+        add(&mut values, start);
+    }
+    values
 }
 
 /// The largest difference and the largest value at the stages; infinite where one is NaN.

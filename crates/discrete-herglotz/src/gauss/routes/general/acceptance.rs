@@ -49,7 +49,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         // Compares `start + M rates` with `sums`, relative to the terms of the sum.
         let holds = |start: f64, rates: &Stages, rounding: f64, sums: &dyn Fn(usize) -> f64| {
             let mut sum = Stages::ZERO;
-            self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
+            self.table.m.apply(rates, s, &mut sum, Lanes::<S>::splat(0.0));
             (0..s).all(|i| {
                 let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
                 let off = start + sum.0[i] - sums(i);

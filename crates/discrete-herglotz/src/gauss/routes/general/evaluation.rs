@@ -5,21 +5,20 @@
 
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::parametrization::Parametrization;
-use crate::numbers::lanes::{Lanes, vector};
-use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::lanes::Lanes;
+use crate::numbers::pair::{Registers, over_registers, register};
 use crate::numbers::registers::blocks;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Derivatives, Lagrangian, VelocityPoint, support::KernelDual};
+use contact_geom::{ChartVector, Derivatives, Lagrangian, VelocityPoint, support::KernelDual, vector};
 use pulp::Simd;
-use std::array::from_fn;
 
 impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// The point of TQ x R at a block of stages.
     #[inline(always)]
     pub(crate) fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
         VelocityPoint {
-            q: vector(|d| self.x[d].block(r)),
-            v: vector(|d| self.v[d].block(r)),
+            q: vector!(|d| self.x[d].block(r)),
+            v: vector!(|d| self.v[d].block(r)),
             z: self.z_stages.block(r),
         }
     }
@@ -44,7 +43,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             let (mut weight, one_minus_rho_stages) =
                 (self.table.weights.block::<S>(r), -self.one_minus_rho_stages.block::<S>(r));
             let point = self.point::<S>(r);
-            let q = vector::<_, N>(|i| {
+            let q: SVector<_, N> = vector!(|i| {
                 let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
                 q.d[i] = Lanes::splat(1.0);
                 q
@@ -52,7 +51,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
             let energy = point.v.dot(&d.y) - re;
             let extended = energy.mul_add(one_minus_rho_stages, energy + self.extension.p_t.value);
-            let of_transformed: [_; N] = from_fn(|i| slope[i] * extended * -weight);
+            let of_transformed: SVector<_, N> = vector!(|i| slope[i] * extended * -weight);
             weight *= g;
             dg = dg.max((g - self.extension.g.block(r)).abs());
             sg = sg.max(g.abs());
@@ -73,14 +72,17 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
     #[inline(always)]
     fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
         let point = VelocityPoint {
-            q: vector(|d| T::of(&self.x[d], r)),
-            v: vector(|d| T::of(&self.v[d], r)),
+            q: vector!(|d| T::of(&self.x[d], r)),
+            v: vector!(|d| T::of(&self.v[d], r)),
             z: T::of(&self.z_stages, r),
         };
         let (l, d) = self.lagrangian.with_gradient_and_force(T::of(&self.table.times, r) + t, &point);
         for i in 0..T::COUNT {
-            let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
-            self.weigh(r + i, l.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+            self.weigh(
+                r + i,
+                l.register(i),
+                &ChartVector { x: register(&d.x, i), y: register(&d.y, i), z: d.z.register(i) },
+            );
         }
         r + T::COUNT
     }

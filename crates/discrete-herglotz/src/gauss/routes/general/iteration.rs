@@ -5,9 +5,10 @@
 
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::parametrization::Parametrization;
-use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{blocks, over_groups};
-use contact_geom::{Lagrangian, Scalar};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, Scalar, vector};
 use pulp::Simd;
 
 /// The largest changes in an iteration, and the largest values: of velocities, integrating factors and actions.
@@ -71,8 +72,8 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             seen.see(1, one_minus_rho_stages - before, rho);
             self.one_minus_rho_stages.set(r, one_minus_rho_stages);
             let inverse = rho.recip();
-            let excess =
-                vector::<Lanes<S>, N>(|d| self.l_v[d].block::<S>(r).mul_add(one_minus_rho_stages, pushed[d][k]));
+            let excess: SVector<Lanes<S>, N> =
+                vector!(|d| self.l_v[d].block::<S>(r).mul_add(one_minus_rho_stages, pushed[d][k]));
             let mut weight = self.table.weights.block::<S>(r);
             if const { !P::PHYSICAL } {
                 weight *= self.extension.g.block(r);

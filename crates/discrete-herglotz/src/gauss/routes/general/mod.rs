@@ -268,10 +268,10 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         let (m, s) = (&self.m, self.table.s);
         for ((q, moved), x) in self.q.iter().zip(&self.moved).zip(&mut self.x) {
             let q = Lanes::<S>::splat(q.value);
-            m.apply(moved, s, x, |_| q);
+            m.apply(moved, s, x, q);
         }
         let z = Lanes::<S>::splat(self.z.value);
-        m.apply(&self.l, s, &mut self.z_stages, |_| z);
+        m.apply(&self.l, s, &mut self.z_stages, z);
     }
 
     /// The predictor of a step: extrapolates the polynomials of the last step.
@@ -283,13 +283,13 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         let StageTable { extrapolation, extrapolation_weighted, .. } = &self.table;
         for x in self.v.iter_mut().chain(&mut self.l_v).chain(rates) {
             let before = *x;
-            extrapolation.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            extrapolation.apply(&before, s, x, Lanes::<S>::splat(0.0));
         }
         // rho is 1 at the start of each step.
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
         for (x, factor) in scaled.chain([(&mut self.l, 1.0)]) {
             let before = *x;
-            extrapolation_weighted.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            extrapolation_weighted.apply(&before, s, x, Lanes::<S>::splat(0.0));
             for r in 0..blocks::<S>(s) {
                 x.set(r, x.block::<S>(r) * factor);
             }
@@ -305,9 +305,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         if self.warm && !solved {
             self.extrapolate::<S>();
             if self.newton.is_some() {
-                self.table
-                    .m
-                    .apply(&self.rate, self.table.s, &mut self.one_minus_rho_stages, |_| Lanes::<S>::splat(0.0));
+                self.table.m.apply(&self.rate, self.table.s, &mut self.one_minus_rho_stages, Lanes::<S>::splat(0.0));
             }
         } else if !solved && !predicted {
             self.l = Stages::ZERO;

@@ -4,11 +4,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
-use crate::numbers::lanes::{Lanes, vector};
-use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::lanes::Lanes;
+use crate::numbers::pair::{Registers, over_registers, register};
 use crate::numbers::registers::{blocks, over_groups};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, VelocityPoint, vector};
 use pulp::Simd;
 
 /// The kinds of variables whose changes are compared with their largest values.
@@ -139,8 +138,8 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     #[inline(always)]
     fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
         let point = PhasePoint {
-            q: vector(|d| T::of(&self.x[d], r)),
-            p: vector(|d| T::of(&self.p_stages[d], r)),
+            q: vector!(|d| T::of(&self.x[d], r)),
+            p: vector!(|d| T::of(&self.p_stages[d], r)),
             z: T::of(&self.z_stages, r),
         };
         let time = T::of(&self.table.times, r) + t;
@@ -151,8 +150,11 @@ impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
             d.x -= self.lagrangian.applied_force(time, &x);
         }
         for i in 0..T::COUNT {
-            let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
-            self.weigh(r + i, h.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+            self.weigh(
+                r + i,
+                h.register(i),
+                &ChartVector { x: register(&d.x, i), y: register(&d.y, i), z: d.z.register(i) },
+            );
         }
         r + T::COUNT
     }

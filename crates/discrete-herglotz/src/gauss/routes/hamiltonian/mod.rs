@@ -236,7 +236,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
         for (x, factor) in scaled.chain(self.moved.iter_mut().chain([&mut self.l]).map(|x| (x, 1.0))) {
             let before = *x;
-            map.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            map.apply(&before, s, x, Lanes::<S>::splat(0.0));
             for r in 0..blocks::<S>(s) {
                 x.set(r, x.block::<S>(r) * factor);
             }

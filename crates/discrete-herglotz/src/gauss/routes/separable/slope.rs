@@ -16,7 +16,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
         let (s, base) = (self.table.s, &self.base[0]);
         let mut next = Stages::ZERO;
         if ahead {
-            self.left.head.b.apply(&self.rest[0], s, &mut next, |r| base.block::<S>(r));
+            self.left.head.b.apply::<S>(&self.rest[0], s, &mut next, base);
         }
         // A steeper secant is due to round-off.
         let (most, least) = (Lanes::<S>::splat(self.left.kappa.abs()), Lanes::<S>::splat(f64::MIN_POSITIVE));

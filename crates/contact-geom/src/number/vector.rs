@@ -1,0 +1,37 @@
+//! Vectors from a function of the index, for code that runs in SIMD lanes.
+
+use crate::Scalar;
+use nalgebra::SVector;
+
+/// The vector whose components are the values of a function of the index; [`vector`](macro@crate::vector) calls it with a closure that
+/// is always inlined.
+#[inline(always)]
+pub fn vector_of<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
+    let mut x = [T::zero(); N];
+    for (i, x) in x.iter_mut().enumerate() {
+        *x = of(i);
+    }
+    x.into()
+}
+
+/// A vector from the formula of its components, `vector!(|i| ...)` with the index i, for Lagrangians, forces and
+/// Hamiltonians.
+///
+/// Integrators evaluate them in SIMD lanes. The closure is always inlined into their kernels; that of nalgebra's `from_fn`
+/// may be compiled as a separate function, which has no vector instructions.
+///
+/// ```
+/// use contact_geom::nalgebra::SVector;
+/// let v = SVector::from([1.0, -2.0]);
+/// let drag: SVector<f64, 2> = contact_geom::vector!(|i| -(v[i] * 0.5));
+/// assert_eq!(drag, SVector::from([-0.5, 1.0]));
+/// ```
+#[macro_export]
+macro_rules! vector {
+    (|$i:pat_param| $of:expr) => {
+        $crate::numbers::vector_of(
+            #[inline(always)]
+            |$i| $of,
+        )
+    };
+}
