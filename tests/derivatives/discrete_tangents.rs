@@ -163,6 +163,4 @@ fn variables_that_a_discrete_lagrangian_does_not_tell() {
             "{found}"
         );
     }
-    let found = mine().second_tangent(&[Variable::Action], Until::Time(1.0)).unwrap_err();
-    assert!(matches!(found, SensitivityError::NoSecondTangent { .. }), "{found}");
 }

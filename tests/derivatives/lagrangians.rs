@@ -6,7 +6,6 @@ use crate::gradients::forces::Forces;
 use crate::gradients::impacts::{Ceiling, Floor, Ground};
 use crate::gradients::invalid_input::{Falling, Slope};
 use crate::gradients::switches::{Bouncing, Kinked, Pushed, Region, Step, Wall};
-use crate::second_derivatives::systems::{General, Oscillator};
 use contact_geom::switching::{Breaks, Impacts};
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, TwoCoordinates, UniformField};
 use contact_geom::{Forced, lagrangian_enum};
@@ -20,22 +19,20 @@ lagrangian_enum! {
         Pendulum(Pendulum),
         Field(UniformField<1>),
         Falling(Falling),
-        Oscillator(Oscillator),
     }
 }
-lagrangian_enum!(parametric One<1> { Pendulum, Field, Falling, Oscillator });
+lagrangian_enum!(parametric One<1> { Pendulum, Field, Falling });
 
 lagrangian_enum! {
     /// Two coordinates, with one or two forces, or with none.
     pub enum Two<2> {
         Kepler(Kepler<2>),
-        General(General),
         Forced(Forced<TwoCoordinates, Forces<2>>),
         ForcedTwice(Forced<Forced<TwoCoordinates, Forces<2>>, Forces<2>>),
         ForcedKepler(Forced<Kepler<2>, Forces<2>>),
     }
 }
-lagrangian_enum!(parametric Two<2> { Kepler, General, Forced, ForcedTwice, ForcedKepler });
+lagrangian_enum!(parametric Two<2> { Kepler, Forced, ForcedTwice, ForcedKepler });
 
 lagrangian_enum! {
     /// One coordinate, with switching functions or breaks.

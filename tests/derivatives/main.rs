@@ -1,4 +1,4 @@
-//! Derivatives of runs: tangents, gradients by the adjoint, and second derivatives, of built-in integrators and of
+//! Derivatives of runs: tangents, and gradients by the adjoint, of built-in integrators and of
 //! discrete Lagrangians of a user. One binary, in which each of them is compiled once for each type of Lagrangian.
 
 #![allow(missing_docs)]
@@ -10,4 +10,3 @@
 mod discrete_tangents;
 mod gradients;
 mod lagrangians;
-mod second_derivatives;

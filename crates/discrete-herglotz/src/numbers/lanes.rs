@@ -295,6 +295,7 @@ impl<S: Simd> Scalar for Lanes<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contact_geom::nalgebra::SVector;
 
     /// Evaluates sine and cosine of the arguments in SIMD lanes.
     struct Evaluate<'a>(&'a [f64]);

@@ -3,8 +3,6 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-pub(crate) mod second_order;
-
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};

@@ -38,17 +38,6 @@ pub enum SensitivityError {
         /// What is not implemented.
         what: &'static str,
     },
-    /// The integrator has no second derivatives.
-    #[error(
-        "second derivatives of runs by `{method}`{case} are not implemented; choose `GaussCollocation` without impacts and \
-         resets, for a Lagrangian that is not given by a contact Hamiltonian, or differences of first derivatives"
-    )]
-    NoSecondTangent {
-        /// The name of the method.
-        method: Cow<'static, str>,
-        /// In which case, if not always.
-        case: &'static str,
-    },
     /// The steps can be differentiated with respect to the start alone.
     #[error(
         "runs by `{method}` are differentiable in the position, the velocity or momentum and the action of the start, \

@@ -6,7 +6,6 @@ use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SolvedStages;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
-use crate::sensitivity::second_derivatives::{MixedDerivatives, PointTangent, SecondDerivatives};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use contact_geom::nalgebra::SVector;
@@ -47,15 +46,6 @@ pub(crate) trait StageSystem<const N: usize> {
         at: &StageDerivatives<N>,
         along: (&StageTangent<N>, &Stages),
     ) -> f64;
-
-    /// [`SecondDerivatives::at`].
-    fn second_at(
-        &self,
-        of: &mut SecondDerivatives<N>,
-        at: (f64, &VelocityPoint<N>, f64),
-        a: &PointTangent<'_, N>,
-        b: &PointTangent<'_, N>,
-    ) -> MixedDerivatives<N>;
 }
 
 impl<L: Parametric<N>, const N: usize> StageSystem<N> for L {
@@ -104,16 +94,6 @@ impl<L: Parametric<N>, const N: usize> StageSystem<N> for L {
             sum += weights.0[i] * of.along(self, quantity, (t, &x, at.rho.0[i]), (&tangent, w.r.0[i]));
         }
         sum
-    }
-
-    fn second_at(
-        &self,
-        of: &mut SecondDerivatives<N>,
-        at: (f64, &VelocityPoint<N>, f64),
-        a: &PointTangent<'_, N>,
-        b: &PointTangent<'_, N>,
-    ) -> MixedDerivatives<N> {
-        of.at(self, at, a, b)
     }
 }
 

@@ -87,14 +87,6 @@ impl<const N: usize> StageTangent<N> {
         }
     }
 
-    /// Adds a multiple of the values of another tangent at the stages.
-    pub fn add_values(&mut self, factor: f64, other: &Self) {
-        let pairs = self.q.iter_mut().chain(&mut self.p).zip(other.q.iter().chain(&other.p));
-        for (to, from) in pairs.chain([(&mut self.z, &other.z), (&mut self.r, &other.r)]) {
-            to.0.iter_mut().zip(&from.0).for_each(|(to, from)| *to += factor * from);
-        }
-    }
-
     /// Multiplies the rates by a factor.
     pub fn scale(&mut self, factor: f64) {
         let rates = self.v.iter_mut().chain(&mut self.p_rate).chain([&mut self.z_rate, &mut self.r_rate]);
