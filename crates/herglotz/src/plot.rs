@@ -1,6 +1,6 @@
 //! Figures of rows: columns against time, and phase portraits.
 
-use contact_figure::{Axis, Coordinate, Curve, Line, Panel, draw, draw_grid, fold, folded};
+use contact_examples::figure::{Axis, Coordinate, Curve, Line, Panel, draw, draw_grid, fold, folded};
 use herglotz::runtime::{Column, Comparison, Work, velocity_name};
 use herglotz::{EndsScene, LatticeScene, Scene};
 use std::collections::BTreeSet;

@@ -1,7 +1,7 @@
 //! Figures of rigid bodies: the polhode, and the path of a point of the body.
 
 use crate::plot::{axis, grid};
-use contact_figure::{Axis, Curve, Line, Panel};
+use contact_examples::figure::{Axis, Curve, Line, Panel};
 use herglotz::runtime::Body;
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! Figures of fits: the data with the fitted motion, and the residuals.
 
 use crate::plot::{axis, grid, label};
-use contact_figure::{Axis, Curve, Line, Panel};
+use contact_examples::figure::{Axis, Curve, Line, Panel};
 use herglotz::runtime::{FittedMotion, FittedSeries};
 
 /// The measured values of each quantity as discs, and the fitted motion, whose rows have the time and the quantities, as

@@ -109,7 +109,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))?;
     match status {
         Status::Completed => Ok(()),
-        status => Err(Failure::Run { what: "the star", status }),
+        status => Err(Failure::run(format_args!("the run of the star ended early: {status}"))),
     }
 }
 
