@@ -250,8 +250,7 @@ impl Report {
             let points = || curves.iter().flat_map(|c| &c.points);
             let (x, y) = (decades(points().map(|p| p.0)), decades(points().map(|p| p.1)));
             if let (Some(x), Some(y)) = (x, y) {
-                let (x_label, y_label, legend) = (size.into(), label.into(), (1.03, 1.0));
-                let panel = Panel { x_label, y_label, x, y, legend, curves, marks: Vec::new() };
+                let panel = Panel::new((size, x), (label, y), (1.03, 1.0), curves);
                 self.out.text(&format!("{}{suffix}.svg", self.case), &draw(&panel))?;
             }
         }

@@ -160,7 +160,7 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
         }
         _ => folded(&points, kinds).into_iter().map(|piece| Curve::unnamed(line, piece)).collect(),
     };
-    Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
+    Some(Panel::new((&x_label, x), (&y_label, y), (0.0, 1.0), curves))
 }
 
 /// A linear axis that contains the numbers and extends from tick to tick; `None` without numbers.
@@ -306,15 +306,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
         let along = axis([0.0, length.saturating_sub(1) as f64].into_iter());
         let across = axis(curves.iter().flat_map(|curve| curve.points.iter().map(|p| p.1)));
         if let (Some(x), Some(y)) = (along, across) {
-            let panel = Panel {
-                x_label: "site".into(),
-                y_label: format!("t, with {name} above it"),
-                x,
-                y,
-                legend: (0.0, 1.0),
-                curves,
-                marks: Vec::new(),
-            };
+            let panel = Panel::new(("site", x), (&format!("t, with {name} above it"), y), (0.0, 1.0), curves);
             figures.push(("space-time.svg".to_owned(), draw(&panel)));
         }
     }

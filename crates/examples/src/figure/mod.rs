@@ -178,6 +178,13 @@ pub struct Panel {
     pub marks: Vec<(f64, f64)>,
 }
 
+impl Panel {
+    /// A panel without marked points, by the quantity and the range of both axes.
+    pub fn new((x_label, x): (&str, Axis), (y_label, y): (&str, Axis), legend: (f64, f64), curves: Vec<Curve>) -> Self {
+        Panel { x_label: x_label.into(), y_label: y_label.into(), x, y, legend, curves, marks: Vec::new() }
+    }
+}
+
 /// The colour of solid curves and of their points.
 const SOLID: &str = "#1f5fa8";
 
@@ -342,15 +349,12 @@ mod tests {
     /// Each of several panels has its letter; empty places and a single panel have none.
     #[test]
     fn letters_are_those_of_panels() {
-        let panel = Panel {
-            x_label: "x".into(),
-            y_label: "y".into(),
-            x: Axis::Linear(0.0, 1.0, 0.5),
-            y: Axis::Linear(0.0, 1.0, 0.5),
-            legend: (0.0, 1.0),
-            curves: vec![Curve::unnamed(Line::Solid, [(0.0, 0.0), (1.0, 1.0)])],
-            marks: Vec::new(),
-        };
+        let panel = Panel::new(
+            ("x", Axis::Linear(0.0, 1.0, 0.5)),
+            ("y", Axis::Linear(0.0, 1.0, 0.5)),
+            (0.0, 1.0),
+            vec![Curve::unnamed(Line::Solid, [(0.0, 0.0), (1.0, 1.0)])],
+        );
         for (panels, in_a_row) in [(1, 1), (1, 3), (2, 2), (3, 2), (5, 3), (7, 3)] {
             let drawn = draw_grid(&vec![panel.clone(); panels], in_a_row);
             let letters: String = ('a'..='w').filter(|letter| drawn.contains(&format!(">{letter}<"))).collect();

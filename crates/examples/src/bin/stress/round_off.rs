@@ -443,15 +443,12 @@ fn diagram(all: &[Ensemble], found: &[Result<(Growth, Option<f64>), InputError>]
                 curves.push(Curve::new(&ensemble.way.name().replace('_', " "), Line::Coloured(number), points));
             }
         }
-        Panel {
-            x_label: "steps".into(),
-            y_label: format!("relative error of the {what}, rms"),
-            x: Axis::Logarithmic(1, 6, 1),
-            y: Axis::Logarithmic(-17, -12, 1),
-            legend: (1.0, 0.98),
+        Panel::new(
+            ("steps", Axis::Logarithmic(1, 6, 1)),
+            (&format!("relative error of the {what}, rms"), Axis::Logarithmic(-17, -12, 1)),
+            (1.0, 0.98),
             curves,
-            marks: Vec::new(),
-        }
+        )
     });
     draw_row(&panels)
 }

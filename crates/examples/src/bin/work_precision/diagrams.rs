@@ -30,14 +30,14 @@ pub fn write(out: &Directory, problem: &Problem, z: Action, rows: &[Row]) -> Res
         let points = of_method.iter().map(|row| (row.seconds, row.error));
         Some(Curve::new(&row.method.replace('_', " "), line, points))
     };
-    let panel = Panel {
-        x_label: format!("{}, z {}: run time (s)", problem.name, z.name()),
-        y_label: "error of (q, v) (relative)".into(),
-        x: Axis::Logarithmic(fastest.log10().floor() as i32, slowest.log10().ceil() as i32, 1),
-        y: Axis::Logarithmic(ERRORS.0, ERRORS.1, 2),
-        legend: (1.0, 1.0),
-        curves: rows.chunk_by(|a, b| a.method == b.method).filter_map(curve).collect(),
-        marks: Vec::new(),
-    };
+    let panel = Panel::new(
+        (
+            &format!("{}, z {}: run time (s)", problem.name, z.name()),
+            Axis::Logarithmic(fastest.log10().floor() as i32, slowest.log10().ceil() as i32, 1),
+        ),
+        ("error of (q, v) (relative)", Axis::Logarithmic(ERRORS.0, ERRORS.1, 2)),
+        (1.0, 1.0),
+        rows.chunk_by(|a, b| a.method == b.method).filter_map(curve).collect(),
+    );
     out.text(&format!("{}_z_{}.svg", problem.name, z.name()), &draw(&panel))
 }
