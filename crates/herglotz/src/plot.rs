@@ -253,15 +253,12 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
         let line = number.checked_sub(own_names).map_or(Line::Coloured(number), Line::Grey);
         Curve::new(name, line, points)
     };
-    Some(draw(&Panel {
-        x_label: "run time (s)".into(),
-        y_label: "relative error of (q, p)".into(),
-        x: Axis::Logarithmic(fast, slow, 1),
-        y: Axis::Logarithmic(best, worst, ((worst - best) / 8).max(1) as u32),
-        legend: (1.0, 1.0),
-        curves: names.iter().enumerate().map(curve).collect(),
-        marks: Vec::new(),
-    }))
+    Some(draw(&Panel::new(
+        ("run time (s)", Axis::Logarithmic(fast, slow, 1)),
+        ("relative error of (q, p)", Axis::Logarithmic(best, worst, ((worst - best) / 8).max(1) as u32)),
+        (1.0, 1.0),
+        names.iter().enumerate().map(curve).collect(),
+    )))
 }
 
 /// The maximal number of curves of a space-time figure; more are too close to be distinguished.

@@ -301,18 +301,15 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let of = known.iter().filter(move |(_, f)| f.dimension == dimension && f.error > 0.0);
         of.map(|(_, f)| (f.tolerance, f.error)).collect::<Vec<_>>()
     };
-    report.figure(&draw(&Panel {
-        x_label: "requested relative error".into(),
-        y_label: "true relative error at the end".into(),
-        x: Axis::Logarithmic(-12, -3, 1),
-        y: Axis::Logarithmic(-17, 1, 2),
-        legend: (0.03, 0.98),
-        curves: vec![
+    report.figure(&draw(&Panel::new(
+        ("requested relative error", Axis::Logarithmic(-12, -3, 1)),
+        ("true relative error at the end", Axis::Logarithmic(-17, 1, 2)),
+        (0.03, 0.98),
+        vec![
             Curve::new("the requested error", Line::Dashed, [(1e-12, 1e-12), (1e-3, 1e-3)]),
             Curve::new("ten times the requested error", Line::Dotted, [(1e-12, 1e-11), (1e-3, 1e-2)]),
             Curve::new("one degree of freedom", Line::Discs, points(1)),
             Curve::new("two degrees of freedom", Line::Crosses, points(2)),
         ],
-        marks: Vec::new(),
-    }))
+    )))
 }

@@ -100,18 +100,15 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         &["integrator", "defect after forward and back over (growth x eps x sqrt steps), worst"],
         of_family.iter().map(|(name, worst)| vec![name.clone(), format!("{worst:.1}")]),
     );
-    report.figure(&draw(&Panel {
-        x_label: "time forward and backward".into(),
-        y_label: "distance from the start".into(),
-        x: Axis::Logarithmic(0, 2, 1),
-        y: Axis::Logarithmic(-16, 2, 2),
-        legend: (0.03, 0.98),
-        curves: vec![
+    report.figure(&draw(&Panel::new(
+        ("time forward and backward", Axis::Logarithmic(0, 2, 1)),
+        ("distance from the start", Axis::Logarithmic(-16, 2, 2)),
+        (0.03, 0.98),
+        vec![
             Curve::new("gauss 8, forward and backward", Line::Solid, points.iter().map(|p| (p.0, p.1))),
             Curve::new("growth of a rounding error", Line::Dotted, points.iter().map(|p| (p.0, p.2 * f64::EPSILON))),
         ],
-        marks: Vec::new(),
-    }))
+    )))
 }
 
 fn steps_of(span: i32) -> usize {

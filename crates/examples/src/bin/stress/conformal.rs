@@ -159,13 +159,10 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         ["integrator", "momentum at the end", "over a random walk", "sigma_d in roundings", "contact form, one step"];
     report.markdown(&columns, lines);
     report.table("", &["integrator", "steps", "momentum_error", "log_product_error", "contact_defect"], rows)?;
-    report.figure(&draw(&Panel {
-        x_label: "steps".into(),
-        y_label: "relative error of the angular momentum".into(),
-        x: Axis::Logarithmic(1, 6, 1),
-        y: Axis::Logarithmic(-17, -9, 1),
-        legend: (1.0, 1.0),
+    report.figure(&draw(&Panel::new(
+        ("steps", Axis::Logarithmic(1, 6, 1)),
+        ("relative error of the angular momentum", Axis::Logarithmic(-17, -9, 1)),
+        (1.0, 1.0),
         curves,
-        marks: Vec::new(),
-    }))
+    )))
 }

@@ -145,15 +145,12 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         rows.chunk_by(|a, b| a[0] == b[0]).filter_map(|run| run.last().cloned()).map(brief),
     );
     report.table("", &["run", "steps", "relative_error", "bound"], rows)?;
-    report.figure(&draw(&Panel {
-        x_label: "steps".into(),
-        y_label: "relative error, with its bound in grey".into(),
-        x: Axis::Logarithmic(3, 9, 1),
-        y: Axis::Logarithmic(-16, -9, 1),
-        legend: (0.03, 0.98),
+    report.figure(&draw(&Panel::new(
+        ("steps", Axis::Logarithmic(3, 9, 1)),
+        ("relative error, with its bound in grey", Axis::Logarithmic(-16, -9, 1)),
+        (0.03, 0.98),
         curves,
-        marks: Vec::new(),
-    }))
+    )))
 }
 
 /// A row of the table with fewer digits.

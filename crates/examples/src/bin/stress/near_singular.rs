@@ -26,19 +26,16 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.at_most("all fixed steps near singularities: runs silently wrong", bad([&table.tally]), 0.0)?;
     report.table("", &["what", "integrator", "parameter", "worth", "error"], table.rows)?;
     let grey = [1e2, 1e16].map(|c: f64| (c, c * f64::EPSILON));
-    report.figure(&draw(&Panel {
-        x_label: "condition of W, or 1 / (1 - e)".into(),
-        y_label: "relative error".into(),
-        x: Axis::Logarithmic(0, 16, 2),
-        y: Axis::Logarithmic(-18, 0, 2),
-        legend: (0.03, 0.98),
-        curves: vec![
+    report.figure(&draw(&Panel::new(
+        ("condition of W, or 1 / (1 - e)", Axis::Logarithmic(0, 16, 2)),
+        ("relative error", Axis::Logarithmic(-18, 0, 2)),
+        (0.03, 0.98),
+        vec![
             Curve::new("eps times the condition", Line::Dotted, grey),
             Curve::new("gauss 16, condition of W", Line::Solid, conditions),
             Curve::new("gauss 8 with a time transformation, e of an orbit", Line::Dashed, orbits),
         ],
-        marks: Vec::new(),
-    }))
+    )))
 }
 
 struct Table {

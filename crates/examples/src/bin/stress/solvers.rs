@@ -263,15 +263,12 @@ fn price(report: &mut Report) -> Result<(), Failure> {
             ));
         }
     }
-    let svg = draw(&Panel {
-        x_label: "step".into(),
-        y_label: "seconds per step".into(),
-        x: Axis::Logarithmic(-2, 2, 1),
-        y: Axis::Logarithmic(-8, -1, 1),
-        legend: (1.0, 1.0),
+    let svg = draw(&Panel::new(
+        ("step", Axis::Logarithmic(-2, 2, 1)),
+        ("seconds per step", Axis::Logarithmic(-8, -1, 1)),
+        (1.0, 1.0),
         curves,
-        marks: Vec::new(),
-    });
+    ));
     report.timed_figure(&svg)
 }
 
