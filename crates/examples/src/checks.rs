@@ -115,7 +115,7 @@ impl Checks {
 
     /// Fails unless every residual is within the tolerance.
     pub fn verdict(&self) -> Result<(), Failure> {
-        let failing: Vec<String> = self
+        let wrong: Vec<String> = self
             .worst
             .iter()
             .filter(|(_, (residual, tolerance))| residual > tolerance)
@@ -126,10 +126,7 @@ impl Checks {
                 format!("  {statement}: {system}, {method}, h = {step}: {residual:.1e} > {tolerance:e}{cause}")
             })
             .collect();
-        if failing.is_empty() {
-            return Ok(());
-        }
-        Err(Failure::Statements { count: failing.len(), total: self.worst.len(), list: failing.join("\n") })
+        Failure::unless_empty(&wrong, self.worst.len(), "checks of the paper's statements fail")
     }
 }
 

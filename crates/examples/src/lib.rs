@@ -1,25 +1,40 @@
-//! Code that the binaries share: output of results, figures, the record of checked statements, and failures with their
-//! exit codes.
+//! What the programs of the workspace share: output of results, figures, the record of checked statements, and failures
+//! with their exit codes.
 //!
-//! It computes no mechanics; the library crates do.
+//! Without features, the crate depends on `contact-geom` alone; `figure` adds the module of that name, and `programs` all
+//! that the programs need.
 
+#[cfg(feature = "programs")]
+mod arguments;
+#[cfg(feature = "programs")]
 mod checks;
+#[cfg(feature = "programs")]
 mod failure;
+#[cfg(feature = "figure")]
+pub mod figure;
+#[cfg(feature = "programs")]
 mod output;
-#[cfg(test)]
+#[cfg(feature = "programs")]
+mod report;
+#[cfg(all(test, feature = "programs"))]
 mod tables;
 
-pub use checks::{Checks, Subject, TOLERANCE, fractions};
-pub use contact_figure::{Axis, Curve, Line, Panel, draw, draw_row};
-pub use failure::{Failure, finish};
-pub use output::{Directory, number, print};
+#[cfg(feature = "programs")]
+pub use {
+    arguments::{check_names, is_requested, progress_bar},
+    checks::{Checks, Subject, TOLERANCE, fractions},
+    failure::{Failure, finish},
+    figure::{Axis, Curve, Line, Panel, draw, draw_row},
+    output::{Directory, number, print},
+    report::{Case, CaseArguments, Report, run_cases, short},
+};
 
 /// The programs of the guide, compiled and run.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "programs"))]
 #[doc = include_str!("../../../docs/guide.md")]
 pub struct Guide;
 
 /// The program of the README.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "programs"))]
 #[doc = include_str!("../../../README.md")]
 pub struct Readme;

@@ -16,7 +16,7 @@ impl Directory {
     /// fails before it computes.
     ///
     /// # Errors
-    /// [`Failure::Output`].
+    /// Where it cannot be written.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, Failure> {
         let path = path.into();
         let probe = path.join(".writable");
@@ -24,7 +24,7 @@ impl Directory {
             fs::create_dir_all(&path).and_then(|()| fs::write(&probe, "")).and_then(|()| fs::remove_file(&probe));
         match written {
             Ok(()) => Ok(Directory { path }),
-            Err(cause) => Err(Failure::Output { path, cause }),
+            Err(cause) => Err(Failure::output(&path, cause)),
         }
     }
 
@@ -36,7 +36,7 @@ impl Directory {
     /// Writes a table as a CSV file.
     ///
     /// # Errors
-    /// [`Failure::Output`].
+    /// Where it cannot be written.
     pub fn table<R>(&self, name: &str, columns: &[&str], rows: impl IntoIterator<Item = R>) -> Result<(), Failure>
     where
         R: IntoIterator<Item = String>,
@@ -51,16 +51,16 @@ impl Directory {
             writer.flush()?;
             Ok(())
         };
-        write().map_err(|cause| Failure::Output { path: path.clone(), cause: io::Error::other(cause) })
+        write().map_err(|cause| Failure::output(&path, cause))
     }
 
     /// Writes a text file.
     ///
     /// # Errors
-    /// [`Failure::Output`].
+    /// Where it cannot be written.
     pub fn text(&self, name: &str, text: &str) -> Result<(), Failure> {
         let path = self.path.join(name);
-        fs::write(&path, text).map_err(|cause| Failure::Output { path, cause })
+        fs::write(&path, text).map_err(|cause| Failure::output(&path, cause))
     }
 }
 
@@ -72,10 +72,10 @@ pub fn number(x: f64) -> String {
 /// Prints on the standard output. A closed pipe, for example to `head`, is not an error.
 ///
 /// # Errors
-/// [`Failure::Terminal`].
+/// Where the standard output cannot be written.
 pub fn print(text: &str) -> Result<(), Failure> {
     match io::stdout().lock().write_all(text.as_bytes()) {
-        Err(cause) if cause.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Terminal(cause)),
+        Err(cause) if cause.kind() != io::ErrorKind::BrokenPipe => Err(Failure::terminal(cause)),
         _ => Ok(()),
     }
 }

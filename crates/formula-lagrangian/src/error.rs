@@ -73,12 +73,6 @@ pub enum FormulaError {
         /// The bound.
         limit: usize,
     },
-    /// The formula has a part that cannot be written in Rust.
-    #[error("the formula has {what}, which the Rust source of a Lagrangian does not contain; use the formula itself")]
-    NotInRust {
-        /// The part.
-        what: &'static str,
-    },
     /// The name of a coordinate, a parameter or a table is invalid.
     #[error("the name {name:?} {why}")]
     Name {

@@ -4,7 +4,7 @@
 //! Both are compiled to straight-line register code, which is evaluated on floating-point numbers, dual numbers and the
 //! vector lanes of the integrators alike. The structure of L (separable, affine in z, ...) is proved from the graph, so
 //! that integrators do not probe it. In units of the time for the Rust type of the same Lagrangian, a run takes 1.3 to
-//! 1.6 with a splitting, and 0.7 to 2.2 with Gauss collocation; [`FormulaLagrangian::to_rust`] writes that type.
+//! 1.6 with a splitting, and 0.7 to 2.2 with Gauss collocation.
 //!
 //! ```
 //! use contact_geom::VelocityPoint;
@@ -159,7 +159,6 @@ mod parser;
 mod quantities;
 mod resets;
 mod rotation;
-mod rust_source;
 mod structure;
 mod symbol;
 mod tables;

@@ -141,8 +141,6 @@ fn formulas_without_constraints() {
     refused(free().with_reset(bounce).unwrap().with_constraints(&["x - y"]));
     refused(two.with_reset(bounce));
     refused(two.with_impact("x", contact_geom::switching::Impact::Elastic, None));
-    let error = two.lagrangian::<3>().unwrap().to_rust("Two").unwrap_err();
-    assert_eq!(error, FormulaError::NotInRust { what: "constraints" });
 }
 
 /// A symmetry of L counts if the constraints are invariant under it as well.

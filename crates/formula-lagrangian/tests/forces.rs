@@ -6,10 +6,6 @@ use contact_geom::{
 };
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian, Function, Graph, Operation, ParseError, Symbols};
 
-#[rustfmt::skip]
-#[path = "snapshots/forced.rs"]
-mod forced;
-
 const PARAMETERS: [(&str, f64); 2] = [("c", 0.5), ("k", 0.25)];
 
 fn plane(text: &str) -> FormulaLagrangian<2> {
@@ -344,29 +340,4 @@ fn errors_by_a_program() {
     assert!(matches!(free.with_rayleigh("c*w"), Err(FormulaError::Parse(_))));
     assert!(matches!(free.with_force("x", "force[x] = 1; 2"), Err(FormulaError::Parse(_))));
     assert!(matches!(free.expression("force[x] = 1; 2"), Err(FormulaError::Parse(_))));
-}
-
-/// Rust source with a force, which is compiled here and compared bitwise with the formula.
-#[test]
-fn the_source_in_rust_has_the_force() {
-    let text = "force[x] = -c*x' - k*x'*hypot(x', y') + cos(t)*y; rayleigh = c*k/2*y'^2
-        force[y] = -k*y'*hypot(x', y'); L = (x'^2 + y'^2)/2 - x^2/2 - c*z";
-    let l = plane(text);
-    let source = l.to_rust("ForcedSpring").unwrap();
-    let path = format!("{}/tests/snapshots/forced.rs", env!("CARGO_MANIFEST_DIR"));
-    if std::env::var_os("UPDATE").is_some() {
-        std::fs::write(&path, &source).unwrap();
-    }
-    assert_eq!(source, std::fs::read_to_string(path).unwrap(), "write it anew with UPDATE=1");
-    let typed = forced::ForcedSpring { c: 0.5, k: 0.25 };
-    for k in 0..100 {
-        let of = |i: usize| ((k * 7 + i) as f64 * 0.618_033_988_749_894_9).fract() - 0.45;
-        let x = VelocityPoint::new([of(0), of(1)], [of(2), of(3)], of(4));
-        assert_eq!(typed.applied_force(of(5), &x), l.applied_force(of(5), &x));
-    }
-    assert_eq!((typed.structure(), typed.force_structure()), (l.structure(), l.force_structure()));
-    assert_eq!(typed.force_structure(), ForceStructure::Drag { linear: SVector::from([0.5, 0.125]), quadratic: 0.25 });
-    let general = plane("force[x] = -sign(x'); (x'^2 + y'^2)/2").to_rust("Dry").unwrap();
-    assert!(general.contains("ForceStructure::General") && general.contains("forced: true"));
-    assert!(!plane("x'^2 + y'^2").to_rust("Free").unwrap().contains("orce"));
 }

@@ -21,4 +21,3 @@ mod structure;
 mod switching;
 mod symbols;
 mod tables;
-mod to_rust;

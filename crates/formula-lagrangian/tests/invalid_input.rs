@@ -73,7 +73,6 @@ fn attack(text: &str) -> bool {
     match Formula::parse(text, &["x", "y"], &[("a", 1.5), ("gamma", -0.1)]) {
         Ok(formula) => {
             let lagrangian = formula.lagrangian::<2>().unwrap();
-            lagrangian.to_rust("System").unwrap();
             let x = VelocityPoint::new([0.5, -0.25], [1.0, 2.0], 0.1);
             let _ = (lagrangian.applied_force(0.3, &x), lagrangian.force_structure(), lagrangian.breaks());
             match formula.expression(text) {

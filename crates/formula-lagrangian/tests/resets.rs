@@ -103,9 +103,6 @@ fn resets_have_parameters_and_tables() {
     assert!(l.symmetries().is_empty());
     assert!(lagrangian(&driven).symmetries().iter().any(|s| matches!(s, Symmetry::Translation(_))));
     assert_eq!(l.structure(), lagrangian(&driven).structure());
-    let bounce = formula("x'^2").with_reset(reset("x", Direction::Falling, &[("x'", "-x'")])).unwrap();
-    let refused = lagrangian(&bounce).to_rust("Ball").unwrap_err();
-    assert_eq!(refused, FormulaError::NotInRust { what: "resets" });
 }
 
 #[test]

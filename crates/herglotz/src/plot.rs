@@ -1,6 +1,6 @@
 //! Figures of rows: columns against time, and phase portraits.
 
-use contact_figure::{Axis, Coordinate, Curve, Line, Panel, draw, draw_grid, fold, folded};
+use contact_examples::figure::{Axis, Coordinate, Curve, Line, Panel, draw, draw_grid, fold, folded};
 use herglotz::runtime::{Column, Comparison, Work, velocity_name};
 use herglotz::{EndsScene, LatticeScene, Scene};
 use std::collections::BTreeSet;
@@ -160,7 +160,7 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
         }
         _ => folded(&points, kinds).into_iter().map(|piece| Curve::unnamed(line, piece)).collect(),
     };
-    Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
+    Some(Panel::new((&x_label, x), (&y_label, y), (0.0, 1.0), curves))
 }
 
 /// A linear axis that contains the numbers and extends from tick to tick; `None` without numbers.
@@ -253,15 +253,12 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
         let line = number.checked_sub(own_names).map_or(Line::Coloured(number), Line::Grey);
         Curve::new(name, line, points)
     };
-    Some(draw(&Panel {
-        x_label: "run time (s)".into(),
-        y_label: "relative error of (q, p)".into(),
-        x: Axis::Logarithmic(fast, slow, 1),
-        y: Axis::Logarithmic(best, worst, ((worst - best) / 8).max(1) as u32),
-        legend: (1.0, 1.0),
-        curves: names.iter().enumerate().map(curve).collect(),
-        marks: Vec::new(),
-    }))
+    Some(draw(&Panel::new(
+        ("run time (s)", Axis::Logarithmic(fast, slow, 1)),
+        ("relative error of (q, p)", Axis::Logarithmic(best, worst, ((worst - best) / 8).max(1) as u32)),
+        (1.0, 1.0),
+        names.iter().enumerate().map(curve).collect(),
+    )))
 }
 
 /// The maximal number of curves of a space-time figure; more are too close to be distinguished.
@@ -306,15 +303,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
         let along = axis([0.0, length.saturating_sub(1) as f64].into_iter());
         let across = axis(curves.iter().flat_map(|curve| curve.points.iter().map(|p| p.1)));
         if let (Some(x), Some(y)) = (along, across) {
-            let panel = Panel {
-                x_label: "site".into(),
-                y_label: format!("t, with {name} above it"),
-                x,
-                y,
-                legend: (0.0, 1.0),
-                curves,
-                marks: Vec::new(),
-            };
+            let panel = Panel::new(("site", x), (&format!("t, with {name} above it"), y), (0.0, 1.0), curves);
             figures.push(("space-time.svg".to_owned(), draw(&panel)));
         }
     }

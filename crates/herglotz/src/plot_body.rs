@@ -1,7 +1,7 @@
 //! Figures of rigid bodies: the polhode, and the path of a point of the body.
 
 use crate::plot::{axis, grid};
-use contact_figure::{Axis, Curve, Line, Panel};
+use contact_examples::figure::{Axis, Curve, Line, Panel};
 use herglotz::runtime::Body;
 use std::f64::consts::TAU;
 
@@ -45,13 +45,13 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
         }
         let name = |k: usize| format!("Pi{}/|Pi|", k + 1);
         let sphere = Panel {
-            x_label: name(i),
-            y_label: name(j),
-            x: widened(Axis::Linear(-1.2, 1.2, 0.4)),
-            y: Axis::Linear(-1.2, 1.2, 0.4),
-            legend: (0.0, 1.0),
-            curves,
             marks: unit.first().and_then(place).into_iter().collect(),
+            ..Panel::new(
+                (&name(i), widened(Axis::Linear(-1.2, 1.2, 0.4))),
+                (&name(j), Axis::Linear(-1.2, 1.2, 0.4)),
+                (0.0, 1.0),
+                curves,
+            )
         };
         let sizes: Vec<(f64, f64)> = t.iter().copied().zip(vectors.iter().map(size)).collect();
         let against = against_time("|Pi|", sizes, true)?;
@@ -67,13 +67,13 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
             .collect();
         let fitted = axis(outline.iter().map(|p| p.0))?;
         let above = Panel {
-            x_label: "tip_x".into(),
-            y_label: "tip_y".into(),
-            x: widened(fitted),
-            y: fitted,
-            legend: (0.0, 1.0),
-            curves: vec![Curve::unnamed(Line::Dotted, outline), Curve::unnamed(Line::Solid, plane.iter().copied())],
             marks: plane.first().copied().into_iter().collect(),
+            ..Panel::new(
+                ("tip_x", widened(fitted)),
+                ("tip_y", fitted),
+                (0.0, 1.0),
+                vec![Curve::unnamed(Line::Dotted, outline), Curve::unnamed(Line::Solid, plane.iter().copied())],
+            )
         };
         let height = against_time("tip_z", t.into_iter().zip(z).collect(), false)?;
         Some(("path.svg", grid(&[above, height])))
@@ -111,5 +111,5 @@ fn against_time(name: &str, points: Vec<(f64, f64)>, from_zero: bool) -> Option<
     let x = axis(points.iter().map(|p| p.0))?;
     let y = axis(points.iter().map(|p| p.1).chain(from_zero.then_some(0.0)))?;
     let curves = vec![Curve::unnamed(Line::Solid, points)];
-    Some(Panel { x_label: "t".into(), y_label: name.into(), x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
+    Some(Panel::new(("t", x), (name, y), (0.0, 1.0), curves))
 }

@@ -1,7 +1,7 @@
 //! Figures of fits: the data with the fitted motion, and the residuals.
 
 use crate::plot::{axis, grid, label};
-use contact_figure::{Axis, Curve, Line, Panel};
+use contact_examples::figure::{Axis, Curve, Line, Panel};
 use herglotz::runtime::{FittedMotion, FittedSeries};
 
 /// The measured values of each quantity as discs, and the fitted motion, whose rows have the time and the quantities, as
@@ -44,5 +44,5 @@ fn panel(series: &FittedSeries, name: &str, curves: [Curve; 2]) -> Option<Panel>
         |of: fn(&(f64, f64)) -> f64| -> Option<Axis> { axis(curves.iter().flat_map(|curve| &curve.points).map(of)) };
     let (x, y) = (all(|p| p.0)?, all(|p| p.1)?);
     let (x_label, y_label) = ("t".to_owned(), label(name));
-    Some(Panel { x_label, y_label, x, y, legend: (0.72, 1.0), curves: curves.into(), marks: Vec::new() })
+    Some(Panel::new((&x_label, x), (&y_label, y), (0.72, 1.0), curves.into()))
 }

@@ -313,11 +313,6 @@ impl System {
         };
         self.inner.symmetries().into_iter().map(of).collect()
     }
-
-    /// The Lagrangian as a Rust source file.
-    fn to_rust(&self, name: &str) -> PyResult<String> {
-        self.inner.to_rust(name).map_err(value_error)
-    }
 }
 
 /// The names of all coordinates and of their velocities; arrays are expanded.

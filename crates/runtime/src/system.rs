@@ -99,15 +99,6 @@ impl System {
         if self.kernel.has_force() { LOSSES_WITH_FORCE } else { &[] }
     }
 
-    /// The same Lagrangian as a Rust source file, for use beyond what a formula allows; see
-    /// [`FormulaLagrangian::to_rust`](formula_lagrangian::FormulaLagrangian::to_rust).
-    ///
-    /// # Errors
-    /// [`RuntimeError::Formula`] where `name` is not a valid type name.
-    pub fn to_rust(&self, name: &str) -> Result<String, RuntimeError> {
-        Ok(self.kernel.to_rust(name)?)
-    }
-
     /// Checks whether the system satisfies the hypotheses of an integrator.
     ///
     /// # Errors

@@ -6,8 +6,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::linear;
 
 /// The dimension from which faer's blocked LU is faster than elimination on the stack: the measured times on the stack
-/// and by faer are 1.83 and 2.11 us at 24, 4.55 and 3.43 us at 32
-/// (`cargo bench -p contact-measure --features benchmarks --bench solve`).
+/// and by faer are 1.83 and 2.11 us at 24, 4.55 and 3.43 us at 32.
 pub const CROSSOVER: usize = 28;
 
 /// The linear solver of Newton's method, with the workspace of faer, so that steps do not allocate.

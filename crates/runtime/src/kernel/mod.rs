@@ -37,9 +37,6 @@ pub(crate) trait Kernel: Send + Sync {
     fn is_smooth(&self) -> bool;
     fn has_force(&self) -> bool;
     fn symmetries(&self) -> Vec<FormulaSymmetry>;
-    fn to_rust(&self, _name: &str) -> Result<String, FormulaError> {
-        Err(FormulaError::IsHamiltonian { what: "Rust source", remedy: "implement `ContactHamiltonian` for a type" })
-    }
     /// The proved structure of a Hamiltonian; `None` for a Lagrangian.
     fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
         None
@@ -167,10 +164,6 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
             _ => None,
         };
         self.0.symmetries().iter().filter_map(recognised).collect()
-    }
-
-    fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
-        self.0.to_rust(name)
     }
 
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {

@@ -109,7 +109,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))?;
     match status {
         Status::Completed => Ok(()),
-        status => Err(Failure::Run { what: "the star", status }),
+        status => Err(Failure::run(format_args!("the run of the star ended early: {status}"))),
     }
 }
 
@@ -117,26 +117,20 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn write(out: &Directory, rows: &[Row<2>], momentum: &[MomentumRow]) -> Result<(), Failure> {
     let entries = rows.iter().map(|x| [x.t, x.q[0], x.q[1], x.p[0], x.p[1]].into_iter().chain(x.z).map(number));
     out.table("star.csv", &["t", "q1", "q2", "p1", "p2", "z"], entries)?;
-    let orbit = Panel {
-        x_label: "position q1 (dimensionless)".into(),
-        y_label: "position q2 (dimensionless)".into(),
-        x: Axis::Linear(-1.5, 1.5, 0.5),
-        y: Axis::Linear(-1.0, 1.0, 0.5),
-        legend: (0.0, 1.0),
-        curves: vec![Curve::unnamed(Line::Solid, rows.iter().map(|x| (x.q[0], x.q[1])))],
-        marks: Vec::new(),
-    };
-    let decay = Panel {
-        x_label: "time t (dimensionless)".into(),
-        y_label: "momentum J (dimensionless)".into(),
-        x: Axis::Linear(0.0, 60.0, 10.0),
-        y: Axis::Linear(0.0, 0.8, 0.2),
-        legend: (0.4, 0.95),
-        curves: vec![
+    let orbit = Panel::new(
+        ("position q1 (dimensionless)", Axis::Linear(-1.5, 1.5, 0.5)),
+        ("position q2 (dimensionless)", Axis::Linear(-1.0, 1.0, 0.5)),
+        (0.0, 1.0),
+        vec![Curve::unnamed(Line::Solid, rows.iter().map(|x| (x.q[0], x.q[1])))],
+    );
+    let decay = Panel::new(
+        ("time t (dimensionless)", Axis::Linear(0.0, 60.0, 10.0)),
+        ("momentum J (dimensionless)", Axis::Linear(0.0, 0.8, 0.2)),
+        (0.4, 0.95),
+        vec![
             Curve::new("angular momentum", Line::Solid, momentum.iter().map(|r| (r.t, r.momentum))),
             Curve::new("product of the factors", Line::Dashed, momentum.iter().map(|r| (r.t, r.predicted))),
         ],
-        marks: Vec::new(),
-    };
+    );
     out.text("star.svg", &draw_row(&[orbit, decay]))
 }

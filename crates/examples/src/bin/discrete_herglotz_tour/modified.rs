@@ -20,25 +20,19 @@ pub fn write(out: &Directory) -> Result<[f64; 2], Failure> {
         let points = defects.iter().filter(|of| of.k == k).map(|of| (of.h, of.defect));
         Curve::new(&format!("k = {k}"), Line::Coloured(k - 1), points)
     };
-    let by_step = Panel {
-        x_label: "step h (dimensionless)".into(),
-        y_label: "defect of H~k (relative)".into(),
-        x: Axis::Logarithmic(-2, 0, 1),
-        y: Axis::Logarithmic(-14, 0, 2),
-        legend: (0.02, 0.98),
-        curves: (1..=MAX_MODIFIED_ORDER).map(of_order).collect(),
-        marks: Vec::new(),
-    };
+    let by_step = Panel::new(
+        ("step h (dimensionless)", Axis::Logarithmic(-2, 0, 1)),
+        ("defect of H~k (relative)", Axis::Logarithmic(-14, 0, 2)),
+        (0.02, 0.98),
+        (1..=MAX_MODIFIED_ORDER).map(of_order).collect(),
+    );
     let smallest = |h: f64| smallest(&defects, h);
-    let least = Panel {
-        x_label: "1/h (dimensionless)".into(),
-        y_label: "smallest defect over k (relative)".into(),
-        x: Axis::Linear(0.0, 20.0, 5.0),
-        y: Axis::Logarithmic(-14, 0, 2),
-        legend: (0.4, 0.95),
-        curves: vec![Curve::unnamed(Line::Discs, STEPS.iter().map(|h| (1.0 / h, smallest(*h))))],
-        marks: Vec::new(),
-    };
+    let least = Panel::new(
+        ("1/h (dimensionless)", Axis::Linear(0.0, 20.0, 5.0)),
+        ("smallest defect over k (relative)", Axis::Logarithmic(-14, 0, 2)),
+        (0.4, 0.95),
+        vec![Curve::unnamed(Line::Discs, STEPS.iter().map(|h| (1.0 / h, smallest(*h))))],
+    );
     out.text("modified_hamiltonian.svg", &draw_row(&[by_step, least]))?;
     Ok([smallest(0.8), smallest(0.4)])
 }

@@ -123,15 +123,12 @@ fn motions(fan: &[Motion], envelope: [Vec<(f64, f64)>; 2]) -> Panel {
     curves.push(Curve::unnamed(Line::Dashed, second));
     let points = fan.iter().flat_map(|m| m.conjugate.iter().map(|c| (c.after, c.q)));
     curves.push(Curve::new("conjugate points", Line::Discs, points));
-    Panel {
-        x_label: "time t (dimensionless)".into(),
-        y_label: "position q (dimensionless)".into(),
-        x: Axis::Linear(0.0, 8.0, 1.0),
-        y: Axis::Linear(-3.0, 4.0, 1.0),
-        legend: (0.55, 0.98),
+    Panel::new(
+        ("time t (dimensionless)", Axis::Linear(0.0, 8.0, 1.0)),
+        ("position q (dimensionless)", Axis::Linear(-3.0, 4.0, 1.0)),
+        (0.55, 0.98),
         curves,
-        marks: Vec::new(),
-    }
+    )
 }
 
 /// The derivative of the position with respect to the initial velocity, for three of the motions.
@@ -145,13 +142,10 @@ fn slopes(fan: &[Motion]) -> Panel {
         }
     }
     curves.push(Curve::new("conjugate points", Line::Discs, zeros));
-    Panel {
-        x_label: "time t (dimensionless)".into(),
-        y_label: "derivative \u{2202}q/\u{2202}v0 (dimensionless)".into(),
-        x: Axis::Linear(0.0, 8.0, 1.0),
-        y: Axis::Linear(-4.0, 4.0, 1.0),
-        legend: (0.05, 0.4),
+    Panel::new(
+        ("time t (dimensionless)", Axis::Linear(0.0, 8.0, 1.0)),
+        ("derivative \u{2202}q/\u{2202}v0 (dimensionless)", Axis::Linear(-4.0, 4.0, 1.0)),
+        (0.05, 0.4),
         curves,
-        marks: Vec::new(),
-    }
+    )
 }

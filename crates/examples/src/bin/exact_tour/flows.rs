@@ -102,19 +102,16 @@ impl Runs<'_> {
     /// A panel with one coordinate of all runs over time.
     fn panel(&self, label: &str, y: Axis, legend: (f64, f64), entry: fn(&PhasePoint<1>) -> f64) -> Panel {
         let points = |states: &States| -> Vec<(f64, f64)> { states.iter().map(|(t, x)| (*t, entry(x))).collect() };
-        Panel {
-            x_label: "time t (dimensionless)".into(),
-            y_label: label.into(),
-            x: Axis::Linear(0.0, 16.0, 4.0),
-            y,
+        Panel::new(
+            ("time t (dimensionless)", Axis::Linear(0.0, 16.0, 4.0)),
+            (label, y),
             legend,
-            curves: vec![
+            vec![
                 Curve::new("motion", Line::Dashed, points(self.curve)),
                 Curve::new("exact discrete flow", Line::Discs, points(self.exact)),
                 Curve::new("left midpoint", Line::Crosses, points(self.left)),
                 Curve::new("midpoint", Line::Pluses, points(self.middle)),
             ],
-            marks: Vec::new(),
-        }
+        )
     }
 }

@@ -149,20 +149,23 @@ fn figure(out: &Directory) -> Result<(), Failure> {
         let orders = error_orders(&system, |h| method.discretise(&system, h, 0.0, &start), 0.0, &x, LARGEST)?;
         curves.push((line, method.name(), orders));
     }
-    let panel = |y_label: &str, of: fn(&ErrorOrders) -> &MeasuredOrder, named: bool| Panel {
-        x_label: "time step h (dimensionless)".into(),
-        y_label: y_label.into(),
-        x: Axis::Logarithmic(-6, 0, 1),
-        y: Axis::Logarithmic(-20, 0, 4),
-        legend: (0.03, 0.98),
-        curves: curves
-            .iter()
-            .map(|(line, name, orders)| {
-                let points = of(orders).errors.iter().copied().filter(|(_, e)| *e > 0.0);
-                if named { Curve::new(&name.replace('_', " "), *line, points) } else { Curve::unnamed(*line, points) }
-            })
-            .collect(),
-        marks: Vec::new(),
+    let panel = |y_label: &str, of: fn(&ErrorOrders) -> &MeasuredOrder, named: bool| {
+        Panel::new(
+            ("time step h (dimensionless)", Axis::Logarithmic(-6, 0, 1)),
+            (y_label, Axis::Logarithmic(-20, 0, 4)),
+            (0.03, 0.98),
+            curves
+                .iter()
+                .map(|(line, name, orders)| {
+                    let points = of(orders).errors.iter().copied().filter(|(_, e)| *e > 0.0);
+                    if named {
+                        Curve::new(&name.replace('_', " "), *line, points)
+                    } else {
+                        Curve::unnamed(*line, points)
+                    }
+                })
+                .collect(),
+        )
     };
     let panels = [
         panel("error of Ld (dimensionless)", |o| &o.value, true),

@@ -87,37 +87,31 @@ pub fn write(out: &Directory) -> Result<String, Failure> {
 
 /// The three discrete Lagrangians for the long step, as functions of q1.
 fn values(rows: &[Row]) -> Panel {
-    Panel {
-        x_label: "position q1 (dimensionless)".into(),
-        y_label: "Ld(q0, q1, z0) (dimensionless)".into(),
-        x: Axis::Linear(-3.0, 4.0, 1.0),
-        y: Axis::Linear(-1.0, 4.0, 1.0),
-        legend: (0.36, 0.95),
-        curves: vec![
+    Panel::new(
+        ("position q1 (dimensionless)", Axis::Linear(-3.0, 4.0, 1.0)),
+        ("Ld(q0, q1, z0) (dimensionless)", Axis::Linear(-1.0, 4.0, 1.0)),
+        (0.36, 0.95),
+        vec![
             Curve::new("left midpoint", Line::Solid, rows.iter().map(|r| (r.q1, r.left))),
             Curve::new("midpoint", Line::DashDot, rows.iter().map(|r| (r.q1, r.middle))),
             Curve::new("exact", Line::Dashed, rows.iter().map(|r| (r.q1, r.exact))),
         ],
-        marks: Vec::new(),
-    }
+    )
 }
 
 /// The differences of both rules for both steps, as functions of the mean velocity.
 fn differences(slow: &[Row], fast: &[Row]) -> Panel {
     let left = |rows: &[Row]| -> Vec<(f64, f64)> { rows.iter().map(|r| (r.u, r.errors().0)).collect() };
     let middle = |rows: &[Row]| -> Vec<(f64, f64)> { rows.iter().map(|r| (r.u, r.errors().1)).collect() };
-    Panel {
-        x_label: "mean velocity (q1 \u{2212} q0)/h (dimensionless)".into(),
-        y_label: "difference from the exact Ld".into(),
-        x: Axis::Linear(-3.0, 3.0, 1.0),
-        y: Axis::Logarithmic(-8, 2, 2),
-        legend: (0.04, 0.97),
-        curves: vec![
+    Panel::new(
+        ("mean velocity (q1 \u{2212} q0)/h (dimensionless)", Axis::Linear(-3.0, 3.0, 1.0)),
+        ("difference from the exact Ld", Axis::Logarithmic(-8, 2, 2)),
+        (0.04, 0.97),
+        vec![
             Curve::new("left midpoint: h = 1 (upper), h = 0.1 (lower)", Line::Solid, left(slow)),
             Curve::unnamed(Line::Solid, left(fast)),
             Curve::new("midpoint: h = 1 (upper), h = 0.1 (lower)", Line::DashDot, middle(slow)),
             Curve::unnamed(Line::DashDot, middle(fast)),
         ],
-        marks: Vec::new(),
-    }
+    )
 }

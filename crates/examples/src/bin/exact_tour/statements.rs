@@ -1,9 +1,9 @@
 //! The statements of section 4 on every system, over six decades of the time step.
 
-use contact_examples::{Checks, Directory, Failure, Subject, fractions, number};
+use contact_examples::{Checks, Directory, Failure, Subject, fractions, number, progress_bar};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use exact_lagrangian::{ContactExponential, ExactError, statements};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 /// The time steps.
 const STEPS: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
@@ -23,9 +23,7 @@ pub struct Loss {
 
 /// Checks all statements; returns the residuals, and the losses for steps down to 1e-8.
 pub fn check() -> (Checks, Vec<Loss>) {
-    let style = ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}");
-    let bar =
-        ProgressBar::new(catalogue_size() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = progress_bar("checking statements", catalogue_size(), "  {msg}");
     let mut walk = Walk { checks: Checks::default(), losses: Vec::new(), bar: &bar };
     visit_catalogue(&mut walk);
     bar.finish_and_clear();

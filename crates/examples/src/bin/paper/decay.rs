@@ -63,32 +63,26 @@ pub fn conformal_factor(out: &Directory) -> Result<(), Failure> {
     };
     let deviation = |r: &Factor| (r.measured / r.exact - 1.0).abs();
     let defect = |r: &Factor| (r.measured / r.product - 1.0).abs();
-    let decay = Panel {
-        x_label: TIME.into(),
-        y_label: "conformal factor σ".into(),
-        x: Axis::Linear(0.0, 50.0, 10.0),
-        y: Axis::Logarithmic(-3, 0, 1),
-        legend: (0.04, 0.32),
-        curves: vec![
+    let decay = Panel::new(
+        (TIME, Axis::Linear(0.0, 50.0, 10.0)),
+        ("conformal factor σ", Axis::Logarithmic(-3, 0, 1)),
+        (0.04, 0.32),
+        vec![
             Curve::new(LEFT, Line::Solid, points(&left, |r| r.measured)),
             Curve::new(MIDDLE, Line::DashDot, points(&middle, |r| r.measured)),
             Curve::new("exact flow, exp(γt)", Line::Dashed, points(&left, |r| r.exact)),
         ],
-        marks: Vec::new(),
-    };
-    let error = Panel {
-        x_label: TIME.into(),
-        y_label: "relative deviation of σ".into(),
-        x: Axis::Linear(0.0, 50.0, 10.0),
-        y: Axis::Logarithmic(-18, 2, 4),
-        legend: (0.1, 0.62),
-        curves: vec![
+    );
+    let error = Panel::new(
+        (TIME, Axis::Linear(0.0, 50.0, 10.0)),
+        ("relative deviation of σ", Axis::Logarithmic(-18, 2, 4)),
+        (0.1, 0.62),
+        vec![
             Curve::new("left midpoint, from exp(γt)", Line::Solid, points(&left[1..], deviation)),
             Curve::new("midpoint, from exp(γt)", Line::DashDot, points(&middle[1..], deviation)),
             Curve::new("midpoint, from the product of the σ", Line::Dotted, points(&middle[1..], defect)),
         ],
-        marks: Vec::new(),
-    };
+    );
     out.text("conformal_factor.svg", &draw_row(&[decay, error]))?;
     let columns =
         ["t", "sigma_left_midpoint", "product_left_midpoint", "sigma_midpoint", "product_midpoint", "sigma_exact"];
@@ -126,32 +120,26 @@ pub fn angular_momentum(out: &Directory) -> Result<(), Failure> {
     let exact = |t: f64| initial * (KEPLER.gamma * t).exp();
     let deviation = |r: &MomentumRow| (r.t, (r.momentum / exact(r.t) - 1.0).abs());
     let defect = |r: &MomentumRow| (r.t, r.defect());
-    let decay = Panel {
-        x_label: TIME.into(),
-        y_label: "momentum J (dimensionless)".into(),
-        x: Axis::Linear(0.0, 30.0, 5.0),
-        y: Axis::Linear(0.4, 0.9, 0.1),
-        legend: (0.24, 0.95),
-        curves: vec![
+    let decay = Panel::new(
+        (TIME, Axis::Linear(0.0, 30.0, 5.0)),
+        ("momentum J (dimensionless)", Axis::Linear(0.4, 0.9, 0.1)),
+        (0.24, 0.95),
+        vec![
             Curve::new(LEFT, Line::Solid, left.iter().map(|r| (r.t, r.momentum))),
             Curve::new("predicted, product of the σ", Line::Dashed, left.iter().map(|r| (r.t, r.predicted))),
         ],
-        marks: Vec::new(),
-    };
-    let error = Panel {
-        x_label: TIME.into(),
-        y_label: "relative deviation of J".into(),
-        x: Axis::Linear(0.0, 30.0, 5.0),
-        y: Axis::Logarithmic(-18, 2, 4),
-        legend: (0.1, 0.98),
-        curves: vec![
+    );
+    let error = Panel::new(
+        (TIME, Axis::Linear(0.0, 30.0, 5.0)),
+        ("relative deviation of J", Axis::Logarithmic(-18, 2, 4)),
+        (0.1, 0.98),
+        vec![
             Curve::new("left midpoint, from J(0) exp(γt)", Line::Solid, left[1..].iter().map(deviation)),
             Curve::new("midpoint, from J(0) exp(γt)", Line::DashDot, middle[1..].iter().map(deviation)),
             Curve::new("both rules, from the product of the σ", Line::Dotted, left[1..].iter().map(defect)),
             Curve::unnamed(Line::Dotted, middle[1..].iter().map(defect)),
         ],
-        marks: Vec::new(),
-    };
+    );
     out.text("angular_momentum.svg", &draw_row(&[decay, error]))?;
     let columns = ["t", "j_left_midpoint", "predicted_left_midpoint", "j_midpoint", "predicted_midpoint", "j_exact"];
     let rows = left.iter().zip(&middle);

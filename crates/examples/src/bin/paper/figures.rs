@@ -27,7 +27,7 @@ fn as_published(points: impl IntoIterator<Item = (f64, f64)>) -> Curve {
 }
 
 fn panel(label: &str, x: Axis, y: Axis, legend: (f64, f64), curves: Vec<Curve>) -> Panel {
-    Panel { x_label: TIME.into(), y_label: label.into(), x, y, legend, curves, marks: Vec::new() }
+    Panel::new((TIME, x), (label, y), legend, curves)
 }
 
 /// The entries that a figure's discrete, exact and published curves show.

@@ -1,16 +1,13 @@
 //! The walk over the catalogue that checks the paper's statements.
 
 use crate::{section2, section3, section5};
-use contact_examples::{Checks, Subject, fractions};
+use contact_examples::{Checks, Subject, fractions, progress_bar};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 /// Checks every statement on everything that it applies to.
 pub fn check_all() -> Checks {
-    let bar = ProgressBar::new(catalogue_size() as u64 + 1).with_style(
-        ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = progress_bar("checking statements", catalogue_size() + 1, "  {msg}");
     let mut walk = Walk { checks: Checks::default(), bar: &bar };
     visit_catalogue(&mut walk);
     let mut checks = walk.checks;
