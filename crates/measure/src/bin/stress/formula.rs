@@ -255,6 +255,7 @@ fn quadratic<T: Scalar, const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<T, N
 
 impl<const N: usize> Lagrangian<N> for Formula<N> {
     /// That of Kepler's problem. Runs do not choose it, since it is not declared in `HINTS`.
+    #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
         q.dot(q).sqrt().sqrt().powi(3)
     }
