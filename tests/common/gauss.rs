@@ -1,7 +1,7 @@
 //! Steppers of contact Gauss collocation from a momentum and a guess of its velocity.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, TimeTransformation};
+use contact_geom::{Lagrangian, PhasePoint};
 use discrete_herglotz::gauss::{Gauss, GaussStepper, TransformedStepper};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Problem, Start, StepperOptions};
 
@@ -19,13 +19,12 @@ pub trait GaussSteppers<L, const N: usize> {
     ) -> Result<GaussStepper<'_, L, N>, InputError>;
 
     /// A stepper with equal steps in transformed time.
-    fn transformed_stepper<C: TimeTransformation<N>>(
+    fn transformed_stepper(
         &self,
-        transformation: C,
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<TransformedStepper<'_, L, C, N>, InputError>;
+    ) -> Result<TransformedStepper<'_, L, N>, InputError>;
 }
 
 impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
@@ -45,14 +44,13 @@ impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
         GaussStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), StepperOptions::default())
     }
 
-    fn transformed_stepper<C: TimeTransformation<N>>(
+    fn transformed_stepper(
         &self,
-        transformation: C,
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<TransformedStepper<'_, L, C, N>, InputError> {
+    ) -> Result<TransformedStepper<'_, L, N>, InputError> {
         let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
-        TransformedStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), transformation)
+        TransformedStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self))
     }
 }

@@ -1,10 +1,11 @@
-//! Helpers that several test files share: random points, the samples of a step, an independent integrator, slopes and
-//! Lagrangians.
+//! Helpers that several test files share: random points, the samples of a step, an independent integrator, slopes,
+//! observers and Lagrangians.
 
 pub mod draws;
 pub mod forces;
 pub mod gauss;
 pub mod lagrangians;
+pub mod observers;
 pub mod oracle;
 
 use contact_geom::{

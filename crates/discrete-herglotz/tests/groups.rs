@@ -13,8 +13,8 @@ mod boundary;
 mod derivatives;
 
 use contact_geom::groups::{
-    GroupError, GroupLagrangian, Inertia, LieGroup, Pair, PlaneRotation, PlaneRotations, Product, RigidBody,
-    RigidMotion, RigidMotions, Rotation, Rotations, Translations, UniformGravity,
+    GroupError, GroupLagrangian, Inertia, LieGroup, RigidBody, RigidMotion, RigidMotions, Rotation, Rotations,
+    UniformGravity,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
@@ -313,17 +313,6 @@ impl GroupLagrangian<RigidMotions, 6> for Falling {
     }
 }
 
-/// A bead on a wheel that turns, the group SO(2) x R: the moment of inertia depends on the place of the bead.
-struct Wheel;
-type TurnAndPlace = Product<PlaneRotations, Translations<1>, 1, 1>;
-
-impl GroupLagrangian<TurnAndPlace, 2> for Wheel {
-    fn value<T: Scalar>(&self, _t: T, g: &Pair<PlaneRotation<T>, SVector<T, 1>>, xi: &SVector<T, 2>, z: T) -> T {
-        let x = g.b[0];
-        (xi[0] * xi[0] * (x * x + 1.0) + xi[1] * xi[1]) * 0.5 + g.a.cos * x * 0.7 - x * x * 0.4 - z * (z * 0.05 + 0.2)
-    }
-}
-
 /// Steps on a group are conformally contact, and of order 2s.
 fn contact_and_of_order_2s<G: LieGroup<N>, const N: usize>(
     name: &str,
@@ -358,13 +347,11 @@ fn contact_and_of_order_2s<G: LieGroup<N>, const N: usize>(
 }
 
 #[test]
-fn bodies_in_space_and_products_of_groups() {
+fn bodies_in_space() {
     let g = RigidMotions::exp(&SVector::from([0.4, -1.1, 0.8, 0.3, 0.2, -0.5]));
     let momentum = SVector::from([0.7, -0.6, 0.9, 0.4, -0.3, 0.5]);
     let start = GroupState::<RigidMotions, 6> { g, momentum, z: 0.4 };
     contact_and_of_order_2s("SE(3)", &Falling, start);
-    let g = TurnAndPlace::exp(&SVector::from([0.4, 0.7]));
-    contact_and_of_order_2s("SO(2) x R", &Wheel, GroupState { g, momentum: SVector::from([0.9, -0.4]), z: 0.4 });
 
     // Horizontal translations of the body in space are symmetries: their momenta scale with the conformal factor. Each
     // step rounds an impulse whose largest entry is that of the falling body, in the vertical momentum and its moment.

@@ -155,7 +155,7 @@ fn invalid_input() {
     let unknown = ready(2).tangent_at(&[Variable::Parameter("gama".into())], &[], UNTIL).unwrap();
     assert!(unknown.iter().all(|member| matches!(member, Err(SensitivityError::Parameter(_)))));
     let kepler = Kepler::<2>::default();
-    let ensemble = Ensemble::new(&kepler, 0.0, 2, |_| kepler.initial()).by(TransformedGauss::new(6));
+    let ensemble = Ensemble::new(&kepler, 0.0, 2, |_| kepler.initial()).by(TransformedGauss { stages: 6 });
     let found = ensemble.steps(Steps::Size(0.2)).gradient(&Mixed, Until::Time(1.0)).unwrap();
     assert!(found.members.iter().all(|member| matches!(member, Err(SensitivityError::NoTangent { .. }))));
 }

@@ -36,7 +36,7 @@ fn integrators_without_tangents() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
     let transformed =
-        problem.by(TransformedGauss::new(6)).steps(Steps::Size(0.2)).gradient(&Constant(1.0), Until::Time(1.0));
+        problem.by(TransformedGauss { stages: 6 }).steps(Steps::Size(0.2)).gradient(&Constant(1.0), Until::Time(1.0));
     assert!(matches!(transformed, Err(SensitivityError::NoTangent { .. })));
     assert!(transformed.unwrap_err().to_string().contains("choose `GaussCollocation`"));
 }

@@ -180,7 +180,7 @@ fn elastic_impacts_keep_the_pairing() {
 fn integrators_without_a_tangent() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    let run = problem.by(TransformedGauss::new(6)).steps(Steps::Size(0.2));
+    let run = problem.by(TransformedGauss { stages: 6 }).steps(Steps::Size(0.2));
     let found = run.lyapunov_exponents(Until::Time(1.0));
     assert!(matches!(found, Err(SensitivityError::NoTangent { .. })));
 }

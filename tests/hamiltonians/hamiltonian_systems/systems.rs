@@ -1,5 +1,6 @@
 //! The systems with the same number of coordinates as one type, for which runs are compiled once, and runs of them.
 
+use crate::common::observers::Each;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::hamiltonian::{
     Bregman, ContactThermostat, Containers, HeatedOscillator, NoseHoover, NosePoincare, Piston, Quartic, Ray,
@@ -10,8 +11,7 @@ use contact_geom::{
     AtEnergy, ChartVector, ContactHamiltonian, HamiltonianStructure, InTransformedTime, Lifted, OfHamiltonian,
     PhasePoint, Scalar,
 };
-use discrete_herglotz::{GaussCollocation, Outcome, Problem, Status, StepView, Steps, Stop, Until};
-use std::ops::ControlFlow;
+use discrete_herglotz::{GaussCollocation, Outcome, Problem, Status, StepView, Steps, Until};
 
 /// An enum of Hamiltonians that is one.
 macro_rules! one_type {
@@ -109,11 +109,10 @@ pub fn run<H: ContactHamiltonian<N>, const N: usize>(
     let problem = Problem::of_hamiltonian(&of, t0, start).unwrap();
     see(t0, &start, 0.0);
     let mut log_factor = 0.0;
-    let mut observer = |at: &StepView<'_, N>| -> ControlFlow<Stop<N>> {
+    let mut observer = Each(|at: &StepView<'_, N>| {
         log_factor += at.sigma.ln();
         see(at.t, &at.state, log_factor);
-        ControlFlow::Continue(())
-    };
+    });
     let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(h)).observe(&mut observer);
     run.run(Until::Time(end)).unwrap()
 }

@@ -1,14 +1,14 @@
 //! Runs on a contact Hamiltonian: a requested accuracy, rows, events, dense output, checkpoints, ensembles, forces.
 
 use super::systems::{Line, One, Push, Two};
+use crate::common::observers::StopsAt;
 use crate::common::relative_distance;
 use contact_geom::systems::Pendulum;
 use contact_geom::{Forced, OfHamiltonian, PhasePoint, VelocityPoint};
 use discrete_herglotz::{
-    Checkpoint, Ensemble, Event, Events, GaussCollocation, InputError, Problem, ResumeState, Rows, Status, StepView,
-    Stepper, StepperOptions, Steps, Stop, Until, gauss::GaussStepper,
+    Checkpoint, Ensemble, Event, Events, GaussCollocation, InputError, Problem, ResumeState, Rows, Status, Stepper,
+    StepperOptions, Steps, Until, gauss::GaussStepper,
 };
-use std::ops::ControlFlow;
 
 /// The start of a motion with one coordinate.
 fn one() -> PhasePoint<1> {
@@ -73,9 +73,7 @@ fn a_resumed_run_is_the_same() {
     let whole = run().run(Until::Time(10.0)).unwrap();
     let path = std::env::temp_dir().join(format!("a_ray_{}.checkpoint", std::process::id()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
-    let mut enough = |at: &StepView<'_, 2>| {
-        if at.k == 30 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
-    };
+    let mut enough = StopsAt(30, "a test");
     run().observe(&mut saved).observe(&mut enough).run(Until::Time(10.0)).unwrap();
     let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(10.0)).unwrap();
     std::fs::remove_file(path).unwrap();

@@ -1,16 +1,16 @@
 //! Events of consecutive runs: each change of sign is counted once, in exactly one of the runs.
 
+use crate::common::observers::StopsAt;
 use crate::lagrangians::{One, one};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, StepView, Steps,
-    Stop, Until, rules::Method,
+    AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, Steps, Until,
+    rules::Method,
 };
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 
 /// An oscillation of frequency one about a place.
 #[derive(Clone, Copy, Debug)]
@@ -153,9 +153,7 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     let problem = Problem::new(&system, 0.0, start).unwrap();
     let run = || problem.by(way.0).steps(Steps::Count(16));
     let mut saved = Checkpoint::every(8, &path).unwrap();
-    let mut enough = |at: &StepView<'_, 1>| {
-        if at.k == 8 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
-    };
+    let mut enough = StopsAt(8, "a test");
     let (mut first, mut second) = (Events::new([at_one()]), Events::new([at_one()]));
     let cut = run().observe(&mut first).observe(&mut saved).observe(&mut enough).run(Until::Time(2.0)).unwrap();
     let resumed = run().observe(&mut second).resume(ResumeState::read(&path).unwrap()).run(Until::Time(2.0)).unwrap();

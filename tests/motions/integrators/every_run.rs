@@ -1,14 +1,14 @@
 //! All features of a run, by integrators without a name in the table: the exact flow, and a user's discrete Lagrangian.
 
+use crate::common::observers::{Each, StopsAt};
 use crate::lagrangians::{One, one};
 use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{
     Checkpoint, CustomMethod, DiscreteLagrangian, Event, Events, Integrator, Outcome, Problem, ResumeState, Rows, Run,
-    Status, StepError, StepView, Steps, Stop, Until,
+    Status, StepError, StepView, Steps, Until,
 };
 use exact_lagrangian::ExactFlow;
-use std::ops::ControlFlow;
 
 /// The midpoint of the positions and of the actions, as a user would write it: `z1` by twelve fixed-point iterations.
 struct Own<L> {
@@ -66,12 +66,11 @@ fn everything(known: OneCoordinate, integrator: impl for<'a> Integrator<'a, One,
     let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", known.name()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
     let mut seen = 0;
-    let mut enough = |at: &StepView<'_, 1>| {
-        seen = at.k;
-        if at.k == 30 { ControlFlow::Break(Stop::here("the user")) } else { ControlFlow::Continue(()) }
-    };
+    let mut last = Each(|at: &StepView<'_, 1>| seen = at.k);
+    let mut enough = StopsAt(30, "the user");
     let run = || -> Run<'_, '_, One, 1> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
-    let cut = run().observe(&mut saved).observe(&mut enough).run(Until::Time(3.25)).unwrap();
+    let run_to_30 = run().observe(&mut saved).observe(&mut last).observe(&mut enough);
+    let cut = run_to_30.run(Until::Time(3.25)).unwrap();
     assert_eq!((cut.status, seen), (Status::Stopped { step: 30, t: cut.t, by: "the user" }, 30), "{name}");
     let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(3.25)).unwrap();
     assert_eq!(resumed, whole, "{name}");

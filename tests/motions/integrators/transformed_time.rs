@@ -3,10 +3,8 @@
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{one, two};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
-use contact_geom::{
-    Hints, Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre, numbers::MaxOrNan,
-};
+use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, System};
+use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre, numbers::MaxOrNan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, TransformedGauss,
     Until,
@@ -20,14 +18,9 @@ fn pericentre(e: f64) -> VelocityPoint<2> {
     VelocityPoint::new([1.0 - e, 0.0], [0.0, ((1.0 + e) / (1.0 - e)).sqrt()], 0.0)
 }
 
-fn transformed<'a, C: TimeTransformation<2>>(
-    gauss: &'a Gauss<Planar>,
-    kepler: &Planar,
-    transformation: C,
-    e: f64,
-) -> TransformedStepper<'a, Planar, C, 2> {
+fn transformed<L: Lagrangian<2>>(gauss: &Gauss<L>, e: f64) -> TransformedStepper<'_, L, 2> {
     let start = pericentre(e);
-    gauss.transformed_stepper(transformation, 0.0, legendre(kepler, 0.0, &start), start.v).unwrap()
+    gauss.transformed_stepper(0.0, legendre(gauss.lagrangian(), 0.0, &start), start.v).unwrap()
 }
 
 fn distance(a: &PhasePoint<2>, b: &PhasePoint<2>) -> f64 {
@@ -42,12 +35,28 @@ fn energy(kepler: &Planar, x: &PhasePoint<2>) -> f64 {
     kepler.hamiltonian(0.0, x).unwrap()
 }
 
-/// The time transformation of a constant rate of any sign.
-struct ConstantRate(f64);
+/// A rate dt/dtau.
+enum Rate {
+    Constant(f64),
+    /// Not defined beyond `x = 0`.
+    Ending,
+}
 
-impl TimeTransformation<2> for ConstantRate {
-    fn rate<T: Scalar>(&self, _q: &SVector<T, 2>) -> T {
-        T::from(self.0)
+/// Kepler's problem with another time transformation.
+struct Orbit(Planar, Rate);
+
+impl Lagrangian<2> for Orbit {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
+        match self.1 {
+            Rate::Constant(rate) => T::from(rate),
+            Rate::Ending => q[0].sqrt() + 1.0,
+        }
     }
 }
 
@@ -59,8 +68,8 @@ fn a_constant_time_transformation_is_the_physical_time() {
     let mut plain = gauss.stepper(0.0, legendre(&kepler, 0.0, &start), start.v).unwrap();
     plain.advance(100).unwrap();
     for rate in [1.0, 2.0] {
-        let gauss = Gauss::new(kepler, 8, 0.1 / rate).unwrap();
-        let mut run = transformed(&gauss, &kepler, ConstantRate(rate), 0.5);
+        let gauss = Gauss::new(Orbit(kepler, Rate::Constant(rate)), 8, 0.1 / rate).unwrap();
+        let mut run = transformed(&gauss, 0.5);
         run.advance(100).unwrap();
         assert!((run.time() - plain.time()).abs() < 1e-14);
         let off = distance(&run.state(), &plain.state());
@@ -74,7 +83,7 @@ fn order_two_s_at_a_physical_time() {
     let kepler = Planar { gamma: -0.05, mu: 1.0 };
     let at = |s: usize, h: f64, t: f64| {
         let gauss = Gauss::new(kepler, s, h).unwrap();
-        let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.5);
+        let mut run = transformed(&gauss, 0.5);
         run.advance_to(t).unwrap();
         assert!((run.time() - t).abs() <= 1e-15 * t, "{} for {t}", run.time());
         run.state()
@@ -97,7 +106,7 @@ fn order_two_s_at_a_physical_time() {
 fn momenta_contract_by_sigma() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
     let gauss = Gauss::new(kepler, 4, 0.2).unwrap();
-    let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.5);
+    let mut run = transformed(&gauss, 0.5);
     let (start, p_t) = (run.state(), run.time_momentum());
     let (mut contracted, mut defect) = (1.0, 0.0_f64);
     for _ in 0..1000 {
@@ -127,7 +136,7 @@ fn eccentric_orbits_cost_less() {
     let (reference, _) = plain(12, 8000);
     let (fixed, most) = plain(8, 800);
     let gauss = Gauss::new(kepler, 8, 0.5).unwrap();
-    let mut run = transformed(&gauss, &kepler, kepler.time_transformation(), 0.9);
+    let mut run = transformed(&gauss, 0.9);
     run.advance_to(t).unwrap();
     let (error, of_fixed) = (distance(&run.state(), &reference), distance(&fixed, &reference));
     println!("{error:e} with {}, {of_fixed:e} with {most}", run.evaluations());
@@ -142,41 +151,25 @@ fn bad_input_is_refused() {
     let state = legendre(&kepler, 0.0, &start);
     let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
     for bad in [0.0, -1.0, f64::INFINITY, f64::NAN] {
-        let refused = gauss.transformed_stepper(ConstantRate(bad), 0.0, state, start.v).err();
+        let gauss = Gauss::new(Orbit(kepler, Rate::Constant(bad)), 3, 0.1).unwrap();
+        let refused = gauss.transformed_stepper(0.0, state, start.v).err();
         assert!(matches!(refused, Some(InputError::TimeTransformation { .. })), "{bad}: {refused:?}");
     }
     let driven = Gauss::new(two(PerturbedKepler::default()), 3, 0.1).unwrap();
-    let refused = driven.transformed_stepper(Radial { exponent: 1.0 }, 0.0, state, start.v).err();
+    let refused = driven.transformed_stepper(0.0, state, start.v).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "autonomous" }));
-    let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, state, start.v).unwrap();
+    let mut run = gauss.transformed_stepper(0.0, state, start.v).unwrap();
     assert_eq!(run.advance_to(f64::NAN).map_err(|halt| halt.cause), Err(StepError::NonFinite));
     assert_eq!((run.advance_to(-1.0), run.time()), (Ok(()), 0.0));
 }
 
 #[test]
 fn a_time_transformation_that_is_not_defined_ends_the_run() {
-    /// Not defined beyond `x = 0`.
-    struct Ending;
-    impl TimeTransformation<2> for Ending {
-        fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
-            q[0].sqrt() + 1.0
-        }
-    }
-    let kepler = Planar::default();
-    let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
-    let mut run = transformed(&gauss, &kepler, Ending, 0.5);
+    let gauss = Gauss::new(Orbit(Planar::default(), Rate::Ending), 3, 0.1).unwrap();
+    let mut run = transformed(&gauss, 0.5);
     let halt = run.advance_to(10.0).unwrap_err();
     assert_eq!(halt.cause, StepError::NonFinite);
     assert!(run.state().q[0] > 0.0 && run.time() < 10.0 && halt.taken > 3);
-}
-
-#[test]
-fn powers_of_the_distance() {
-    let q = SVector::from([0.3, -0.4]);
-    for exponent in [-1.0, 0.0, 0.7, 1.0, 1.5, 2.0] {
-        let rate: f64 = Radial { exponent }.rate(&q);
-        assert!((rate / 0.5_f64.powf(exponent) - 1.0).abs() < 1e-15, "{exponent}");
-    }
 }
 
 /// (q, p) on the orbit of [`pericentre`] without drag, from Kepler's equation by bisection.
@@ -323,7 +316,7 @@ fn invalid_time_transformations_are_refused() {
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
     // Not by `AnyIntegrator`, which is compiled with every integrator.
-    let by = TransformedGauss::new(4);
+    let by = TransformedGauss { stages: 4 };
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
         let system = Transformed { rate, autonomous };
         Problem::new(&system, 0.0, start).unwrap().by(by).steps(steps).plan(Until::Time(2.0)).err()

@@ -1,5 +1,6 @@
 //! Output of runs by every integrator: rows at times, events, runs backward, stopped and resumed runs.
 
+use crate::common::observers::{Each, StopsAt};
 use crate::lagrangians::{one, two};
 use crate::motions::run_of;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, UniformField};
@@ -9,10 +10,9 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Problem, Progress, Quotient, ResumeState, Rows, Run,
-    StepView, Steps, Stop, Until,
+    StepView, Steps, Until,
 };
 use discrete_herglotz::{InputError, Outcome, Status, gauss::Gauss, rules::Method};
-use std::ops::ControlFlow;
 
 /// Every integrator that accepts a system.
 fn applicable<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = AnyIntegrator> {
@@ -286,18 +286,12 @@ fn observers_ask_and_stop() {
         let plain = run_in(&problem, integrator, 20, 1.0).without_action().run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.z, plain.log_factor), (None, None));
         let mut seen = Vec::new();
-        let mut watch = |at: &StepView<'_, 2>| {
-            seen.push((at.k, at.t, at.energy().unwrap()));
-            ControlFlow::Continue(())
-        };
+        let mut watch = Each(|at: &StepView<'_, 2>| seen.push((at.k, at.t, at.energy().unwrap())));
         let watched: Outcome<2> =
             run_in(&problem, integrator, 20, 1.0).without_action().observe(&mut watch).run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.q, plain.p, plain.steps), (watched.q, watched.p, watched.steps), "{integrator}");
         assert!(watched.z.is_some() && seen.len() == watched.steps, "{integrator}");
-        let mut stops = |at: &StepView<'_, 2>| match at.k {
-            5 => ControlFlow::Break(Stop::here("the fifth step")),
-            _ => ControlFlow::Continue(()),
-        };
+        let mut stops = StopsAt(5, "the fifth step");
         let stopped = run_in(&problem, integrator, 20, 1.0)
             .with_conformal_factor()
             .observe(&mut stops)
@@ -351,10 +345,7 @@ fn interrupted_runs_are_resumed() {
             // Places that are not periodic.
             for place in [1, 2 + whole.steps * 5 / 13, whole.steps - 1] {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut interrupt = |at: &StepView<'_, N>| match at.k {
-                    k if k == place => ControlFlow::Break(Stop::here("a test")),
-                    _ => ControlFlow::Continue(()),
-                };
+                let mut interrupt = StopsAt(place, "a test");
                 let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
                 let stopped = run.observe(&mut saved).observe(&mut interrupt).run(Until::Time(6.0)).unwrap();
                 assert_eq!((stopped.steps, saved.error.is_none()), (place, true), "{integrator}");
@@ -398,10 +389,7 @@ fn unresolved_steps_are_resumed() {
             flagged += usize::from(whole.unresolved.is_some());
             for place in [1, 8, 16, 17, 32, whole.steps].into_iter().filter(|k| (1..=whole.steps).contains(k)) {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut interrupt = |at: &StepView<'_, 2>| match at.k {
-                    k if k == place => ControlFlow::Break(Stop::here("a test")),
-                    _ => ControlFlow::Continue(()),
-                };
+                let mut interrupt = StopsAt(place, "a test");
                 let stopped = run().observe(&mut saved).observe(&mut interrupt).run(until).unwrap();
                 let resumed = run().resume(ResumeState::read(&path).unwrap()).run(until).unwrap();
                 // As text, since a defect may be NaN.

@@ -1,5 +1,6 @@
 //! Steps and runs: against steps by derivatives of the value, backward against forward, small steps and large systems.
 
+use crate::common::observers::StopsAt;
 use crate::common::{around, on_random, step_from};
 use crate::lagrangians::one;
 use crate::paper::table::discretise;
@@ -9,12 +10,11 @@ use contact_geom::{
     numbers::{MaxAbsOrNan, MaxOrNan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Problem, Rows, Status, StepError, StepView, Stepper, Steps, Stop, Until,
+    AnyIntegrator, DiscreteLagrangian, Problem, Rows, Status, StepError, Stepper, Steps, Until,
     rules::{Flow, Method, Midpoint},
     solve::Solver,
     theory::legendre_minus,
 };
-use std::ops::ControlFlow;
 
 /// A discrete Lagrangian that has only a value, so that its steps take the general route.
 struct DerivedFromValue<D>(D);
@@ -120,11 +120,7 @@ fn records() {
     let pendulum = one(Pendulum::default());
     let problem = Problem::new(&pendulum, 2.0, PhasePoint::new([1.0], [0.5], 0.2)).unwrap();
     let by_rule = AnyIntegrator::Discrete(Method::LeftMidpoint);
-    let counter = |at: &StepView<'_, 1>| match at.k {
-        25 => ControlFlow::Break(Stop::here("the counter")),
-        _ => ControlFlow::Continue(()),
-    };
-    let mut both = (Rows::every(10).unwrap(), counter);
+    let mut both = (Rows::every(10).unwrap(), StopsAt(25, "the counter"));
     let run = problem.by(by_rule).steps(Steps::Size(0.1)).observe(&mut both);
     let stopped = run.run(Until::Steps(100)).unwrap();
     assert_eq!(stopped.status, Status::Stopped { step: 25, t: 4.5, by: "the counter" });

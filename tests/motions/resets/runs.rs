@@ -1,5 +1,6 @@
 //! Runs with resets: rows, events, resumed runs, ensembles.
 
+use crate::common::observers::StopsAt;
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
 use contact_geom::switching::{Control, Impact, Impacts};
@@ -73,15 +74,8 @@ fn runs_are_resumed_across_impacts_bit_by_bit() {
         let whole = run().run(Until::Time(8.0)).unwrap();
         for every in [1, 4, 7] {
             let path = std::env::temp_dir().join(format!("resets_{name}_{every}_{}", std::process::id()));
-            let mut count = 0;
-            let mut stop = |view: &discrete_herglotz::StepView<'_, 2>| {
-                count += 1;
-                if view.t > 4.0 {
-                    std::ops::ControlFlow::Break(discrete_herglotz::Stop::here("half way"))
-                } else {
-                    std::ops::ControlFlow::Continue(())
-                }
-            };
+            // Half way: 22 steps are taken in all.
+            let mut stop = StopsAt(12, "a test");
             let mut checkpoint = Checkpoint::every(every, &path).unwrap();
             run().observe(&mut checkpoint).observe(&mut stop).run(Until::Time(8.0)).unwrap();
             let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(8.0)).unwrap();

@@ -203,10 +203,15 @@ pub trait Lagrangian<const N: usize> {
         &[]
     }
 
-    /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) in which steps of equal
-    /// length suit this motion, for autonomous Lagrangians. It must be positive and should decrease where the motion
-    /// gets faster. Set [`Hints::time_transformation`] as well; by default tau is the time
-    /// itself.
+    /// The rate `g(q) = dt/dtau` of a time transformation, in whose time tau steps of equal length suit this motion, for
+    /// autonomous Lagrangians. It must be positive and should decrease where the motion gets faster. Set
+    /// [`Hints::time_transformation`] as well; by default tau is the time itself.
+    ///
+    /// It is the transformation of Poincaré and Levi-Civita: on T\*(Q x R) x R with coordinates `(q, t, p, p_t, z)` the
+    /// contact Hamiltonian `K = g(q) (H(q, p, z) + p_t)` has, on the surface `K = 0`, the motion of H in the time tau,
+    /// and the surface is invariant since `K' = -K R(K)` with the Reeb field R. A contact method of fixed step size for
+    /// K is therefore a method of variable step size for H; see Hairer, "Variable time step integration with symplectic
+    /// methods", Appl. Numer. Math. 25 (1997).
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
         T::one()

@@ -22,7 +22,6 @@ pub(crate) mod probe;
 mod rounding;
 mod structure;
 mod table;
-mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
@@ -50,4 +49,3 @@ pub use probe::check_closed_derivatives;
 pub use rounding::{gradient_rounding, rounding_at_state};
 pub use structure::{Defect, Defects, Structure};
 pub use table::{Interpolation, Table, TableError};
-pub use time_transformation::TimeTransformation;

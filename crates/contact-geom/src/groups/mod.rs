@@ -9,9 +9,6 @@
 //! |---|---|---|---|
 //! | [`Rotations`], SO(3) | 3 | [`Rotation`], a unit quaternion | angular velocity |
 //! | [`RigidMotions`], SE(3) | 6 | [`RigidMotion`] | angular velocity, then velocity |
-//! | [`PlaneRotations`], SO(2) | 1 | [`PlaneRotation`] | angular velocity |
-//! | [`Translations`], R^n | n | a vector | velocity |
-//! | [`Product`], A x B | the sum | [`Pair`] | that of A, then that of B |
 //!
 //! Formulas branch on the value of a number, so groups are evaluated for one state at a time, not in SIMD lanes.
 
@@ -21,16 +18,13 @@ mod inertia;
 mod lagrangian;
 mod lie_group;
 mod parametric;
-mod plane_rotation;
 mod potentials;
-mod product;
 mod rigid_body;
 mod rigid_motion;
 mod rotation;
 mod stumpff;
 #[cfg(test)]
 mod tests;
-mod translations;
 
 pub use error::GroupError;
 pub use forced::{GroupForce, GroupForced};
@@ -38,10 +32,7 @@ pub use inertia::Inertia;
 pub use lagrangian::{GroupLagrangian, GroupPartials};
 pub use lie_group::LieGroup;
 pub use parametric::ParametricGroupLagrangian;
-pub use plane_rotation::{PlaneRotation, PlaneRotations};
 pub use potentials::{GroupPotential, NoPotential, UniformGravity};
-pub use product::{Pair, Product};
 pub use rigid_body::RigidBody;
 pub use rigid_motion::{RigidMotion, RigidMotions};
 pub use rotation::{Rotation, Rotations};
-pub use translations::Translations;

@@ -3,9 +3,7 @@
 use super::{System, between};
 use crate::dynamics::parametric_fields;
 use crate::numbers::{Coefficient, ScalarOver};
-use crate::{
-    ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint,
-};
+use crate::{ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: for `mu = 1`, lengths are
@@ -53,9 +51,12 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
         }
     }
 
+    /// The rate `|q|^(3/2)` is proportional to the free-fall time to the centre, so that close and distant passages of
+    /// the centre take the same number of steps.
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, q: &SVector<T, D>) -> T {
-        self.time_transformation().rate(q)
+        // SIMD registers support square roots and products, but no general powers.
+        q.dot(q).sqrt().sqrt().powi(3)
     }
 }
 
@@ -88,12 +89,6 @@ impl<const D: usize> System<D> for Kepler<D> {
 }
 
 impl<const D: usize> Kepler<D> {
-    /// The natural time transformation. Its rate `|q|^(3/2)` is proportional to the free-fall time to the centre, so
-    /// that close and distant passages of the centre take the same number of steps.
-    pub fn time_transformation(&self) -> Radial {
-        Radial { exponent: 1.5 }
-    }
-
     /// The Lagrangian, over the type of its parameters.
     #[inline(always)]
     fn formula<C: Coefficient, T: ScalarOver<C>>(
@@ -105,27 +100,6 @@ impl<const D: usize> Kepler<D> {
         z: T,
     ) -> T {
         v.dot(v) * 0.5 + attraction(mu, q) + z * gamma
-    }
-}
-
-/// The time transformation `g = |q|^a`. For Kepler's problem without drag, tau is up to a constant factor the eccentric
-/// anomaly for `a = 1` and the true anomaly for `a = 2`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Radial {
-    /// The exponent `a`.
-    pub exponent: f64,
-}
-
-impl<const D: usize> TimeTransformation<D> for Radial {
-    #[inline(always)]
-    fn rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
-        let (square, halves) = (q.dot(q), 2.0 * self.exponent);
-        // SIMD registers support square roots and products, but no general powers.
-        if halves.fract() == 0.0 && halves.abs() <= 64.0 {
-            square.sqrt().sqrt().powi(halves as i32)
-        } else {
-            square.powf(0.5 * self.exponent)
-        }
     }
 }
 

@@ -36,7 +36,7 @@ pub use double_pendulum::DoublePendulum;
 pub use duffing::Duffing;
 pub use free_particle::FreeParticle;
 pub use harmonic_oscillator::HarmonicOscillator;
-pub use kepler::{Kepler, Radial};
+pub use kepler::Kepler;
 pub use lane_emden::LaneEmden;
 pub use lienard::Lienard;
 pub use pendulum::Pendulum;

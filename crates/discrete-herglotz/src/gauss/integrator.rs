@@ -2,12 +2,11 @@
 
 use crate::gauss::checks::check_stages;
 use crate::gauss::routes::hamiltonian::step_jacobian;
-use crate::gauss::routes::transformed::StatedTransformation;
 use crate::gauss::{GaussStepper, TransformedStepper};
 use crate::integration::{BatchKernel, StepFormula};
 use crate::{InputError, Integrator, MethodInfo, Problem, StepError, Stepper, StepperOptions};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{Lagrangian, PhasePoint, TimeTransformation};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// Contact [`Gauss`](crate::gauss::Gauss) collocation with s = 1 to 16 stages, of order 2s, for every regular
 /// Lagrangian.
@@ -17,43 +16,24 @@ pub struct GaussCollocation {
     pub stages: usize,
 }
 
-/// Contact Gauss collocation with equal steps in a transformed time, for autonomous Lagrangians: the steps are short
-/// where the motion is fast, and the last step is shortened to end at the end of the time span.
+/// Contact Gauss collocation with equal steps in the transformed time that an autonomous Lagrangian states
+/// ([`Lagrangian::dt_dtau`]): the steps are short where the motion is fast, and the last step is shortened to end at the
+/// end of the time span.
 ///
 /// ```
 /// use contact_geom::systems::{Kepler, System};
 /// use discrete_herglotz::{Problem, Steps, TransformedGauss, Until};
 /// let kepler = Kepler::<2>::default();
 /// let problem = Problem::new(&kepler, 0.0, kepler.initial())?;
-/// let by = TransformedGauss::with(6, kepler.time_transformation());
+/// let by = TransformedGauss { stages: 6 };
 /// let outcome = problem.by(by).steps(Steps::Size(0.2)).run(Until::Time(10.0))?;
 /// assert!((outcome.t - 10.0).abs() < 1e-14);
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TransformedGauss<T = OwnTransformation> {
+pub struct TransformedGauss {
     /// The number of stages, 1 to 16.
     pub stages: usize,
-    /// The time transformation: that of the Lagrangian, or another one.
-    pub transformation: T,
-}
-
-/// The time transformation that a Lagrangian states ([`Lagrangian::dt_dtau`]).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OwnTransformation;
-
-impl TransformedGauss {
-    /// The method with the time transformation that the Lagrangian states.
-    pub fn new(stages: usize) -> Self {
-        TransformedGauss { stages, transformation: OwnTransformation }
-    }
-}
-
-impl<T> TransformedGauss<T> {
-    /// The method with a given [`TimeTransformation`].
-    pub fn with(stages: usize, transformation: T) -> Self {
-        TransformedGauss { stages, transformation }
-    }
 }
 
 /// The description of either method.
@@ -74,11 +54,6 @@ pub(crate) fn info(stages: usize, in_transformed_time: bool) -> MethodInfo {
         source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
             .into(),
     }
-}
-
-fn check_transformed<L: Lagrangian<N>, const N: usize>(lagrangian: &L, stages: usize) -> Result<(), InputError> {
-    check_stages(stages)?;
-    if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussCollocation {
@@ -129,11 +104,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        check_stages(self.stages)?;
         if const { !L::HINTS.time_transformation } {
-            check_stages(self.stages)?;
             return Err(InputError::NoTimeTransformation);
         }
-        check_transformed(lagrangian, self.stages)
+        if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
     }
 
     fn stepper(
@@ -145,32 +120,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
         // The stepper is compiled only for Lagrangians with a time transformation; the check rejects all others.
         if const { L::HINTS.time_transformation } {
-            Ok(Box::new(TransformedStepper::new(problem, self.stages, h, StatedTransformation(problem.lagrangian))?))
+            Ok(Box::new(TransformedStepper::new(problem, self.stages, h)?))
         } else {
             Err(InputError::NoTimeTransformation)
         }
-    }
-}
-
-impl<'a, L, T, const N: usize> Integrator<'a, L, N> for TransformedGauss<T>
-where
-    L: Lagrangian<N>,
-    T: TimeTransformation<N> + Clone + 'a,
-{
-    fn info(&self) -> MethodInfo {
-        info(self.stages, true)
-    }
-
-    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-        check_transformed(lagrangian, self.stages)
-    }
-
-    fn stepper(
-        &self,
-        problem: &Problem<'a, L, N>,
-        h: f64,
-        _: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(TransformedStepper::new(problem, self.stages, h, self.transformation.clone())?))
     }
 }

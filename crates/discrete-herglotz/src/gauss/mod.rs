@@ -14,7 +14,6 @@ mod virtual_work;
 mod work_summary;
 
 pub(crate) use dense::StepStart;
-pub use integrator::OwnTransformation;
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 pub use routes::transformed::TransformedStepper;

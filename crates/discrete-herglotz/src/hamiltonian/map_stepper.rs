@@ -49,15 +49,15 @@ pub(super) trait ContactMaps<const N: usize> {
     fn work_summary(&self) -> Vec<PlanEntry>;
 }
 
-/// The stepper of a method whose step is a composition of contact maps: [`PieceStepper`](super::PieceStepper) or
-/// [`GeneratingStepper`](super::GeneratingStepper). The state is kept by compensated sums.
+/// The stepper of a method whose step is a composition of contact maps: [`PieceStepper`](super::PieceStepper), and that
+/// of [`ContactEuler`](super::ContactEuler). The state is kept by compensated sums.
 #[derive(Clone, Debug)]
 pub struct MapStepper<M, const N: usize> {
     pub(super) maps: M,
     h: f64,
     t0: f64,
     taken: u64,
-    sums: StateSums<N>,
+    pub(super) sums: StateSums<N>,
     evaluations: u64,
 }
 

@@ -4,7 +4,6 @@
 //! `eta = dz - p dq`, `q' = H_p`, `p' = -H_q - p H_z`, `z' = p . H_p - H`, `sigma' = -H_z sigma`. Every map of this
 //! module is conformally contact by construction, `Phi* eta = sigma eta`, whatever the rank of `H_pp`.
 
-mod bracket_series;
 mod generating;
 mod increment;
 mod map_stepper;
@@ -16,11 +15,7 @@ mod splitting;
 #[cfg(test)]
 mod tests;
 
-pub use bracket_series::{BracketSeries, BracketTerm, MAX_BRACKET_DEGREE, SplitPart};
-pub use generating::{
-    Adjoint, Arrangement, ContactEuler, Euler, ExactTypeTwo, GeneratingFunction, GeneratingMaps, GeneratingStepper,
-    TypeThree, TypeTwo, type_three_step, type_two_step,
-};
+pub use generating::ContactEuler;
 pub use increment::ContactIncrement;
 pub use map_stepper::MapStepper;
 pub use modified::{MAX_MODIFIED_ORDER, ModifiedDefect, modified_defects, modified_hamiltonian};

@@ -52,7 +52,7 @@ macro_rules! each {
                 $result
             }
             AnyIntegrator::TransformedGauss { stages } => {
-                let $integrator = TransformedGauss::new(stages);
+                let $integrator = TransformedGauss { stages };
                 $result
             }
             AnyIntegrator::Divided($integrator) => $result,

@@ -6,8 +6,8 @@ use contact_geom::systems::constrained::RigidPendulum;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError};
 use discrete_herglotz::{
-    Checkpoint, Event, Events, InputError, Integrator, Outcome, Problem, ResumeState, Rows, SplittingScheme, Status,
-    StepView, Steps, Stop, Until,
+    Checkpoint, Event, Events, InputError, Integrator, Observer, Outcome, Problem, ResumeState, Rows, SplittingScheme,
+    Status, StepView, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -70,6 +70,15 @@ fn an_accuracy_is_met() {
     }
 }
 
+/// Ends a run after this step.
+struct StopsAt(usize);
+
+impl<const N: usize> Observer<N> for StopsAt {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if at.k == self.0 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
+    }
+}
+
 /// A stopped run continues to the same bits.
 #[test]
 fn runs_are_resumed() {
@@ -83,10 +92,7 @@ fn runs_are_resumed() {
         let bound = if matches!(method, ConstrainedMethod::Rattle(_)) { 1e-14 } else { 1e-10 };
         assert!((whole.log_factor.unwrap() + 0.4).abs() < bound, "{method:?}: {whole:?}");
         let mut saved = Checkpoint::every(13, &path).unwrap();
-        let mut interrupt = |at: &StepView<'_, 2>| match at.k {
-            13 => ControlFlow::Break(Stop::here("a test")),
-            _ => ControlFlow::Continue(()),
-        };
+        let mut interrupt = StopsAt(13);
         let stopped = run().observe(&mut saved).observe(&mut interrupt).run(Until::Time(4.0)).unwrap();
         assert_eq!((stopped.steps, saved.error.is_none()), (13, true));
         let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(4.0)).unwrap();

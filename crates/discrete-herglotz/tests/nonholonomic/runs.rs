@@ -10,8 +10,8 @@ use contact_geom::{Force, Forced, Scalar, Symmetry, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, LagrangeDAlembert, Nonholonomic};
 use discrete_herglotz::rules::{Method, Midpoint};
 use discrete_herglotz::{
-    Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Problem, ResumeState, Rows, SplittingScheme,
-    Status, StepView, Steps, Stop, Until,
+    Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Observer, Problem, ResumeState, Rows,
+    SplittingScheme, Status, StepView, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -117,6 +117,15 @@ fn an_accuracy_is_met() {
     }
 }
 
+/// Ends a run after this step.
+struct StopsAt(usize);
+
+impl<const N: usize> Observer<N> for StopsAt {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if at.k == self.0 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
+    }
+}
+
 /// A stopped run continues to the same bits.
 #[test]
 fn runs_are_resumed() {
@@ -128,10 +137,7 @@ fn runs_are_resumed() {
         let whole = run().run(Until::Time(4.0)).unwrap();
         assert_eq!((whole.status, whole.unresolved), (Status::Completed, None));
         let mut saved = Checkpoint::every(133, &path).unwrap();
-        let mut interrupt = |at: &StepView<'_, 3>| match at.k {
-            133 => ControlFlow::Break(Stop::here("a test")),
-            _ => ControlFlow::Continue(()),
-        };
+        let mut interrupt = StopsAt(133);
         let stopped = run().observe(&mut saved).observe(&mut interrupt).run(Until::Time(4.0)).unwrap();
         assert_eq!((stopped.steps, saved.error.is_none()), (133, true));
         let state = ResumeState::read(&path).unwrap();

@@ -11,8 +11,8 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Problem, Run, Start, Steps, Stop, Until, gauss::VirtualWork, hamiltonian,
-    hamiltonian::ModifiedDefect, theory::legendre_inverse,
+    AnyIntegrator, InputError, Observer, Problem, Run, Start, StepView, Steps, Stop, Until, gauss::VirtualWork,
+    hamiltonian, hamiltonian::ModifiedDefect, theory::legendre_inverse,
 };
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
@@ -150,6 +150,26 @@ pub(super) fn of_steps<L: FormulaSystem<N>, const N: usize>(
     Ok(along(system, motion, samples)?.0)
 }
 
+/// Records the states at multiples of a number of steps, and ends the run if its interruption is wanted.
+struct Recorded<I, const N: usize> {
+    states: Vec<State<N>>,
+    stride: usize,
+    interrupted: I,
+}
+
+impl<I: Fn() -> bool, const N: usize> Observer<N> for Recorded<I, N> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if at.k.is_multiple_of(self.stride) && !at.last {
+            self.states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
+        }
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && (self.interrupted)() {
+            ControlFlow::Break(Stop::here("the check"))
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
 /// The same, with the states at the samples, and with the number of stages of the integrator, if it is a collocation.
 fn along<L: FormulaSystem<N>, const N: usize>(
     system: &Sized<L, N>,
@@ -164,18 +184,10 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     let stride = plan.steps.div_ceil(samples.max(1));
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
-    let mut states: Vec<State<N>> = vec![(motion.start.t, *problem.state(), 0.0)];
-    let mut record = |at: &discrete_herglotz::StepView<'_, N>| {
-        if at.k.is_multiple_of(stride) && !at.last {
-            states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
-        }
-        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && interrupted() {
-            ControlFlow::Break(Stop::here("the check"))
-        } else {
-            ControlFlow::Continue(())
-        }
-    };
+    let states = vec![(motion.start.t, *problem.state(), 0.0)];
+    let mut record = Recorded { states, stride, interrupted: &interrupted };
     run_by(&problem, by, plan.steps)?.with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
+    let states = record.states;
     let map = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {

@@ -6,20 +6,14 @@ use crate::invalid_input::numbers::{EXTREME, Report, places, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ContactHamiltonian, OfHamiltonian, PhasePoint, Scalar};
 use discrete_herglotz::hamiltonian::{
-    Arrangement, BracketSeries, Euler, GeneratingStepper, PieceStepper, PieceSum, Quadratic, SplitPart,
-    modified_defects, modified_hamiltonian, separable_pieces, type_three_step, type_two_step,
+    ContactEuler, PieceStepper, PieceSum, Quadratic, modified_defects, modified_hamiltonian, separable_pieces,
 };
-use discrete_herglotz::{GaussCollocation, Problem, SplittingScheme, Stepper};
+use discrete_herglotz::{GaussCollocation, Integrator, Problem, SplittingScheme, Stepper, StepperOptions};
 
 pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["Problem::of_hamiltonian"], run: problems },
-    InputTest { entries: &["GeneratingStepper::new", "PieceStepper::new", "Quadratic::new"], run: steppers },
-    InputTest { entries: &["hamiltonian::type_three_step", "hamiltonian::type_two_step"], run: maps },
+    InputTest { entries: &["PieceStepper::new", "Quadratic::new"], run: steppers },
     InputTest { entries: &["hamiltonian::separable_pieces"], run: separable },
-    InputTest {
-        entries: &["BracketSeries::defects", "BracketSeries::new", "BracketSeries::value", "BracketTerm::value"],
-        run: brackets,
-    },
     InputTest { entries: &["hamiltonian::modified_defects", "hamiltonian::modified_hamiltonian"], run: modified },
 ];
 
@@ -48,8 +42,12 @@ fn steppers(report: &mut Report) {
         let state = PhasePoint::from(x);
         let by_pieces = PieceStepper::new((piece(&[1.0, 0.2, 1.0, -0.1]),), &SplittingScheme::STRANG, 0.1, t, state);
         report.entry_point(&(t, x), by_pieces.map(|stepper| stepper.state().q[0]));
-        let by_functions = GeneratingStepper::new(Euler(Linear), Arrangement::TypeTwo, 0.1, t, state);
-        report.entry_point(&(t, x), by_functions.map(|stepper| stepper.state().q[0]));
+        for by in [ContactEuler::TypeTwo, ContactEuler::TypeThree] {
+            let of = OfHamiltonian(Linear);
+            let found = Problem::of_hamiltonian(&of, t, state)
+                .and_then(|problem| Ok(by.stepper(&problem, 0.1, StepperOptions::default())?.state().q[0]));
+            report.entry_point(&(t, x), found);
+        }
     }
     let state = PhasePoint::new([0.3], [0.7], 0.2);
     for value in EXTREME {
@@ -63,19 +61,10 @@ fn steppers(report: &mut Report) {
             });
             report.entry_point(&value, stepped.map(|x| (x.q[0], (x.p[0], x.z))));
         }
-        let stepper = GeneratingStepper::new(Euler(Linear), Arrangement::TypeTwo, value, 0.0, state);
+        let of = OfHamiltonian(Linear);
+        let problem = Problem::of_hamiltonian(&of, 0.0, state).unwrap();
+        let stepper = ContactEuler::TypeTwo.stepper(&problem, value, StepperOptions::default());
         report.entry_point(&value, stepper.map(|stepper| stepper.state().q[0]));
-    }
-}
-
-fn maps(report: &mut Report) {
-    for (t, x) in places() {
-        let state = PhasePoint::from(x);
-        let mut evaluations = 0;
-        let two = type_two_step(&Euler(Linear), t, 0.1, &state, &mut evaluations);
-        report.entry_point(&(t, x), two.map(|change| (change.q[0], (change.p[0], change.z))));
-        let three = type_three_step(&Euler(Linear), t, 0.1, &state, &mut evaluations);
-        report.entry_point(&(t, x), three.map(|change| (change.q[0], (change.p[0], change.z))));
     }
 }
 
@@ -100,24 +89,6 @@ fn separable(report: &mut Report) {
         let state = PhasePoint::from(x);
         let pieces = separable_pieces(&h, t, &state);
         report.formula(&(t, x), pieces.map(|of| PieceSum(of).value(t, &state.q, &state.p, state.z)));
-    }
-}
-
-fn brackets(report: &mut Report) {
-    let (a, b) = (Separable { kinetic: true }, Separable { kinetic: false });
-    for time in EXTREME {
-        let series = BracketSeries::new(&[(SplitPart::A, time), (SplitPart::B, 1.0)], 2);
-        report.entry_point(&time, series.map(|of| of.terms().iter().map(|term| term.coefficient).sum::<f64>()));
-    }
-    let strang = [(SplitPart::A, 0.5), (SplitPart::B, 1.0), (SplitPart::A, 0.5)];
-    let Ok(series) = BracketSeries::new(&strang, 3) else { return report.check(false, || "no series".into()) };
-    for x in triples() {
-        let state = PhasePoint::from(x);
-        report.formula(&x, Ok::<_, String>(series.value(&a, &b, &state, 0.1, 3)));
-        let first: f64 = series.terms().iter().take(2).map(|term| term.value(&a, &b, &state)).sum();
-        report.formula(&x, Ok::<_, String>(first));
-        let defects = series.defects(&a, &b, &[state], &[0.1], |x, _| Ok((*x, 1.0)));
-        report.entry_point(&x, defects.map(|all| all.iter().map(|d| d.defect).sum::<f64>()));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::runs::{BY, seven, tame};
 use super::{STEPS, starts};
+use crate::common::observers::Each;
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{CLAIMING, EXTREME, Report};
 use crate::lagrangians::One;
@@ -12,7 +13,6 @@ use discrete_herglotz::{
     PlanEntry, Problem, ResumeState, SplittingScheme, Status, StepView, Stepper, StepperOptions, Steps, Until,
     rules::{CompositionMethod, DiscretizationMethod, Method, Midpoint, QuadratureMethod},
 };
-use std::ops::ControlFlow;
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
@@ -186,12 +186,11 @@ fn resumed(report: &mut Report) {
         }
         // A state that is kept by hand in the middle of a run, and written to a path that does not exist.
         let mut kept = None;
-        let mut keep = |at: &StepView<'_, 1>| {
+        let mut keep = Each(|at: &StepView<'_, 1>| {
             if at.k == 3 {
                 kept = at.resume_state();
             }
-            ControlFlow::Continue(())
-        };
+        });
         seven(&problem, by).observe(&mut keep).run(until).unwrap();
         if let Some(kept) = kept {
             report.check(kept.write(path.join("below a file")).is_err(), || "a file below a file".into());

@@ -1,6 +1,7 @@
 //! Invalid input to observers: rows, events, observers with odd requests, and their views of a run.
 
 use super::runs::{BY, seven, tame};
+use crate::common::observers::Each;
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
@@ -264,13 +265,13 @@ fn moments(report: &mut Report) {
         for until in [0.5, -0.5] {
             let mut at_start = None;
             let mut seen = 0;
-            let mut look = |at: &StepView<'_, 1>| {
+            let mut look = Each(|at: &StepView<'_, 1>| {
                 report.entry_point(&at.t, at.velocity());
                 report.entry_point(&at.t, at.energy());
                 for value in EXTREME {
                     report.entry_point(&value, at.velocity_at(at.t, &PhasePoint::new([value], [value], value)));
                 }
-                let Some(step) = at.last_step() else { return ControlFlow::Break(Stop::here("no step")) };
+                let Some(step) = at.last_step() else { return };
                 let ((from, start), (to, end)) = step.ends();
                 let met = at_start.replace((to, end)).is_none_or(|before| before == (from, start));
                 let ends = step.at(from) == Ok(start) && step.at(to) == Ok(end) && (to, end) == (at.t, at.state);
@@ -279,8 +280,7 @@ fn moments(report: &mut Report) {
                     report.entry_point(&t, step.at(t));
                 }
                 seen += 1;
-                ControlFlow::Continue(())
-            };
+            });
             let outcome = seven(&problem, integrator).observe(&mut look).run(Until::Time(until)).unwrap();
             report.check(outcome.status == Status::Completed && seen == 7, || format!("{outcome:?}"));
         }

@@ -57,8 +57,6 @@ pub const TESTS: &[InputTest] = &[
     },
     InputTest {
         entries: &[
-            "TransformedGauss::new",
-            "TransformedGauss::with",
             "TransformedStepper::new",
             "TransformedStepper::time_momentum",
             "TransformedStepper::advance_to",
@@ -317,35 +315,28 @@ fn transformed(report: &mut Report) {
     let problem = Problem::new(&kepler, 0.0, PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0)).unwrap();
     for (stages, h) in [0, 1, 16, 17, usize::MAX].into_iter().flat_map(|s| EXTREME.map(|h| (s, h))) {
         let good = (1..=16).contains(&stages) && h != 0.0 && h.is_finite();
-        let clock = kepler.time_transformation();
-        let made = TransformedStepper::new(&problem, stages, h, clock).map(|stepper| stepper.time());
+        let made = TransformedStepper::new(&problem, stages, h).map(|stepper| stepper.time());
         report.check(good || made.is_err(), || format!("{stages} stages, h = {h}"));
-        let own = problem.by(TransformedGauss::new(stages)).steps(Steps::Size(h)).run(Until::Steps(1)).is_err();
-        report.check(good || own, || format!("TransformedGauss::new({stages}), h = {h}"));
-        let by = TransformedGauss::with(stages, kepler.time_transformation());
-        let given = problem.by(by).steps(Steps::Size(h)).run(Until::Steps(1)).is_err();
-        report.check(good || given, || format!("TransformedGauss::with({stages}), h = {h}"));
+        let own = problem.by(TransformedGauss { stages }).steps(Steps::Size(h)).run(Until::Steps(1)).is_err();
+        report.check(good || own, || format!("TransformedGauss {stages}, h = {h}"));
     }
     for (value, h) in EXTREME.into_iter().flat_map(|value| [(value, 0.2), (value, -0.2)]) {
         let gauss = Gauss::new(kepler, 4, h).unwrap();
         for x in [[value, 0.0, 0.0, 1.0], [1.0, value, 0.0, 1.0], [1.0, 0.0, value, 1.0], [value; 4]] {
             let start = PhasePoint::<2>::new([x[0], x[1]], [x[2], x[3]], 0.0);
-            let made =
-                gauss.transformed_stepper(kepler.time_transformation(), 0.0, start, start.p).map(|mut stepper| {
-                    let _ = stepper.advance(3);
-                    (stepper.state(), stepper.time(), stepper.time_momentum())
-                });
+            let made = gauss.transformed_stepper(0.0, start, start.p).map(|mut stepper| {
+                let _ = stepper.advance(3);
+                (stepper.state(), stepper.time(), stepper.time_momentum())
+            });
             report.entry_point(&start, made);
         }
         let start = PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0);
-        report.check(
-            value.is_finite()
-                || gauss.transformed_stepper(kepler.time_transformation(), value, start, start.p).is_err(),
-            || format!("from t = {value}"),
-        );
+        report.check(value.is_finite() || gauss.transformed_stepper(value, start, start.p).is_err(), || {
+            format!("from t = {value}")
+        });
         // A distant time is not requested, since it takes that many steps.
         if !value.is_finite() || value.abs() <= 1.0 {
-            let mut stepper = gauss.transformed_stepper(kepler.time_transformation(), 0.0, start, start.p).unwrap();
+            let mut stepper = gauss.transformed_stepper(0.0, start, start.p).unwrap();
             let done = stepper.advance_to(value);
             let at = if value * h > 0.0 { value } else { 0.0 };
             // A time that is too short for its steps is refused, and the state does not change.

@@ -6,9 +6,9 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::{ActionSquared, AnyForce};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
-    Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Statement, Structure, TimeTransformation,
-    VelocityDrag, VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
-    legendre_jacobian, regularity, statements,
+    Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Statement, Structure, VelocityDrag,
+    VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian,
+    regularity, statements,
     support::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, legendre_polynomials},
 };
 
@@ -67,10 +67,7 @@ pub const TESTS: &[InputTest] = &[
         ],
         run: closed_forms,
     },
-    InputTest {
-        entries: &["Kepler::time_transformation", "TimeTransformation::rate", "Lagrangian::dt_dtau"],
-        run: time_transformations,
-    },
+    InputTest { entries: &["Lagrangian::dt_dtau"], run: time_transformations },
 ];
 
 fn herglotz(report: &mut Report) {
@@ -240,10 +237,8 @@ fn closed_forms(report: &mut Report) {
 
 fn time_transformations(report: &mut Report) {
     let kepler = Kepler::<2>::default();
-    let transformation = kepler.time_transformation();
     for value in EXTREME {
         let q = SVector::from([value, 0.3]);
-        report.formula(&value, fine(transformation.rate(&q)));
         report.formula(&value, fine(kepler.dt_dtau(&q)));
     }
 }

@@ -8,8 +8,8 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::constrained::RigidPendulum;
 use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
-    ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
-    TimeTransformation, VelocityDrag, VelocityPoint,
+    ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityDrag,
+    VelocityPoint,
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
@@ -50,11 +50,18 @@ impl Lagrangian<1> for FalselyQuadratic {
     }
 }
 
+/// A free particle whose transformed time stands still.
 struct Stopped;
 
-impl TimeTransformation<2> for Stopped {
-    fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
-        q[0] * 0.0
+impl Lagrangian<1> for Stopped {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, ..Structure::default() }
+    }
+    fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, 1>) -> T {
+        T::zero()
     }
 }
 
@@ -140,7 +147,6 @@ fn input_errors() {
     let problem = Problem::new(&pendulum, 0.5, start).unwrap();
     let in_steps = |steps| problem.steps(steps).plan(Until::Time(5.5)).err().unwrap();
     let kepler = Kepler::<2>::default();
-    let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
     every!(InputError, "discrete-herglotz/src/error.rs" {
         InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite nonzero number", "positive if the end of the run gives"];
         InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(f64::INFINITY)).err().unwrap(), ["is inf;", "finite and nonzero", "negative for a run backward"];
@@ -181,8 +187,8 @@ fn input_errors() {
         }, ["has no momentum", "H_pp is singular", "start from a momentum"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
         InputError::TimeTransformation { .. } => {
-            let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
-            gauss.transformed_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
+            let (gauss, start) = (Gauss::new(Stopped, 3, 0.1).unwrap(), PhasePoint::new([0.0], [1.0], 0.0));
+            gauss.transformed_stepper(0.0, start, start.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
         InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "is 0", "at least 1"];

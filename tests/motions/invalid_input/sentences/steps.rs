@@ -5,6 +5,7 @@ use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::Massless;
+use crate::common::observers::StopsAt;
 use crate::lagrangians::{One, SwitchingOne, one};
 use crate::resets::Floor;
 use contact_geom::nalgebra::SVector;
@@ -15,12 +16,11 @@ use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Method, Midpoint, Rectangle};
 use discrete_herglotz::solve::Solver;
 use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, DividedGauss, Event, Events, InputError, Problem, Status, StepError, StepView,
-    Stepper, Steps, Stop, Until,
+    AnyIntegrator, DiscreteLagrangian, DividedGauss, Event, Events, InputError, Problem, Status, StepError, Stepper,
+    Steps, Until,
 };
 use exact_lagrangian::ExactLagrangian;
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
 
 /// A Lagrangian that jumps where its velocity passes 1/2, one with a reset there, and one whose switching function changes its sign at every
 /// evaluation.
@@ -199,10 +199,7 @@ fn statuses() {
     every!(Status, "discrete-herglotz/src/status.rs" {
         Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
         Status::Stopped { .. } => {
-            let mut fourth = |at: &StepView<'_, 1>| match at.k {
-                4 => ControlFlow::Break(Stop::here("a weary observer")),
-                _ => ControlFlow::Continue(()),
-            };
+            let mut fourth = StopsAt(4, "a weary observer");
             run().observe(&mut fourth).run(Until::Steps(10)).unwrap().status
         }, ["stopped by a weary observer", "at t = 0.4", "in step 4"];
         Status::FalseClaim { .. } => {

@@ -56,7 +56,7 @@ impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> Contact
 /// On the surface `K = 0`, that is `p_t = -H`, the motions are those of H: `q' = g H_p`, `t' = g`,
 /// `p' = g (-H_q - p H_z)`, `z' = g (p . H_p - H)`, since `X_(g K0) = g X_K0` for `K0 = H + p_t` (see [`TimesRate`]) and
 /// `X_K0` is `X_H` with `t' = 1`. The conformal factor is that of H. Unlike
-/// [`TimeTransformation`](crate::TimeTransformation) the rate may depend on time, momenta and action, and H on time.
+/// that of [`Lagrangian::dt_dtau`](crate::Lagrangian::dt_dtau) the rate may depend on time, momenta and action, and H on time.
 ///
 /// ```
 /// use contact_geom::{HamiltonianDerivatives, InTransformedTime, PhasePoint, systems::hamiltonian::HeatedOscillator};

@@ -6,7 +6,7 @@ use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
-use crate::gauss::stages::parametrization::{Extension, Fictitious, Values};
+use crate::gauss::stages::parametrization::{Extension, Fictitious, Parametrization, Values};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
 use crate::integration::check_unforced;
@@ -16,22 +16,11 @@ use crate::numbers::lanes::forget_branches;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::{InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Scalar, TimeTransformation};
+use contact_geom::{Lagrangian, PhasePoint};
 use pulp::{Simd, WithSimd};
 
-/// The time transformation that a Lagrangian states.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StatedTransformation<'a, L>(pub &'a L);
-
-impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for StatedTransformation<'_, L> {
-    #[inline(always)]
-    fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        self.0.dt_dtau(q)
-    }
-}
-
-/// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of a
-/// [`TimeTransformation`], `dt = g(q) dtau`.
+/// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of the
+/// time transformation of the Lagrangian, `dt = g(q) dtau` ([`Lagrangian::dt_dtau`]).
 ///
 /// It is Gauss collocation for the contact Hamiltonian `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H`, and
 /// therefore `K = 0`, at the start. With the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`,
@@ -48,8 +37,8 @@ impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for StatedTransform
 /// [`StepError::NotConverged`].
 ///
 /// A run by [`TransformedGauss`](crate::TransformedGauss) uses it.
-pub struct TransformedStepper<'a, L, C, const N: usize> {
-    general: Box<General<'a, L, Fictitious<C>, N>>,
+pub struct TransformedStepper<'a, L, const N: usize> {
+    general: Box<General<'a, L, Fictitious<'a, L>, N>>,
     arch: Instructions,
     h: f64,
     tau: f64,
@@ -59,14 +48,14 @@ pub struct TransformedStepper<'a, L, C, const N: usize> {
     unresolved: Option<UnresolvedStep>,
 }
 
-impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> TransformedStepper<'a, L, C, N> {
+impl<'a, L: Lagrangian<N>, const N: usize> TransformedStepper<'a, L, N> {
     /// A stepper at the start of a problem with `stages` from 1 to 16 and steps of length `h` in tau.
     ///
     /// # Errors
     /// [`InputError::Stages`], [`InputError::Step`]; [`InputError::Unclaimed`] if the Lagrangian does not claim that it
     /// is autonomous; [`InputError::TimeTransformation`] if the rate dt/dtau at the start is not positive and finite;
     /// [`InputError::FirstStep`] if the mass matrix or the energy at the start is not regular or not finite.
-    pub fn new(problem: &Problem<'a, L, N>, stages: usize, h: f64, transformation: C) -> Result<Self, InputError> {
+    pub fn new(problem: &Problem<'a, L, N>, stages: usize, h: f64) -> Result<Self, InputError> {
         check_step(stages, h)?;
         check_unforced(problem.lagrangian, "collocation in transformed time")?;
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
@@ -74,7 +63,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
         }
-        let rate = transformation.rate(&state.q);
+        let rate = lagrangian.dt_dtau(&state.q);
         if !(rate > 0.0 && rate.is_finite()) {
             return Err(InputError::TimeTransformation { rate });
         }
@@ -82,7 +71,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         if !energy.is_finite() {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
-        let extension = Extension::new(Fictitious(transformation), t0, -energy);
+        let extension = Extension::new(Fictitious(lagrangian), t0, -energy);
         let (table, mass) = (StageTable::new(stages, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, false, &state, &start.v));
         Ok(TransformedStepper {
@@ -124,7 +113,7 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
         let (&StageTable { s, h, .. }, transformation) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
-        curve.of_transformed(&general.solved_in_transformed_time(), [transformation.0.rate(&start.q), general.rate()]);
+        curve.of_transformed(&general.solved_in_transformed_time(), [transformation.rate(&start.q), general.rate()]);
         let at =
             |set| self.arch.dispatch(Compare { lagrangian: general.lagrangian, transformation, curve: &curve, set });
         (0..sets).map(at).reduce(DefectSample::and)
@@ -196,14 +185,14 @@ impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Transformed
 }
 
 /// A number of steps, compiled for one instruction set; ends at the first step that fails.
-struct AdvanceTransformed<'b, 'a, L, C, const N: usize> {
-    general: &'b mut General<'a, L, Fictitious<C>, N>,
+struct AdvanceTransformed<'b, 'a, L, const N: usize> {
+    general: &'b mut General<'a, L, Fictitious<'a, L>, N>,
     unresolved: &'b mut Option<UnresolvedStep>,
     taken: &'b mut usize,
     steps: usize,
 }
 
-impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for AdvanceTransformed<'_, '_, L, C, N> {
+impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceTransformed<'_, '_, L, N> {
     type Output = Result<(), StepFailure>;
 
     #[inline(always)]
@@ -225,7 +214,7 @@ impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for Ad
     }
 }
 
-impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, C, N> {
+impl<L: Lagrangian<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, N> {
     /// The steps are equal in transformed time.
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.lengthen();

@@ -4,7 +4,7 @@ use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Scalar, TimeTransformation};
+use contact_geom::{Lagrangian, Scalar};
 
 /// The independent variable in which the steps are equal.
 pub(crate) trait Parametrization<const N: usize> {
@@ -25,14 +25,14 @@ impl<const N: usize> Parametrization<N> for Physical {
     }
 }
 
-/// The transformed time tau of a time transformation.
-pub(crate) struct Fictitious<C>(pub C);
+/// The transformed time tau that a Lagrangian states.
+pub(crate) struct Fictitious<'a, L>(pub &'a L);
 
-impl<const N: usize, C: TimeTransformation<N>> Parametrization<N> for Fictitious<C> {
+impl<const N: usize, L: Lagrangian<N>> Parametrization<N> for Fictitious<'_, L> {
     const PHYSICAL: bool = false;
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        self.0.rate(q)
+        self.0.dt_dtau(q)
     }
 }
 

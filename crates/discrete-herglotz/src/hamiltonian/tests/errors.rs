@@ -2,8 +2,8 @@
 
 use super::{Plane, random_point};
 use crate::hamiltonian::{
-    ActionPart, AffineFlow, Arrangement, ContactEuler, Euler, ExactTypeTwo, GeneratingFunction, GeneratingStepper,
-    HamiltonianSplitting, Kinetic, PieceStepper, PieceSum, Potential, Prolonged, Quadratic,
+    ActionPart, AffineFlow, ContactEuler, HamiltonianSplitting, Kinetic, PieceStepper, PieceSum, Potential, Prolonged,
+    Quadratic,
 };
 use crate::splitting::Riccati;
 use crate::{InputError, Integrator, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
@@ -51,35 +51,26 @@ fn steps_and_schemes_that_are_not_possible() {
     assert!(matches!(new(SplittingScheme::BLANES_MOAN_4, 0.1), Some(InputError::Hypothesis { .. })));
     let none = PieceStepper::new(Vec::<Quadratic<1>>::new(), &SplittingScheme::STRANG, 0.1, 0.0, x).err();
     assert!(matches!(none, Some(InputError::Count { found: 0, .. })));
-    let nystrom = ContactEuler { arrangement: Arrangement::Symmetric(SplittingScheme::BLANES_MOAN_4) };
+    let nystrom = ContactEuler::Symmetric(SplittingScheme::BLANES_MOAN_4);
     assert!(matches!(nystrom.check(&OfHamiltonian(form(1.0))), Err(InputError::Hypothesis { .. })));
-}
-
-#[test]
-fn a_function_of_another_hamiltonian() {
-    let hamiltonian = OfHamiltonian(form(1.0));
-    let problem = Problem::new(&hamiltonian, 0.0, PhasePoint::new([1.0], [1.0], 0.0)).unwrap();
-    let method = GeneratingFunction { function: ExactTypeTwo(form(1.1)), order: 64, arrangement: Arrangement::TypeTwo };
-    let found = method.stepper(&problem, 0.1, StepperOptions::default()).err();
-    assert!(matches!(found, Some(InputError::Hypothesis { .. })), "{found:?}");
 }
 
 /// H = 5 z: sigma = 1 - 5 h of type II, 1/(1 + 5 h) of type III.
 #[test]
 fn a_factor_that_is_not_positive() {
-    let drag = PieceSum((Prolonged(AffineFlow::<1> { zz: -5.0, ..AffineFlow::ZERO }),));
-    let x = PhasePoint::new([1.0], [1.0], 1.0);
-    let new = |arrangement, h| GeneratingStepper::new(Euler(&drag), arrangement, h, 0.0, x);
-    match new(Arrangement::TypeTwo, 0.3).err() {
+    let drag = OfHamiltonian(PieceSum((Prolonged(AffineFlow::<1> { zz: -5.0, ..AffineFlow::ZERO }),)));
+    let problem = Problem::new(&drag, 0.0, PhasePoint::new([1.0], [1.0], 1.0)).unwrap();
+    let new = |by: ContactEuler, h| by.stepper(&problem, h, StepperOptions::default());
+    match new(ContactEuler::TypeTwo, 0.3).err() {
         Some(InputError::Sigma { sigma }) => assert!((sigma + 0.5).abs() < 1e-15),
         other => panic!("{other:?}"),
     }
-    assert!(matches!(new(Arrangement::TypeThree, -0.3).err(), Some(InputError::Sigma { .. })));
-    let mut forward = new(Arrangement::TypeThree, 0.3).unwrap();
+    assert!(matches!(new(ContactEuler::TypeThree, -0.3).err(), Some(InputError::Sigma { .. })));
+    let mut forward = new(ContactEuler::TypeThree, 0.3).unwrap();
     forward.advance(1).unwrap();
     assert!((forward.sigma() - 0.4).abs() < 1e-15);
     // 1 + 5 h = 0 is a singular equation for z1.
-    let singular = new(Arrangement::TypeThree, -0.2).err();
+    let singular = new(ContactEuler::TypeThree, -0.2).err();
     assert!(matches!(singular, Some(InputError::FirstStep(StepError::Singular { .. }))), "{singular:?}");
 }
 

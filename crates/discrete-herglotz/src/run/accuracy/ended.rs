@@ -5,13 +5,25 @@ use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{EVENT_SEARCH, EVENT_SEARCH_BUDGET, EVENT_SEARCH_ERROR, MIN_EVENT_SEARCH_STEPS};
 use crate::run::integrate::integrate;
 use crate::run::request::{Request, StepSelection};
-use crate::run::{Plan, StepView, Stop, Terminal};
+use crate::run::{Observer, Plan, StepView, Stop, Terminal};
 use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// The cause of the end of a search that exceeds its budget.
 const SPENT: &str = "the budget of the search";
+
+/// Ends a search whose evaluations exceed its budget.
+struct Budget;
+
+impl<const N: usize> Observer<N> for Budget {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        match at.stepper.evaluations() {
+            spent if spent > EVENT_SEARCH_BUDGET => ControlFlow::Break(Stop::here(SPENT)),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
 
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
@@ -30,11 +42,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             ended: None,
         };
         let plan = Plan::new(&request, &selection).ok()?;
-        let budget = |at: &StepView<'_, N>| match at.stepper.evaluations() {
-            spent if spent > EVENT_SEARCH_BUDGET => ControlFlow::Break(Stop::here(SPENT)),
-            _ => ControlFlow::Continue(()),
-        };
-        let outcome = integrate(&plan, &mut vec![terminal, Box::new(budget)], None).ok()?;
+        let outcome = integrate(&plan, &mut vec![terminal, Box::new(Budget)], None).ok()?;
         match outcome.status {
             Status::Stopped { by, .. } if by != SPENT => Some(outcome.t),
             _ => None,

@@ -127,7 +127,7 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
     }
     let Err(Ended::Switch { reason: SwitchReason::TimeTransformation, .. }) = found else { return Ok(found?) };
     // If the search in transformed time fails, equal steps are tried.
-    let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss::new(TRANSFORMED_STAGES));
+    let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss { stages: TRANSFORMED_STAGES });
     Ok(in_transformed_time(trials, &transformed, TRANSFORMED_STAGES).or_else(|ended| match ended {
         Ended::Refused(InputError::Interrupted) => Err(ended),
         _ => by_equal_steps(trials, &gauss(stages), stages),

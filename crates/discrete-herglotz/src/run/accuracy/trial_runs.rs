@@ -1,7 +1,6 @@
 //! Trial runs: a motion that is computed with a given number of steps, recorded at a few common times, and sampled for
 //! defects between its nodes.
 
-use crate::gauss::routes::transformed::StatedTransformation;
 use crate::gauss::{DefectSample, SAMPLE_SETS};
 use crate::integration::check_claims::violated_claim;
 use crate::resolution::thresholds::{MAX_DEFECT_RATIO, MIN_COMPARED_DEFECT, MIN_SAMPLE_POINTS, TRIAL_ROUNDINGS};
@@ -75,11 +74,10 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let points = if closely { MIN_SAMPLE_POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
         let settings = TrialSettings { count, grid, points, narrow, costs: EvaluationCost::of::<N>(stages) };
         if const { L::HINTS.time_transformation } && matches!(grid, ComparisonGrid::Times) {
-            let mut stepper =
-                match TransformedStepper::new(problem, stages, h, StatedTransformation(problem.lagrangian)) {
-                    Ok(stepper) => stepper,
-                    Err(error) => return TrialEnd::of_failed_start(error),
-                };
+            let mut stepper = match TransformedStepper::new(problem, stages, h) {
+                Ok(stepper) => stepper,
+                Err(error) => return TrialEnd::of_failed_start(error),
+            };
             let ending = self.run_with_samples(&mut stepper, &settings, 1, |run, sets| (run.sample_defect(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }

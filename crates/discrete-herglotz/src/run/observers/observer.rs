@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 /// An observer of a run. It is called at the start, at least at the steps that it requests, and at the last step.
 ///
-/// Closures of [`StepView`] observe every step; pairs, triples and vectors of observers are called in their order.
+/// Pairs, triples and vectors of observers are called in their order.
 pub trait Observer<const N: usize> {
     /// The quantities that it requests of the run; by default the action.
     fn needs(&self) -> OutputRequest {
@@ -51,12 +51,6 @@ pub type Terminal<'o, const N: usize> = Box<dyn Observer<N> + 'o>;
 fn all_terminal<'o, const N: usize>(of: impl IntoIterator<Item = Option<Terminal<'o, N>>>) -> Option<Terminal<'o, N>> {
     let all: Vec<_> = of.into_iter().flatten().collect();
     (!all.is_empty()).then(|| Box::new(all) as Terminal<'o, N>)
-}
-
-impl<const N: usize, F: FnMut(&StepView<'_, N>) -> ControlFlow<Stop<N>>> Observer<N> for F {
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        self(at)
-    }
 }
 
 /// Implements [`Observer`] for tuples of observers.

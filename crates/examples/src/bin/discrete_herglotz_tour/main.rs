@@ -19,7 +19,8 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, f
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Symmetry};
 use discrete_herglotz::{
-    AnyIntegrator, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, StepView, Steps, Until, rules::Method,
+    AnyIntegrator, MomentumDecay, MomentumRow, Observer, Problem, Progress, Row, Rows, Status, StepView, Steps, Stop,
+    Until, rules::Method,
 };
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
@@ -54,6 +55,16 @@ fn main() -> ExitCode {
     finish(run(&Arguments::parse()))
 }
 
+/// The smallest conformal factor of a step.
+struct SmallestFactor(f64);
+
+impl Observer<2> for SmallestFactor {
+    fn step(&mut self, at: &StepView<'_, 2>) -> ControlFlow<Stop<2>> {
+        self.0 = self.0.min(at.sigma);
+        ControlFlow::Continue(())
+    }
+}
+
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
     let (h, steps) = RUN;
@@ -63,18 +74,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     // bar.
     let mut states = Rows::every(5)?;
     let mut momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
-    let mut smallest = f64::INFINITY;
-    let mut factor = |at: &StepView<'_, 2>| {
-        smallest = smallest.min(at.sigma);
-        ControlFlow::Continue(())
-    };
+    let mut factor = SmallestFactor(f64::INFINITY);
     let bar = ProgressBar::new(steps as u64);
-    let mut progress = |at: &StepView<'_, 2>| {
-        if at.k.is_multiple_of(100) {
-            bar.set_position(at.k as u64);
-        }
-        ControlFlow::Continue(())
-    };
+    let mut progress = Progress::new(|part| bar.set_position((part * steps as f64) as u64));
     let end = problem
         .by(AnyIntegrator::Discrete(Method::Midpoint))
         .steps(Steps::Size(h))
@@ -85,6 +87,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         .run(Until::Steps(steps))?;
     bar.finish_and_clear();
 
+    let smallest = factor.0;
     let (rows, momentum, status) = (states.rows, momentum.rows, end.status);
     write(&out, &rows, &momentum)?;
     let [long, short] = modified::write(&out)?;

@@ -254,6 +254,12 @@ fn quadratic<T: Scalar, const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<T, N
 }
 
 impl<const N: usize> Lagrangian<N> for Formula<N> {
+    /// That of Kepler's problem. Runs do not choose it, since it is not declared in `HINTS`.
+    #[inline(always)]
+    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        q.dot(q).sqrt().sqrt().powi(3)
+    }
+
     /// Not inlined into the kernels, as it should be where speed matters: all its variants would be compiled into each
     /// kernel.
     #[inline(never)]

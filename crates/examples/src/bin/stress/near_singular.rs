@@ -7,7 +7,7 @@ use crate::motion::{FAMILIES, ORDER_ONE, Problem, RunEnd, Verdict, distance};
 use contact_examples::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::systems::{HarmonicOscillator, LaneEmden, Radial};
+use contact_geom::systems::{HarmonicOscillator, LaneEmden};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Stepper, gauss::TransformedStepper, rules::Method};
 use exact_lagrangian::ContactExponential;
@@ -127,8 +127,7 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
         ]);
 
         let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
-        let clock = Radial { exponent: 1.5 };
-        let mut stepper = TransformedStepper::new(&motion, 8, 0.1, clock)?;
+        let mut stepper = TransformedStepper::new(&motion, 8, 0.1)?;
         let end = if stepper.advance_to(TAU).is_ok() { RunEnd::Completed(stepper.state()) } else { RunEnd::Panicked };
         let error = end.error(&exact, 0.0);
         table.add("orbit", "transformed_gauss_8", e, end.verdict(&exact, 0.0, ORDER_ONE), error);

@@ -2,7 +2,6 @@
 
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
-use contact_geom::systems::Radial;
 use contact_geom::{VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, Rows, Status, Stepper, Steps, gauss::TransformedStepper, rules::Method,
@@ -166,8 +165,7 @@ fn standing_clock() -> String {
     let start = VelocityPoint::new([1e-200, 0.0], [0.0, 1e100], 0.0);
     let ended = || -> Result<String, InputError> {
         let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
-        let clock = Radial { exponent: 1.5 };
-        let mut run = TransformedStepper::new(&motion, 8, 0.1, clock)?;
+        let mut run = TransformedStepper::new(&motion, 8, 0.1)?;
         Ok(match run.advance_to(1.0) {
             Ok(()) => format!("completed q = {:e}", Stepper::state(&run).q[0]),
             Err(failure) => format!("halted: {}", failure.cause),

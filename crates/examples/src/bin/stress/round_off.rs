@@ -13,7 +13,6 @@ use crate::statistics::{mean, rms, slope};
 use contact_examples::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Radial;
 use contact_geom::{
     PhasePoint, Structure, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
@@ -293,8 +292,7 @@ impl Ensemble {
                 match self.way {
                     Way::TransformedGauss(stages) => {
                         let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
-                        let clock = Radial { exponent: 1.5 };
-                        let mut stepper = TransformedStepper::new(&motion, stages, self.h, clock)?;
+                        let mut stepper = TransformedStepper::new(&motion, stages, self.h)?;
                         Ok(walk(&mut stepper))
                     }
                     Way::By(_) | Way::General(_) | Way::ActionDriven(_) => {
