@@ -14,10 +14,10 @@ mod counting_allocator;
 #[path = "common/gauss.rs"]
 mod gauss_steppers;
 
+use contact_examples::systems::constrained::{KnifeEdge, RigidPendulum};
+use contact_examples::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::groups::{Inertia, LieGroup, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::constrained::{KnifeEdge, RigidPendulum};
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{
     ContactHamiltonian, Lagrangian, OfHamiltonian, Parametric, PhasePoint, Scalar, VelocityPoint, lagrangian_enum,
     legendre,

@@ -3,8 +3,8 @@
 
 #![no_main]
 
+use contact_examples::systems::Pendulum;
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::{InputError, AnyIntegrator, Outcome, Problem, Row, Rows, Steps, Until};
 use libfuzzer_sys::fuzz_target;
 

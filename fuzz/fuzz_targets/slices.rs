@@ -2,8 +2,8 @@
 
 #![no_main]
 
+use contact_examples::systems::Pendulum;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::systems::Pendulum;
 use contact_geom::{DiscretePoint, PhasePoint, Regularity, Symmetry, VelocityPoint, numbers::{max_or_nan, max_abs_or_nan}};
 use discrete_herglotz::{rules::Midpoint, solve::Solver, theory::DiscretePath};
 use exact_lagrangian::principle::{Curve, SplineCurve};

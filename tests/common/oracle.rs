@@ -1,7 +1,7 @@
 //! An independent integrator: dop853 of another library, for Herglotz' equations and their variational equation.
 
+use contact_examples::systems::System;
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::systems::System;
 use contact_geom::{
     ChartVector, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, VelocityPoint,
     hamiltonian::DarbouxField,

@@ -1,9 +1,9 @@
 //! Tangents and gradients of runs by discrete Lagrangians of a user.
 
 use crate::lagrangians::ForcedOne;
+use contact_examples::systems::{CoupledInZ, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::systems::{CoupledInZ, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{DiscretePoint, Parametric, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::rules::{Method, Midpoint};
 use discrete_herglotz::sensitivity::{EndCovector, SensitivityError, StateDerivative, Variable};

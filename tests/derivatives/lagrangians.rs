@@ -6,8 +6,8 @@ use crate::gradients::forces::Forces;
 use crate::gradients::impacts::{Ceiling, Floor, Ground};
 use crate::gradients::invalid_input::{Falling, Slope};
 use crate::gradients::switches::{Bouncing, Kinked, Pushed, Region, Step, Wall};
+use contact_examples::systems::{Kepler, OneCoordinate, Pendulum, TwoCoordinates, UniformField};
 use contact_geom::switching::{Breaks, Impacts};
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, TwoCoordinates, UniformField};
 use contact_geom::{Forced, lagrangian_enum};
 
 /// One coordinate and a force.

@@ -1,4 +1,4 @@
-//! The systems of `contact_geom::systems::hamiltonian`, and Lane-Emden's equation to the surface, against published
+//! The systems of `contact_examples::systems::hamiltonian`, and Lane-Emden's equation to the surface, against published
 //! numbers, closed forms, and the laws that they obey.
 
 mod containers;

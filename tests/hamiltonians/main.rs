@@ -1,4 +1,4 @@
-//! Contact Hamiltonians given directly: their methods, and the systems of `contact_geom::systems::hamiltonian`.
+//! Contact Hamiltonians given directly: their methods, and the systems of `contact_examples::systems::hamiltonian`.
 
 #![allow(missing_docs)]
 // In a check `f64::max` and `amax` would lose a NaN.

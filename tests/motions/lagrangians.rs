@@ -35,11 +35,11 @@ use crate::resets::breaks;
 use crate::resets::campaign::{Flight, Slope};
 use crate::resets::impacts::{self, High, Piston};
 use crate::resets::runs::Walls;
-use contact_geom::switching::{Breaks, Impacts};
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
     TwoCoordinates, UniformField,
 };
+use contact_geom::switching::{Breaks, Impacts};
 use contact_geom::{Lagrangian, lagrangian_enum};
 
 lagrangian_enum! {

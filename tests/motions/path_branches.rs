@@ -3,9 +3,9 @@
 
 use crate::common::lagrangians::Bratu;
 use crate::lagrangians::{One, Two, one, two};
+use contact_examples::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
-use contact_geom::systems::{CoupledPlane, HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, PhasePoint, Scalar};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,

@@ -32,7 +32,6 @@ pub mod groups;
 mod number;
 mod statement;
 pub mod statements;
-pub mod systems;
 
 /// Contact Hamiltonian vector fields and their algebra: brackets, Lie derivatives, infinitesimal conformality.
 pub mod hamiltonian {

@@ -10,7 +10,8 @@
 //! Lagrangian; [`statements`](theory::statements) evaluates the statements of the paper for a discrete Lagrangian.
 //!
 //! ```
-//! use contact_geom::{VelocityPoint, systems::DoublePendulum};
+//! use contact_examples::systems::DoublePendulum;
+//! use contact_geom::VelocityPoint;
 //! use discrete_herglotz::{GaussCollocation, Problem, Rows, Steps, Until};
 //!
 //! let system = DoublePendulum::default();

@@ -10,12 +10,12 @@ mod derivatives;
 #[path = "constraints/runs.rs"]
 mod runs;
 
+use contact_examples::systems::constrained::{FourBar, ParallelCranks, RigidPendulum, Squeezer};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy};
 use contact_geom::groups::{Inertia, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::support::linear::solve;
-use contact_geom::systems::constrained::{FourBar, ParallelCranks, RigidPendulum, Squeezer};
 use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, OffConstraint};
 use discrete_herglotz::groups::{GroupGauss, GroupMotion, GroupState};

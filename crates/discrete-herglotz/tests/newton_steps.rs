@@ -1,6 +1,6 @@
 //! Tests of steps that are solved by Newton's method on all stages at once.
 
-use contact_geom::systems::HarmonicOscillator;
+use contact_examples::systems::HarmonicOscillator;
 use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, numbers::max_abs_or_nan};
 use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss, solve::Solver};
 

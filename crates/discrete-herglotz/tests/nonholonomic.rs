@@ -7,9 +7,9 @@
 #[path = "nonholonomic/runs.rs"]
 mod runs;
 
+use contact_examples::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
-use contact_geom::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};
 use contact_geom::{Energy, Lagrangian, PhasePoint, SmoothFunction, VelocityPoint, constraints::Distribution};
 use discrete_herglotz::InputError;
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, Nonholonomic, OffConstraint};

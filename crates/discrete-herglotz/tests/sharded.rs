@@ -4,8 +4,8 @@
 // In a test a failing `unwrap` is a test failure.
 #![allow(clippy::unwrap_used)]
 
+use contact_examples::systems::Pendulum;
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::{
     CheckpointError, Ensemble, SplittingScheme, Steps, Until,
     ensemble::{EnsembleError, Tally},

@@ -11,7 +11,8 @@
     feature = "mpi",
     doc = r#"
 ```no_run
-use contact_geom::{VelocityPoint, systems::Pendulum};
+use contact_examples::systems::Pendulum;
+use contact_geom::VelocityPoint;
 use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
 use ensemble_mpi::{Options, run};
 

@@ -3,8 +3,8 @@
 
 use crate::principle::{Curve, MotionCurve, NonHolonomic, SplineCurve, action, action_derivative};
 use crate::*;
+use contact_examples::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
 use std::fmt::Debug;

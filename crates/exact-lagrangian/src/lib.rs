@@ -6,7 +6,8 @@
 //! `L_h^e(q0, q1, z0) = z(h) - z0` ([`ExactLagrangian`]), a discrete Lagrangian whose flow is the motion itself.
 //!
 //! ```
-//! use contact_geom::{DiscretePoint, legendre, systems::CoupledInZ};
+//! use contact_examples::systems::CoupledInZ;
+//! use contact_geom::{DiscretePoint, legendre};
 //! use discrete_herglotz::theory::legendre_minus;
 //! use exact_lagrangian::ExactLagrangian;
 //!

@@ -28,7 +28,8 @@ use evolution::Evolution;
 /// only.
 ///
 /// ```
-/// use contact_geom::{DiscretePoint, systems::UniformField};
+/// use contact_examples::systems::UniformField;
+/// use contact_geom::DiscretePoint;
 /// use discrete_herglotz::DiscreteLagrangian;
 /// use exact_lagrangian::QuadraticExact;
 ///

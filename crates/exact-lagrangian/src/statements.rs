@@ -22,8 +22,8 @@ use crate::{
     principle::{MotionCurve, NonHolonomic, VariedCurve, action, action_derivative},
     through,
 };
+use contact_examples::systems::System;
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::systems::System;
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, PhasePoint, Scalar,
     SecondDiscreteJet, Smooth, Statement, VelocityPoint, legendre,

@@ -87,7 +87,8 @@ const MIN_ERROR_OVER_ROUND_OFF: f64 = 200.0;
 /// method of documented order r, `value` and `flow` should show `r + 1` on a problem that is nonlinear in q and z.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::QuadraticInZ};
+/// use contact_examples::systems::QuadraticInZ;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::rules::Midpoint;
 /// use exact_lagrangian::error_orders;
 ///
@@ -207,8 +208,8 @@ fn least_squares_slope(points: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contact_examples::systems::CoupledInZ;
     use contact_geom::Scalar;
-    use contact_geom::systems::CoupledInZ;
     use discrete_herglotz::{StepError, rules::Midpoint};
 
     /// The midpoint rule, given by its value alone: its momenta and steps are differences that lose digits like `1/h`.

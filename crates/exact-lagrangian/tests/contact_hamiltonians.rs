@@ -5,9 +5,9 @@
 #![allow(clippy::unwrap_used)]
 #![deny(clippy::disallowed_methods)]
 
+use contact_examples::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
-use contact_geom::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::{ChartVector, ContactHamiltonian, DiscretePoint, PhasePoint, Scalar, VelocityPoint, support::seed};
 use exact_lagrangian::{
     ContactFlowError, ExactError, ExactLagrangian, ExactLeftHamiltonian, ExactRightHamiltonian, FromFunction,

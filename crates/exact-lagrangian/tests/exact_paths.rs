@@ -4,7 +4,7 @@
 // A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
-use contact_geom::systems::{CoupledInZ, CoupledPlane, QuadraticInZ};
+use contact_examples::systems::{CoupledInZ, CoupledPlane, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian,

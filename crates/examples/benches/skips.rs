@@ -3,8 +3,8 @@
 //!
 //! Prints a table, and writes `skips.csv` into the directory that the environment variable `OUT` names, if it is set.
 
+use contact_examples::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, WithoutClosedDerivatives};
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,

@@ -1,9 +1,9 @@
 //! Time of steps of the paper's midpoint rule by automatic differentiation, compared with a hand-written Newton loop
 //! with the same arithmetic and stopping criterion. A sample has a thousand steps.
 
+use contact_examples::systems::{DoublePendulum, Pendulum};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Matrix2, Vector2};
-use contact_geom::systems::{DoublePendulum, Pendulum};
 use criterion::{Criterion, criterion_group, criterion_main};
 use discrete_herglotz::{
     DiscreteLagrangian, Stepper,

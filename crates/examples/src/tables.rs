@@ -1,6 +1,6 @@
 //! Checks that the tables of the guide agree with those that the code generates.
 
-use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
+use crate::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
 use discrete_herglotz::{AnyIntegrator, Integrator, MethodInfo};
 
 /// The table of the integrators, with one line for each kind: names, orders, whether a step is explicit or implicit,

@@ -4,7 +4,8 @@
 //! Jacobian is that of the computed motion, exactly. [`LeastSquares`] fits it, or any other [`Model`], to data.
 //!
 //! ```
-//! use contact_geom::{VelocityPoint, systems::Pendulum};
+//! use contact_examples::systems::Pendulum;
+//! use contact_geom::VelocityPoint;
 //! use discrete_herglotz::sensitivity::Variable;
 //! use herglotz_fit::{LeastSquares, MotionModel, Observed};
 //! let times = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];

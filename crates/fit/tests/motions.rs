@@ -2,7 +2,7 @@
 
 use crate::noise::Noise;
 use crate::spring::Spring;
-use contact_geom::systems::{DoublePendulum, Pendulum};
+use contact_examples::systems::{DoublePendulum, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndState, Loss, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Rows, Steps, Until};

@@ -2,8 +2,8 @@
 
 use crate::noise::Noise;
 use crate::spring::Spring;
+use contact_examples::systems::DoublePendulum;
 use contact_geom::VelocityPoint;
-use contact_geom::systems::DoublePendulum;
 use discrete_herglotz::sensitivity::Variable;
 use herglotz_fit::{FitError, LeastSquares, Loss, Model, MotionModel, Observed};
 

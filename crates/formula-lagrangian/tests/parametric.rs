@@ -1,9 +1,10 @@
 //! Derivatives of formulas with respect to their parameters.
 
 use crate::random::Random;
+use contact_examples::systems::Pendulum;
 use contact_geom::nalgebra::SVector;
 use contact_geom::table::{Interpolation, Table};
-use contact_geom::{Dual, Forced, Lagrangian, Parametric, VelocityDrag, VelocityPoint, systems::Pendulum};
+use contact_geom::{Dual, Forced, Lagrangian, Parametric, VelocityDrag, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, Gradient, LossGradient};
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};

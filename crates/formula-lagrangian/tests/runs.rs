@@ -1,6 +1,6 @@
 //! Runs of formulas compared with those of the Rust types of the same Lagrangians.
 
-use contact_geom::systems::{Pendulum, QuadraticInZ};
+use contact_examples::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{Dual, Lagrangian, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 use formula_lagrangian::Formula;

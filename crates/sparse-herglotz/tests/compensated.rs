@@ -1,8 +1,8 @@
 //! Compensated sums give the same motion to round-off, with smaller round-off. The system of bodies agrees with that of
 //! the library for small systems.
 
+use contact_examples::systems::Bodies;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, VelocityPoint, check_closed_derivatives};
 use discrete_herglotz::{SplittingScheme, Stepper, splitting::Splitting};
 use sparse_herglotz::systems::{FputBond, OuterSolarSystem, fput_chain};

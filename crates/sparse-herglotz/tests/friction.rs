@@ -1,7 +1,7 @@
 //! Friction of the unknowns of a sparse system: compared with the splitting of small systems, and what refuses it.
 
+use contact_examples::systems::{Chain, Ends};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Chain, Ends};
 use contact_geom::{Forced, PhasePoint, VelocityDrag};
 use discrete_herglotz::{SplittingScheme, Stepper, splitting::DragSplitting};
 use sparse_herglotz::systems::{FputBond, fput_chain};

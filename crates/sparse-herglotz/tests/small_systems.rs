@@ -1,8 +1,8 @@
 //! Sparse systems of few unknowns compared with the library for small systems, for every splitting scheme and the
 //! midpoint rule.
 
+use contact_examples::systems::{Chain, Ends};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Chain, Ends};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
     SplittingScheme, Stepper,

@@ -1,7 +1,7 @@
 //! Tangents, gradients and differences agree, on every system of the catalogue.
 
 use crate::gradients::runs::{Case, weyl};
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use discrete_herglotz::GaussCollocation;
 
 /// Every system, from sampled states, with 1 to 16 stages, forward and backward in

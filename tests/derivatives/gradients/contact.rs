@@ -1,8 +1,8 @@
 //! Properties of tangents that need no reference.
 
 use crate::gradients::runs::weyl;
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{GaussCollocation, Problem, Start, Steps, Until};

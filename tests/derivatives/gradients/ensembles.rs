@@ -1,6 +1,6 @@
 //! Gradients of the members of an ensemble: those of single runs, bitwise, for any number of threads.
 
-use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, System};
+use contact_examples::systems::{Duffing, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::ensemble::EnsembleError;
 use discrete_herglotz::sensitivity::{BatchGradient, EndCovector, EndState, Loss, SensitivityError, Variable};

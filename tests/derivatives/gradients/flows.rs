@@ -3,11 +3,11 @@
 use crate::gradients::forces::{Forces, Stirring};
 use crate::gradients::runs::{Case, Method, weyl};
 use crate::lagrangians::{ForcedOne, Two};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledInZ, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
     SystemVisitor, TwoCoordinates, UniformField, visit_catalogue,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Force, ForceStructure, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, SensitivityError, Variable};
 use discrete_herglotz::{Integrator, Problem, SplittingScheme, Steps, Until, rules};

@@ -3,10 +3,10 @@
 use crate::gradients::flows::{EqualDrag, LinearDrag};
 use crate::gradients::runs::Case;
 use crate::lagrangians::{ForcedOne, Two};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Force, ForceStructure, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
 use discrete_herglotz::GaussCollocation;
 

@@ -2,10 +2,10 @@
 
 use crate::gradients::runs::{Case, weyl};
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
+use contact_examples::systems::UniformField;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts, Surface};
-use contact_geom::systems::UniformField;
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, SensitivityError, TangentRow, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};

@@ -1,7 +1,7 @@
 //! Input that cannot be differentiated.
 
 use crate::lagrangians::{One, SwitchingOne};
-use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum, System};
+use contact_examples::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::rules;
 use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, Variable};

@@ -1,6 +1,6 @@
 //! Losses of the end and of rows.
 
-use contact_geom::systems::{CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, System, TwoCoordinates};
+use contact_examples::systems::{CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, System, TwoCoordinates};
 use contact_geom::{Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, EndState, Gradient, Loss, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};

@@ -3,12 +3,12 @@
 use crate::gradients::impacts::Floor;
 use crate::gradients::runs::Method;
 use crate::lagrangians::{One, SwitchingOne};
-use contact_geom::numbers::max_or_nan;
-use contact_geom::switching::{Impact, Impacts};
-use contact_geom::systems::{
+use contact_examples::systems::{
     Chain, CoupledInZ, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
     SystemVisitor, TwoCoordinates, UniformField, visit_catalogue,
 };
+use contact_geom::numbers::max_or_nan;
+use contact_geom::switching::{Impact, Impacts};
 use contact_geom::{Parametric, VelocityPoint};
 use discrete_herglotz::sensitivity::{LyapunovExponents, SensitivityError};
 use discrete_herglotz::{

@@ -1,7 +1,7 @@
 //! A damped pendulum over ten periods, against derivatives that were computed with 30 digits.
 
+use contact_examples::systems::{OneCoordinate, Pendulum};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{OneCoordinate, Pendulum};
 use discrete_herglotz::sensitivity::{EndCovector, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 

@@ -3,9 +3,9 @@
 use crate::gradients::impacts::Floor;
 use crate::gradients::runs::Case;
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
+use contact_examples::systems::UniformField;
 use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts, Surface};
-use contact_geom::systems::UniformField;
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};

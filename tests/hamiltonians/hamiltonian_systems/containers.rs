@@ -1,8 +1,8 @@
 //! Two gas containers: published numbers, and both laws of thermodynamics.
 
 use super::systems::{Four, end, run, slope};
+use contact_examples::systems::hamiltonian::{Containers, Gas, ThermalCoordinates};
 use contact_geom::Lifted;
-use contact_geom::systems::hamiltonian::{Containers, Gas, ThermalCoordinates};
 use discrete_herglotz::Status;
 
 const COORDINATES: [ThermalCoordinates; 2] = [ThermalCoordinates::Entropies, ThermalCoordinates::Energies];

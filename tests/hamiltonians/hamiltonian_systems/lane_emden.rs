@@ -1,7 +1,7 @@
 //! Polytropic stars: Lane-Emden's equation from the centre to the surface.
 
 use super::systems::{OfSystem, One, Polytrope};
-use contact_geom::systems::{LaneEmden, System};
+use contact_examples::systems::{LaneEmden, System};
 use contact_geom::{OfHamiltonian, PhasePoint, legendre};
 use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Steps, Until};
 

@@ -1,8 +1,8 @@
 //! Optimizers on the quartic function.
 
 use super::systems::{Two, run};
+use contact_examples::systems::hamiltonian::{Bregman, Kinetic, Objective, Quartic, RelativisticDescent};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::hamiltonian::{Bregman, Kinetic, Objective, Quartic, RelativisticDescent};
 use discrete_herglotz::Status;
 
 /// The function of Lyapunov does not increase, so that `f <= E0/(C t^k)`, and the conformal factor is `(t0/t)^k`.

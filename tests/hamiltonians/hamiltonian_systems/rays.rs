@@ -1,9 +1,9 @@
 //! Rays against their closed forms.
 
 use super::systems::{Two, end, run};
+use contact_examples::systems::hamiltonian::{Medium, Ray};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::hamiltonian::{Medium, Ray};
 
 /// The bound on the error of a ray of a length of 2 to 6: some thousand units of round-off.
 const ROUND_OFF: f64 = 2e-13;

@@ -1,7 +1,7 @@
 //! The capture of a satellite into the synchronous resonance.
 
 use super::systems::{One, run};
-use contact_geom::systems::hamiltonian::SpinOrbit;
+use contact_examples::systems::hamiltonian::SpinOrbit;
 use discrete_herglotz::Status;
 
 /// The run of Bravetti, Seri, Vermeeren and Zadra: the spin decays from 3 to the resonance, within whose width 0.16 it

@@ -1,12 +1,12 @@
 //! The systems with the same number of coordinates as one type, for which runs are compiled once, and runs of them.
 
 use crate::common::observers::Each;
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::hamiltonian::{
+use contact_examples::systems::hamiltonian::{
     Bregman, ContactThermostat, Containers, HeatedOscillator, NoseHoover, NosePoincare, Piston, Quartic, Ray,
     RelativisticDescent, SpinOrbit, TimeOfEnergy,
 };
-use contact_geom::systems::{LaneEmden, System, VanDerPol};
+use contact_examples::systems::{LaneEmden, System, VanDerPol};
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     AtEnergy, ChartVector, ContactHamiltonian, HamiltonianStructure, InTransformedTime, Lifted, OfHamiltonian,
     PhasePoint, Scalar,

@@ -1,7 +1,7 @@
 //! Simple thermodynamic systems: motions of the evolution field.
 
 use super::systems::{One, Two, end, run, slope};
-use contact_geom::systems::hamiltonian::{Gas, HeatedOscillator, Piston};
+use contact_examples::systems::hamiltonian::{Gas, HeatedOscillator, Piston};
 use contact_geom::{AtEnergy, ContactHamiltonian, InTransformedTime, PhasePoint};
 use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Status, Steps, Until};
 

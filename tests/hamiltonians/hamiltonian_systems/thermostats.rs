@@ -1,7 +1,7 @@
 //! Thermostats: contact density dynamics, Nose and Hoover, Nose and Poincare.
 
 use super::systems::{One, Two, end, run};
-use contact_geom::systems::hamiltonian::{Bath, ContactThermostat, HeatedOscillator, Nose, NoseHoover};
+use contact_examples::systems::hamiltonian::{Bath, ContactThermostat, HeatedOscillator, Nose, NoseHoover};
 use contact_geom::{ContactHamiltonian, PhasePoint};
 use discrete_herglotz::Status;
 

@@ -1,7 +1,7 @@
 //! Van der Pol's oscillator as a contact Hamiltonian that is linear in p, and as a lifted vector field.
 
 use super::systems::{One, Two, end, run};
-use contact_geom::systems::VanDerPol;
+use contact_examples::systems::VanDerPol;
 use contact_geom::{Lifted, OfHamiltonian, PhasePoint};
 use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Status, Steps, Until};
 

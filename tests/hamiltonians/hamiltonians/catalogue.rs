@@ -2,7 +2,7 @@
 
 use super::systems::{Line, One, Two};
 use crate::common::relative_distance;
-use contact_geom::systems::{
+use contact_examples::systems::{
     ChargedParticle, CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, LaneEmden, OneCoordinate,
     Pendulum, PerturbedKepler, QuadraticInZ, Relativistic, SphericalPendulum, System, TwoCoordinates, UniformField,
 };

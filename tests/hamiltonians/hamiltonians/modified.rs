@@ -2,9 +2,9 @@
 
 use super::systems::One;
 use crate::common::slope;
+use contact_examples::systems::{HarmonicOscillator, OneCoordinate, Pendulum};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum};
 use contact_geom::{OfHamiltonian, PhasePoint, VelocityPoint};
 use discrete_herglotz::hamiltonian::{modified_defects, modified_hamiltonian};
 use discrete_herglotz::{GaussCollocation, InputError, Integrator, Problem, SplittingScheme, StepperOptions};
@@ -115,7 +115,7 @@ fn the_oscillator_has_it_in_closed_form() {
 
 #[test]
 fn what_has_no_modified_hamiltonian_is_refused() {
-    let forced: OneCoordinate = contact_geom::systems::Duffing::forced().into();
+    let forced: OneCoordinate = contact_examples::systems::Duffing::forced().into();
     let problem = Problem::new(&forced, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let of = |most| modified_defects(&problem, &SplittingScheme::STRANG, 1.0, &[0.1], most).unwrap_err();
     assert_eq!(of(3), InputError::Unclaimed { claim: "autonomous" });

@@ -3,7 +3,7 @@
 use super::systems::{Line, One, Push, Two};
 use crate::common::observers::StopsAt;
 use crate::common::relative_distance;
-use contact_geom::systems::Pendulum;
+use contact_examples::systems::Pendulum;
 use contact_geom::{Forced, OfHamiltonian, PhasePoint, VelocityPoint};
 use discrete_herglotz::{
     Checkpoint, Ensemble, Event, Events, GaussCollocation, InputError, Problem, ResumeState, Rows, Status, Stepper,

@@ -1,8 +1,8 @@
 //! The contact Hamiltonians of these tests. Those with the same number of coordinates are one type, which is compiled once.
 
+use contact_examples::systems::{OneCoordinate, Pendulum, System, TwoCoordinates};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{Coefficient, ScalarOver};
-use contact_geom::systems::{OneCoordinate, Pendulum, System, TwoCoordinates};
 use contact_geom::{
     ContactHamiltonian, Force, Forced, HamiltonianStructure, ParametricHamiltonian, PhasePoint, Scalar, VelocityPoint,
     lagrangian_enum,

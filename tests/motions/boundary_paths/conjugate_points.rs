@@ -2,9 +2,9 @@
 
 use super::{EPS, at, size};
 use crate::lagrangians::{Two, one};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator, Kepler};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, Kepler};
 use contact_geom::{Lagrangian, PhasePoint, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
 use discrete_herglotz::rules::{Method, Midpoint};

@@ -3,10 +3,10 @@
 use super::{EPS, at, by, check, largest_of};
 use crate::lagrangians::{One, SwitchingOne, Two, one};
 use crate::resets::Floor;
+use contact_examples::systems::{Duffing, FreeParticle, Pendulum, QuadraticInZ, Relativistic, UniformField};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::switching::{Impact, Impacts};
-use contact_geom::systems::{Duffing, FreeParticle, Pendulum, QuadraticInZ, Relativistic, UniformField};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
 use discrete_herglotz::rules::{Method, Midpoint};

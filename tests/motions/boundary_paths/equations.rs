@@ -2,10 +2,10 @@
 
 use super::{EPS, at, by, check, largest_of};
 use crate::lagrangians::{one, two};
+use contact_examples::systems::{CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
-use contact_geom::systems::{CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, QuadraticInZ};
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::rules::{Method, Midpoint};

@@ -3,9 +3,9 @@
 use super::{EPS, at, check, size};
 use crate::common::lagrangians::Bratu;
 use crate::lagrangians::{One, one, two};
+use contact_examples::systems::{DoublePendulum, Pendulum};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
-use contact_geom::systems::{DoublePendulum, Pendulum};
 use contact_geom::{VelocityPoint, legendre};
 use discrete_herglotz::DiscreteLagrangian;
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, PathStatus, continuation};

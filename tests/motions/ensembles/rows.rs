@@ -3,8 +3,8 @@
 use super::systems::{Bowl, pendulum};
 use super::{By, integrators, members, pendulum_start};
 use crate::lagrangians::{One, one};
+use contact_examples::systems::HarmonicOscillator;
 use contact_geom::VelocityPoint;
-use contact_geom::systems::HarmonicOscillator;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
 use discrete_herglotz::{
     Ensemble, Event, Events, InputError, Problem, Row, Rows, SplittingScheme, Status, Steps, Until,

@@ -3,8 +3,8 @@
 use super::systems::{Branching, HenonHeiles, pendulum};
 use super::{numbers, pendulum_start, unit};
 use crate::lagrangians::{One, kepler, one};
+use contact_examples::systems::{Duffing, HarmonicOscillator, Kepler};
 use contact_geom::numbers::MaxOrNan;
-use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler};
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{Ending, Member};
 use discrete_herglotz::{

@@ -1,8 +1,8 @@
 //! The Lagrangians of these tests beside the catalogue.
 
 use crate::lagrangians::{One, one};
+use contact_examples::systems::Pendulum;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, Scalar, Structure};
 
 /// A pendulum with a coefficient of the drag.

@@ -2,8 +2,8 @@
 //! each of their maps is, and so is a product of such maps. Tested by the derivative of a whole step.
 
 use crate::common::{bounded, on_some, step_from};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, Darboux, Derivatives, PhasePoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},

@@ -4,7 +4,7 @@ use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::integrators::gauss::cut;
 use crate::lagrangians::{One, one};
-use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
+use contact_examples::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{
     ChartVector, Lagrangian, PhasePoint, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},

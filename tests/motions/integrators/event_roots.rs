@@ -1,8 +1,8 @@
 //! All sign changes of an event function within one step, and a status where they cannot be told apart.
 
 use crate::lagrangians::{One, SwitchingOne, one};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator, OneCoordinate};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, OneCoordinate};
 use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, GaussCollocation, Outcome, Problem, Status, StepError, Steps, Until, rules::Method,

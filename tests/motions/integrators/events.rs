@@ -2,8 +2,8 @@
 
 use crate::common::observers::StopsAt;
 use crate::lagrangians::{One, one};
+use contact_examples::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, Steps, Until,

@@ -2,7 +2,7 @@
 
 use crate::common::observers::{Each, StopsAt};
 use crate::lagrangians::{One, one};
-use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
+use contact_examples::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan};
 use discrete_herglotz::{
     Checkpoint, CustomMethod, DiscreteLagrangian, Event, Events, Integrator, Outcome, Problem, ResumeState, Rows, Run,

@@ -8,7 +8,7 @@ use crate::common::oracle::motion;
 use crate::common::{relative_distance, slope};
 use crate::forces::Applied;
 use crate::lagrangians::{One, kepler, one, two};
-use contact_geom::systems::{CoupledPlane, Kepler, Pendulum, QuadraticInZ, System};
+use contact_examples::systems::{CoupledPlane, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Forced, Lagrangian, PhasePoint, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan};
 use discrete_herglotz::gauss::{GaussRoute, GaussStepper, VirtualWork};
 use discrete_herglotz::{GaussCollocation, Problem, Stepper, StepperOptions, Steps, Until};

@@ -5,11 +5,11 @@ use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::common::{relative_distance, slope};
 use crate::lagrangians::{One, Two, one};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
     Relativistic, System, TwoCoordinates,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},

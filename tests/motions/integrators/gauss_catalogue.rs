@@ -4,7 +4,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::{TOLERANCE, around, bounded, on_some, relative_distance, step_from};
 use crate::lagrangians::{KindVisitor, visit_kinds};
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Statement, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},

@@ -4,8 +4,8 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithStructure;
 use crate::lagrangians::{One, Two, one};
+use contact_examples::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{
     GeometryError, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre, numbers::MaxAbsOrNan,
 };

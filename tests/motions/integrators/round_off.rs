@@ -3,7 +3,7 @@
 use crate::common::gauss::GaussSteppers;
 use crate::common::lagrangians::WithGradientAndStructure;
 use crate::lagrangians::One;
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
+use contact_examples::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{Stepper, gauss::Gauss};
 

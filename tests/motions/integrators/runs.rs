@@ -3,10 +3,10 @@
 use crate::common::lagrangians::WithStructure;
 use crate::common::oracle::motion;
 use crate::lagrangians::{One, one, two};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, OneParameterGroup, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
     legendre,

@@ -2,8 +2,8 @@
 
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{one, two};
+use contact_examples::systems::{Kepler, Pendulum, PerturbedKepler, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, System};
 use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre, numbers::MaxOrNan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, TransformedGauss,

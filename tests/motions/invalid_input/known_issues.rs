@@ -2,9 +2,9 @@
 
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{One, one, two};
+use contact_examples::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityPoint,
 };

@@ -3,8 +3,8 @@
 use crate::common::lagrangians::{Bratu, Massless};
 use crate::invalid_input::sentences::input::Odd;
 use crate::lagrangians::{One, one};
+use contact_examples::systems::{FreeParticle, Pendulum};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, InputError, Outcome, Problem, Row, Rows, Status, StepError, Steps, Until,

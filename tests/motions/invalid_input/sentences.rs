@@ -38,9 +38,9 @@ pub mod steps;
 
 use crate::common::lagrangians::{Bratu, Massless};
 use crate::lagrangians::{One, one};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::support::linear;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, Symmetry, VelocityPoint, herglotz_field};
 use discrete_herglotz::rules::{LeftMidpoint, Method, Rectangle, UnknownMethod};
 use discrete_herglotz::{AnyIntegrator, UnknownIntegrator, UnresolvedStep};

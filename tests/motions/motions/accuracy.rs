@@ -166,7 +166,7 @@ fn singularities_end_the_search_soon() {
 /// chaos.
 #[test]
 fn what_decays_below_the_numbers_is_rounded() {
-    let system = one(contact_geom::systems::HarmonicOscillator { gamma: -0.1 });
+    let system = one(contact_examples::systems::HarmonicOscillator { gamma: -0.1 });
     let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
     let refused = run_to(&system, start, 1e3, 1e-9).err();
     assert!(matches!(refused, Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, .. })), "{refused:?}");

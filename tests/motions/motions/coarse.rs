@@ -4,8 +4,8 @@
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{One, Two, one};
 use crate::motions::run_of;
+use contact_examples::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, SplittingScheme, Status, Stepper, Steps, UnresolvedStep, gauss::Gauss, rules::Method,

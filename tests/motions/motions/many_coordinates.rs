@@ -1,8 +1,8 @@
 //! Systems of many coordinates, in the two mebibytes of stack of a thread of the standard library.
 
 use crate::common::gauss::GaussSteppers;
+use contact_examples::systems::{Chain, Ends, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Chain, Ends, System};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, WithoutClosedDerivatives, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, SplittingScheme, Stepper,

@@ -3,7 +3,7 @@
 use crate::common::observers::{Each, StopsAt};
 use crate::lagrangians::{one, two};
 use crate::motions::run_of;
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, UniformField};
+use contact_examples::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, UniformField};
 use contact_geom::{
     Lagrangian, PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},

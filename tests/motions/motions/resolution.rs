@@ -1,8 +1,8 @@
 //! Steps that do not resolve their motion are flagged; steps that resolve it are not.
 
 use crate::lagrangians::{One, Two, one, two};
+use contact_examples::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, SplittingScheme, Stepper,

@@ -3,8 +3,8 @@
 use crate::common::draws::Draws;
 use crate::common::lagrangians::WithStructure;
 use crate::lagrangians::{One, one};
+use contact_examples::systems::Pendulum;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
 

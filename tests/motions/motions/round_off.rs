@@ -1,8 +1,8 @@
 //! Brouwer's law: the rounding of steps accumulates as a random walk, without drift.
 
 use crate::lagrangians::{One, one};
+use contact_examples::systems::HarmonicOscillator;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
     InputError, SplittingScheme, Stepper,

@@ -4,7 +4,7 @@
 use crate::common::draws::Draws;
 use crate::lagrangians::Two;
 use crate::motions::run_of;
-use contact_geom::systems::Kepler;
+use contact_examples::systems::Kepler;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Status, Steps, Until};
 

@@ -1,8 +1,8 @@
 //! Derivatives by dual numbers against another library, and the function that checks closed derivatives.
 
 use crate::common::{on_random, within};
+use contact_examples::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, Derivatives, Dual, Hessian, Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives,
     check_closed_derivatives,

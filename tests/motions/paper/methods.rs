@@ -1,11 +1,11 @@
 //! The table of methods: names, hypotheses, and every property that it states, each compared with numbers.
 
 use crate::paper::table::{Pairs, SYMMETRIC, discretise, pairs};
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledInZ, DoublePendulum, Duffing, HarmonicOscillator, OneCoordinate, Pendulum, PerturbedKepler, QuadraticInZ,
     System, TwoCoordinates, catalogue_size,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
     numbers::MaxAbsOrNan,

@@ -4,7 +4,7 @@ use crate::common::observers::StopsAt;
 use crate::common::{around, on_random, step_from};
 use crate::lagrangians::one;
 use crate::paper::table::discretise;
-use contact_geom::systems::{Chain, OneCoordinate, Pendulum, System, SystemVisitor, visit_catalogue};
+use contact_examples::systems::{Chain, OneCoordinate, Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     ChartVector, DiscretePoint, PhasePoint, Scalar, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},
@@ -96,7 +96,7 @@ fn small_steps_keep_their_digits() {
 #[test]
 fn a_large_chain() {
     let run = || {
-        let chain = Chain::<48> { ends: contact_geom::systems::Ends::Free, ..Chain::default() };
+        let chain = Chain::<48> { ends: contact_examples::systems::Ends::Free, ..Chain::default() };
         let ld = Midpoint::new(&chain, 0.1).unwrap();
         let start = legendre(&chain, 0.0, &chain.initial());
         let mut sigma = 1.0;

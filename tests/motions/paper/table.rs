@@ -5,7 +5,7 @@
 //! the method, with the smallest random sample that fails.
 
 use crate::common::{around, bounded, on_random, on_some, step_from};
-use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use contact_geom::{Statement, VelocityPoint, legendre, statements as continuous};
 use discrete_herglotz::{
     InputError,

@@ -53,7 +53,7 @@ fn the_law_of_newton_is_not_contact() {
 /// `sqrt(lambda)`.
 #[test]
 fn the_conformal_law_has_the_restitution_of_the_root() {
-    let free = contact_geom::systems::FreeParticle { gamma: 0.0 };
+    let free = contact_examples::systems::FreeParticle { gamma: 0.0 };
     struct Wall;
     impl Surface<1> for Wall {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>) -> T {

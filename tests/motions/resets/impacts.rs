@@ -2,8 +2,8 @@
 
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
+use contact_examples::systems::{Pendulum, UniformField};
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
-use contact_geom::systems::{Pendulum, UniformField};
 use contact_geom::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, GaussCollocation, Outcome, Problem, Resets, Status, StepError, Steps, Until};
 

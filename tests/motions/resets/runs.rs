@@ -3,8 +3,8 @@
 use crate::common::observers::StopsAt;
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
+use contact_examples::systems::UniformField;
 use contact_geom::switching::{Control, Impact, Impacts};
-use contact_geom::systems::UniformField;
 use contact_geom::{Hints, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, Event, Events, Problem, Resets, ResumeState, Rows, Status, StepError, Steps, Until,

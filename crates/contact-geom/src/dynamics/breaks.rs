@@ -9,7 +9,8 @@ use nalgebra::{SMatrix, SVector};
 /// there, whatever the integrator.
 ///
 /// ```
-/// use contact_geom::{Lagrangian, switching::Breaks, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{Lagrangian, switching::Breaks};
 /// let driven = Breaks::new(Pendulum { gamma: -0.1 }, vec![3.0, 1.0])?;
 /// assert_eq!(Lagrangian::<1>::breaks(&driven), [1.0, 3.0]);
 /// # Ok::<(), contact_geom::GeometryError>(())

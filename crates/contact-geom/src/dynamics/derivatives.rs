@@ -14,7 +14,8 @@ use num_traits::One;
 /// trait is implemented for every Lagrangian, so that its methods cannot be overridden.
 ///
 /// ```
-/// use contact_geom::{Derivatives, VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{Derivatives, VelocityPoint};
 /// let x = VelocityPoint::new([1.0], [2.0], 0.0);
 /// assert_eq!(Pendulum { gamma: -0.1 }.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```

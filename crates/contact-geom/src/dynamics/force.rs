@@ -96,7 +96,8 @@ impl<const N: usize, F: Force<N>> Force<N> for &F {
 /// The drag `-linear_i v_i - quadratic |v| v_i` of a velocity, by a viscous medium and by a turbulent one.
 ///
 /// ```
-/// use contact_geom::{Forced, VelocityDrag, VelocityPoint, herglotz_field, nalgebra::SVector, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{Forced, VelocityDrag, VelocityPoint, herglotz_field, nalgebra::SVector};
 /// let drag = VelocityDrag { linear: SVector::from([0.5]), quadratic: 0.25 };
 /// let damped = Forced { lagrangian: Pendulum { gamma: 0.0 }, force: drag };
 /// let field = herglotz_field(&damped, 0.0, &VelocityPoint::new([0.0], [2.0], 0.0))?;

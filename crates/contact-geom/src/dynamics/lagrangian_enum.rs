@@ -9,7 +9,7 @@
 /// are given by a contact Hamiltonian are not accepted.
 ///
 /// ```
-/// use contact_geom::systems::{Duffing, Pendulum};
+/// use contact_examples::systems::{Duffing, Pendulum};
 /// use contact_geom::{Lagrangian, Parametric};
 ///
 /// contact_geom::lagrangian_enum! {

@@ -9,7 +9,8 @@ use nalgebra::SVector;
 /// at an equilibrium, the bound is that of the terms that cancel.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum, support::gradient_rounding};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{VelocityPoint, support::gradient_rounding};
 /// let x = VelocityPoint::new([1.0], [0.0], 0.0);
 /// let (_, rounding) = gradient_rounding(&Pendulum { gamma: -0.1 }, 0.0, &x);
 /// assert!((1e-17..1e-15).contains(&rounding.x[0])); // of a sine

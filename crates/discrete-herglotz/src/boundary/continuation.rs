@@ -17,7 +17,7 @@ use contact_geom::nalgebra::SVector;
 /// finite.
 ///
 /// ```
-/// use contact_geom::systems::Pendulum;
+/// use contact_examples::systems::Pendulum;
 /// use discrete_herglotz::{boundary::{BoundaryPath, End, continuation}, rules::Midpoint};
 ///
 /// // The same span with more and more steps.

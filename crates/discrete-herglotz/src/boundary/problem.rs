@@ -23,7 +23,7 @@ use contact_geom::nalgebra::SVector;
 /// [index](Self::index).
 ///
 /// ```
-/// use contact_geom::systems::Pendulum;
+/// use contact_examples::systems::Pendulum;
 /// use discrete_herglotz::{boundary::{BoundaryPath, End}, rules::Midpoint};
 ///
 /// // From rest position to 1 in time 2, by 200 steps.

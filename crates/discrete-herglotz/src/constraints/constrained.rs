@@ -30,7 +30,8 @@ pub enum ConstrainedMethod {
 /// the constraints; those in parameters, in the time and in the step size hold for a start that satisfies them.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
+/// use contact_examples::systems::constrained::RigidPendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
 /// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Until};
 /// let pendulum = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };

@@ -29,7 +29,8 @@ use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoi
 /// Reference: Hairer, Lubich and Wanner, Geometric Numerical Integration, section VII.1.4, for RATTLE.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
+/// use contact_examples::systems::constrained::RigidPendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{SplittingScheme, Stepper, constraints::{ConstrainedStart, DragRattle}};
 /// let pendulum = RigidPendulum::<2> { gravity: 9.81, gamma: -0.1 };
 /// let start = ConstrainedStart::new(VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0));

@@ -23,7 +23,8 @@ use contact_geom::{Lagrangian, VelocityPoint};
 /// symmetries change by the force of the constraints.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::constrained::KnifeEdge};
+/// use contact_examples::systems::constrained::KnifeEdge;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::constraints::LagrangeDAlembert;
 /// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Until};
 /// let blade = KnifeEdge { slope: 1.0, gamma: 0.0 };

@@ -32,7 +32,8 @@ use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoi
 /// section VII.1.4.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::constrained::RigidPendulum};
+/// use contact_examples::systems::constrained::RigidPendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Stepper, constraints::{ConstrainedStart, ContactLobatto}};
 /// let pendulum = RigidPendulum::<3> { gravity: 9.81, gamma: -0.1 };
 /// let start = ConstrainedStart::new(VelocityPoint::new([1.0, 0.0, 0.0], [0.0, 2.0, 0.0], 0.0));

@@ -35,7 +35,8 @@ use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoi
 /// J. Nonlinear Sci. 16 (2006) 283-328, for reversible discrete constraints.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::constrained::KnifeEdge};
+/// use contact_examples::systems::constrained::KnifeEdge;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::constraints::{ConstrainedStart, Nonholonomic};
 /// use discrete_herglotz::{SplittingScheme, Stepper, rules::Midpoint};
 /// let blade = KnifeEdge { slope: 1.0, gamma: -0.1 };

@@ -49,7 +49,8 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// [`unresolved`](crate::ensemble::Ending::unresolved) is taken; its state is that of the lane.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };

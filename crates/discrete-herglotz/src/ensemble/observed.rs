@@ -15,7 +15,8 @@ const MEMBERS_PER_OBSERVED_SHARD: usize = 16;
 /// An [`Ensemble`] with an observer for each member, created by [`Ensemble::observe`].
 ///
 /// ```
-/// use contact_geom::{PhasePoint, VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{PhasePoint, VelocityPoint};
 /// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Steps, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };

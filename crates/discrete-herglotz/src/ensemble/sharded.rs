@@ -17,7 +17,8 @@ use std::collections::VecDeque;
 /// [`Ensemble::run`], which consists of the same two parts.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };

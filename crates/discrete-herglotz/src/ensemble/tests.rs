@@ -3,8 +3,8 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
 use crate::test_lagrangians::{InPlane, OnLine};
 use crate::{Ensemble, GaussCollocation, SplittingScheme, Steps, Until};
+use contact_examples::systems::{Kepler, Pendulum};
 use contact_geom::Lagrangian;
-use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
 

@@ -21,7 +21,7 @@ pub struct GaussCollocation {
 /// end of the time span.
 ///
 /// ```
-/// use contact_geom::systems::{Kepler, System};
+/// use contact_examples::systems::{Kepler, System};
 /// use discrete_herglotz::{Problem, Steps, TransformedGauss, Until};
 /// let kepler = Kepler::<2>::default();
 /// let problem = Problem::new(&kepler, 0.0, kepler.initial())?;

@@ -46,7 +46,8 @@ pub(crate) use tables::coefficients::MAX_STAGES;
 /// the time.
 ///
 /// ```
-/// use contact_geom::{DiscretePoint, systems::DoublePendulum};
+/// use contact_examples::systems::DoublePendulum;
+/// use contact_geom::DiscretePoint;
 /// use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss};
 /// let ld = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
 /// let x = DiscretePoint::new([1.0, 0.5], [0.95, 0.5], 0.0);

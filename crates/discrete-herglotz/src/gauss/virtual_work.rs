@@ -18,7 +18,8 @@ use contact_geom::{
 /// where the force does no virtual work, and always without a force.
 ///
 /// ```
-/// use contact_geom::{Force, Forced, PhasePoint, Scalar, VelocityPoint, nalgebra::SVector, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{Force, Forced, PhasePoint, Scalar, VelocityPoint, nalgebra::SVector};
 /// use discrete_herglotz::gauss::VirtualWork;
 /// struct Friction;
 /// impl Force<1> for Friction {

@@ -38,7 +38,8 @@ impl<const N: usize> From<PhasePoint<N>> for Start<N> {
 /// An initial value problem: a Lagrangian with an initial state, checked on construction.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Problem, Rows, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };

@@ -23,7 +23,8 @@ use contact_geom::nalgebra::SVector;
 /// factors.
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::DoublePendulum};
+/// use contact_examples::systems::DoublePendulum;
+/// use contact_geom::PhasePoint;
 /// use discrete_herglotz::{SplittingScheme, Stepper, rules::{Composition, Midpoint}};
 /// let system = DoublePendulum::default();
 /// let rule = |h| Midpoint::new(&system, h);

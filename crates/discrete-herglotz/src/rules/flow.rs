@@ -34,7 +34,8 @@ pub struct FlowStep<const N: usize> {
 /// [`from_points`](Self::from_points) is a second constructor, from `(q0, q1, z0)` as in the paper.
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::PhasePoint;
 /// use discrete_herglotz::{Stepper, rules::{Flow, Midpoint}};
 /// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.1)?;
 /// let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;

@@ -157,7 +157,8 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
 /// order of its flow.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{CustomMethod, Problem, Steps, Until, rules::Midpoint};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));

@@ -16,7 +16,8 @@ use thiserror::Error;
 /// A method that constructs a discrete Lagrangian from a Lagrangian and a time step.
 ///
 /// ```
-/// use contact_geom::{Lagrangian, PhasePoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::{Lagrangian, PhasePoint};
 /// use discrete_herglotz::{DiscreteLagrangian, rules::Method};
 ///
 /// let (system, start) = (Pendulum::default(), PhasePoint::new([1.0], [0.5], 0.0));

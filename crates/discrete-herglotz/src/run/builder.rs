@@ -19,7 +19,8 @@ use std::sync::Arc;
 /// error.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{GaussCollocation, Problem, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };

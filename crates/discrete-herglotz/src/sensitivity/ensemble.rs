@@ -54,7 +54,8 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// Recorded rows and a checkpoint are ignored.
     ///
     /// ```
-    /// use contact_geom::{Scalar, VelocityPoint, systems::Pendulum};
+    /// use contact_examples::systems::Pendulum;
+    /// use contact_geom::{Scalar, VelocityPoint};
     /// use discrete_herglotz::sensitivity::{EndState, Loss};
     /// use discrete_herglotz::{Ensemble, GaussCollocation, Steps, Until};
     /// struct Miss;

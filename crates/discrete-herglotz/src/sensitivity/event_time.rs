@@ -16,7 +16,8 @@ impl<const N: usize> EndState<N> {
     /// [`pullback_at`](crate::sensitivity::RecordedRun::pullback_at) the result is its gradient.
     ///
     /// ```
-    /// use contact_geom::{Scalar, VelocityPoint, systems::Pendulum};
+    /// use contact_examples::systems::Pendulum;
+    /// use contact_geom::{Scalar, VelocityPoint};
     /// use discrete_herglotz::{Problem, Steps, Until, sensitivity::{EndState, Loss, Variable}};
     /// struct Height;
     /// impl Loss<1> for Height {

@@ -81,7 +81,8 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     /// are not differentiated themselves.
     ///
     /// ```
-    /// use contact_geom::{Scalar, VelocityPoint, systems::Pendulum};
+    /// use contact_examples::systems::Pendulum;
+    /// use contact_geom::{Scalar, VelocityPoint};
     /// use discrete_herglotz::{Problem, Steps, Until, sensitivity::{EndState, Loss}};
     /// struct Miss;
     /// impl Loss<1> for Miss {

@@ -146,7 +146,8 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     /// the discrete run, made orthonormal after each step.
     ///
     /// ```
-    /// use contact_geom::{VelocityPoint, systems::Duffing};
+    /// use contact_examples::systems::Duffing;
+    /// use contact_geom::VelocityPoint;
     /// use discrete_herglotz::{Problem, Steps, Until};
     /// let duffing = Duffing::forced();
     /// let problem = Problem::new(&duffing, 0.0, VelocityPoint::new([0.1], [0.0], 0.0))?;

@@ -181,7 +181,8 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     /// differentiated themselves.
     ///
     /// ```
-    /// use contact_geom::{VelocityPoint, systems::Pendulum};
+    /// use contact_examples::systems::Pendulum;
+    /// use contact_geom::VelocityPoint;
     /// use discrete_herglotz::{Problem, Steps, Until, sensitivity::Variable};
     /// let pendulum = Pendulum { gamma: -0.01 };
     /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;

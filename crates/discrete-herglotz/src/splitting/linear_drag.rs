@@ -28,7 +28,8 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// a copy. The results therefore do not depend on what is observed nor on how many steps are taken at once.
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::PhasePoint;
 /// use discrete_herglotz::{SplittingScheme, Stepper, splitting::Splitting};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);

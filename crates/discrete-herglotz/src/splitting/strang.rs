@@ -19,7 +19,8 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// [`Splitting`](crate::splitting::Splitting).
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::PhasePoint;
 /// use discrete_herglotz::{Stepper, rules::Flow, splitting::Strang};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);

@@ -14,7 +14,8 @@ use contact_geom::Lagrangian;
 /// encounter, requires much shorter steps than the rest.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Kepler};
+/// use contact_examples::systems::Kepler;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{DividedGauss, Problem, Steps, Until};
 /// let (kepler, e) = (Kepler::<2> { gamma: 0.0, mu: 1.0 }, 0.9999);
 /// let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);

@@ -37,7 +37,7 @@ pub(crate) use tides::Tides;
 pub(crate) use unstated::Unstated;
 pub(crate) use whisper::Whisper;
 
-use contact_geom::systems::{Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
+use contact_examples::systems::{Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
 
 contact_geom::lagrangian_enum! {
     /// Lagrangians with one coordinate.

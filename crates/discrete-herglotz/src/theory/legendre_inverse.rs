@@ -24,7 +24,8 @@ const MAX_STALLED_CORRECTIONS: u32 = 8;
 /// or at an iterate, [`StepError::NotConverged`].
 ///
 /// ```
-/// use contact_geom::{PhasePoint, systems::Relativistic};
+/// use contact_examples::systems::Relativistic;
+/// use contact_geom::PhasePoint;
 /// let (system, state) = (Relativistic::default(), PhasePoint::new([0.2], [1.5], 0.1));
 /// let x = discrete_herglotz::theory::legendre_inverse(&system, 0.0, &state, &[0.0].into())?;
 /// assert!((contact_geom::legendre(&system, 0.0, &x).p[0] - 1.5).abs() < 1e-14);
@@ -102,7 +103,8 @@ fn velocity_of_hamiltonian<L: Lagrangian<N>, const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::{legendre, systems::Relativistic};
+    use contact_examples::systems::Relativistic;
+    use contact_geom::legendre;
 
     /// Starting from rest, where the first correction may exceed the speed of light. The tolerance allows for the
     /// round-off of the velocity, which W carries into the momentum, and for that of the gradient, a difference of

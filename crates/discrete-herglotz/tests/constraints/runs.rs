@@ -1,8 +1,8 @@
 //! Runs under constraints: an accuracy, rows, events, checkpoints, and what is refused.
 
+use contact_examples::systems::Pendulum;
+use contact_examples::systems::constrained::RigidPendulum;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
-use contact_geom::systems::constrained::RigidPendulum;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError};
 use discrete_herglotz::{

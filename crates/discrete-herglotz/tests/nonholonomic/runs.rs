@@ -2,10 +2,10 @@
 //! what is refused.
 
 use super::sleigh;
+use contact_examples::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};
 use contact_geom::constraints::Distribution;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
-use contact_geom::systems::constrained::{ChaplyginSleigh, KnifeEdge, RollingDisc};
 use contact_geom::{Force, Forced, Scalar, Symmetry, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, LagrangeDAlembert, Nonholonomic};
 use discrete_herglotz::rules::{Method, Midpoint};

@@ -11,7 +11,8 @@
 //! is refused, a checkpoint cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
 
 use clap::Parser;
-use contact_geom::{VelocityPoint, systems::Pendulum};
+use contact_examples::systems::Pendulum;
+use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, Ensemble, Status, Steps, Until, ensemble::Member};
 use ensemble_mpi::{Merged, MpiError, Options, run};
 use mpi::topology::Communicator;

@@ -152,7 +152,7 @@ fn lowest<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::systems::HarmonicOscillator;
+    use contact_examples::systems::HarmonicOscillator;
 
     /// A derivative that has merely decayed is not reported as a conjugate point. The conjugate points of a decaying
     /// oscillation are found as long as its amplitude is a normal number.

@@ -11,7 +11,8 @@ use discrete_herglotz::{
 /// [`herglotz_flow`](crate::herglotz_flow); they end at the jumps of L that its switching functions indicate.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Problem, Rows, Steps, Until};
 /// use exact_lagrangian::ExactFlow;
 /// let pendulum = Pendulum { gamma: -0.1 };

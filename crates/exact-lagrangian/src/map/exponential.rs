@@ -11,7 +11,8 @@ use discrete_herglotz::InputError;
 /// [`retract`](Self::retract).
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use exact_lagrangian::ContactExponential;
 ///
 /// let exp = ContactExponential::new(Pendulum::default(), 0.5)?;

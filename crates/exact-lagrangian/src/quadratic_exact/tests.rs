@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::herglotz_flow;
-use contact_geom::systems::{Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField};
+use contact_examples::systems::{
+    Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField,
+};
 use contact_geom::{
     Derivatives, GeometryError, Structure,
     numbers::{MaxAbsOrNan, MaxOrNan},

@@ -2,7 +2,8 @@
 
 use super::Sample;
 use crate::ExactError;
-use contact_geom::{ChartVector, Dual, legendre, legendrian_defect, support::seed, systems::System};
+use contact_examples::systems::System;
+use contact_geom::{ChartVector, Dual, legendre, legendrian_defect, support::seed};
 
 /// Statement 48: the graph of `phi_h` on T\*Q x R at `r = ln sigma_h` is Legendrian, with the coordinates of TQ x R as
 /// parameters of the graph. The derivatives are those of the flow on dual numbers.

@@ -10,8 +10,8 @@
 //! defect of the pullback. It writes no files.
 
 use clap::Parser;
+use contact_examples::systems::{CoupledInZ, Pendulum, System};
 use contact_examples::{Failure, finish, print};
-use contact_geom::systems::{CoupledInZ, Pendulum, System};
 use contact_geom::{
     ChartVector, ContactForm, Darboux, DiscretePoint, EtaMinus, EtaPlus, GeometryError, LagrangianForm, PhasePoint,
     Scalar, Smooth, SmoothFunction, conformality, hamiltonian::DarbouxField, legendre,

@@ -17,7 +17,8 @@ use discrete_herglotz::{GaussCollocation, Problem, Until};
 /// Lagrangian and the start have ([`start`](Self::start)).
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::sensitivity::{TangentRow, Variable};
 /// use herglotz_fit::{LeastSquares, MotionModel, Observed};
 /// let times = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];

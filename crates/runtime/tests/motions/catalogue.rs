@@ -1,7 +1,8 @@
 //! The systems of the catalogue, compared with the types of the libraries.
 
 use super::{accurate, start_of};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field, systems as typed};
+use contact_examples::systems as typed;
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
 use discrete_herglotz::Status;
 use herglotz_runtime::{CATALOGUE, CatalogueEntry, FormulaSymmetry, Motion, System};
 

@@ -30,7 +30,7 @@ impl Potential<1> for FputBond {
 /// A chain of `sites` unit masses between two walls, with a bond between neighbours and to the walls, and drag:
 /// `L = sum v_i^2/2 - sum V(q_(i+1) - q_i) + gamma z`, `q_0 = q_(n+1) = 0`. Dimensionless.
 ///
-/// This is [`Chain`](contact_geom::systems::Chain) with fixed ends, for any number of sites.
+/// This is `contact_examples::systems::Chain` with fixed ends, for any number of sites.
 ///
 /// # Errors
 /// [`SparseError::Unknowns`] if `sites` is 0.

@@ -43,7 +43,7 @@ fn square<T: Scalar, const D: usize>(r: &SVector<T, D>) -> T {
 ///
 /// Each pair is an element, so that the cost grows with the square of the number of bodies. Over many revolutions use
 /// [`SparseSplitting::compensated`](crate::SparseSplitting::compensated). For few bodies
-/// [`contact_geom::systems::Bodies`] with Gauss collocation is more efficient.
+/// `contact_examples::systems::Bodies` with Gauss collocation is more efficient.
 ///
 /// # Errors
 /// [`SparseError::Unknowns`] if there are no bodies; [`SparseError::Parameter`] if a mass or `g` is not finite.

@@ -4,8 +4,8 @@ use crate::common::forces::{AnyForce, Drag, Fall, G, Swirl};
 use crate::common::{relative_distance, slope};
 use crate::forces::Applied;
 use crate::lagrangians::{One, Two, kepler, one};
+use contact_examples::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until};
 

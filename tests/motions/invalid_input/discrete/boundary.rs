@@ -3,8 +3,8 @@
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report};
 use crate::lagrangians::{One, one};
+use contact_examples::systems::Pendulum;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::{
     InputError,
     boundary::{BoundaryPath, CriticalPath, End, branch, continuation},

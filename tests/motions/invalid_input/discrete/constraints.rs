@@ -3,7 +3,7 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
-use contact_geom::systems::constrained::{KnifeEdge, RigidPendulum};
+use contact_examples::systems::constrained::{KnifeEdge, RigidPendulum};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::constraints::{
     Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, LagrangeDAlembert,

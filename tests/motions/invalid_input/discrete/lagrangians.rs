@@ -5,9 +5,9 @@ use crate::forces::forced_one;
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{CLAIMING, EVERYTHING, EXTREME, Grade, Report, fine, grade, places, triples};
 use crate::lagrangians::one;
+use contact_examples::systems::{Pendulum, QuadraticInZ};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::statements::AnyForce;
-use contact_geom::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, DiscreteStep, MomentumDecay, MomentumRow, Problem, Steps, Until,

@@ -7,9 +7,9 @@ use crate::forces::forced_one;
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{CLAIMING, EVERYTHING, EXTREME, Grade, Numbers, Report, fine, grade, triples};
 use crate::lagrangians::one;
+use contact_examples::systems::{Kepler, QuadraticInZ};
 use contact_geom::nalgebra::SVector;
 use contact_geom::statements::AnyForce;
-use contact_geom::systems::{Kepler, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Symmetry};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, Problem, SplittingScheme, Start, Stepper, StepperOptions, Steps, TransformedGauss,

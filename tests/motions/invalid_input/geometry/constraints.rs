@@ -2,13 +2,13 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report, fine};
+use contact_examples::systems::constrained::{ChaplyginSleigh, FourBar, ParallelCranks, RigidPendulum};
 use contact_geom::VelocityPoint;
 use contact_geom::constraints::{
     ConstraintDerivatives, DistributionDerivatives, Redundancy, constrained_motion, nonholonomic_motion,
 };
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{independent_rows, least_norm, restricted};
-use contact_geom::systems::constrained::{ChaplyginSleigh, FourBar, ParallelCranks, RigidPendulum};
 
 pub const TESTS: &[InputTest] = &[
     InputTest {

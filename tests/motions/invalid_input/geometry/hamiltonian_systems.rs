@@ -2,11 +2,11 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::Report;
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::hamiltonian::{
+use contact_examples::systems::hamiltonian::{
     Bath, Bregman, ContactThermostat, Containers, Gas, HeatedOscillator, Kinetic, Medium, Nose, NoseHoover, Objective,
     Piston, Quartic, Ray, RelativisticDescent, SpinOrbit, ThermalCoordinates,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{AtEnergy, ContactHamiltonian, InTransformedTime, PhasePoint, VectorField};
 
 pub const TESTS: &[InputTest] = &[

@@ -2,9 +2,11 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, places, triples};
+use contact_examples::systems::{
+    CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField,
+};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::{ActionSquared, AnyForce};
-use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
     Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Statement, Structure, VelocityDrag,
     VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian,

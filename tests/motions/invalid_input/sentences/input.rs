@@ -4,9 +4,9 @@ use super::{name_of_variant, variants};
 use super::{pendulum_at, strong};
 use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{One, one};
+use contact_examples::systems::constrained::RigidPendulum;
+use contact_examples::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::systems::constrained::RigidPendulum;
-use contact_geom::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityDrag,
     VelocityPoint,

@@ -2,8 +2,8 @@
 
 use crate::common::oracle::motion_with_derivative;
 use crate::common::{on_random, within};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator, System, SystemVisitor, visit_catalogue};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, System, SystemVisitor, visit_catalogue};
 use contact_geom::{ChartVector, LagrangianForm, support::conformality_with_jacobian};
 
 /// The error of the oracle: its relative tolerance of 3e-14 a step, over some tens of steps, times the growth of the

@@ -3,8 +3,8 @@
 
 use crate::common::oracle::motion_with_derivative;
 use crate::common::{on_random, within};
+use contact_examples::systems::{Kepler, Lienard, System, SystemVisitor, VanDerPol, visit_catalogue};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Lienard, System, SystemVisitor, VanDerPol, visit_catalogue};
 use contact_geom::{
     AsFunction, ChartVector, Darboux, Energy, LagrangianForm, NoetherMomentum, OneParameterGroup, Smooth,
     SmoothFunction, Symmetry,

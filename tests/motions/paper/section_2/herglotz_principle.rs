@@ -2,8 +2,8 @@
 //! `dZ/dz0`, and curves by splines.
 
 use crate::common::lagrangians::LogarithmicWall;
+use contact_examples::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate, Pendulum, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate, Pendulum, System};
 use exact_lagrangian::{
     ExactError,
     principle::{Curve, MotionCurve, SplineCurve, VariedCurve, action, action_derivative},

@@ -2,7 +2,7 @@
 //! that evaluate the statements for the methods.
 
 use crate::common::{TOLERANCE, around, on_some, step_from};
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use discrete_herglotz::theory::statements;
 use exact_lagrangian::ExactLagrangian;
 

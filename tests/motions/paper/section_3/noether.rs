@@ -1,7 +1,7 @@
 //! Statements 25 and 26 (section 3.2): the momentum along a run, and a group that is no symmetry.
 
 use crate::lagrangians::{kepler, two};
-use contact_geom::systems::{Kepler, SphericalPendulum, System};
+use contact_examples::systems::{Kepler, SphericalPendulum, System};
 use contact_geom::{DiscretePoint, Lagrangian, numbers::max_or_nan};
 use discrete_herglotz::{
     MomentumDecay, Problem, SplittingScheme, Status, Steps, Until,

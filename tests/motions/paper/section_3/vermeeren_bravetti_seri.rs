@@ -3,8 +3,8 @@
 //! momenta.
 
 use crate::common::{around, on_random, step_from, within};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{
     DiscretePoint, Statement,
     numbers::{MaxAbsOrNan, MaxOrNan},

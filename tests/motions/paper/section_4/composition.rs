@@ -2,9 +2,9 @@
 //! there.
 
 use crate::paper::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
+use contact_examples::systems::{CoupledInZ, OneCoordinate, System, visit_catalogue};
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{CoupledInZ, OneCoordinate, System, visit_catalogue};
 use exact_lagrangian::{ExactError, ExactLagrangian, compose, statements, through};
 
 /// Along random motions of every system, with unequal steps.

@@ -1,8 +1,10 @@
 //! Statement 34 (section 4.2): the derivatives `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1` and `sigma_d
 //! = e^b` against differences, under strong damping, for short steps, and where the momentum depends on time.
 
+use contact_examples::systems::{
+    DoublePendulum, HarmonicOscillator, OneCoordinate, QuadraticInZ, System, TwoCoordinates,
+};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, OneCoordinate, QuadraticInZ, System, TwoCoordinates};
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, Parametric, Scalar, VelocityPoint, legendre, numbers::MaxAbsOrNan,
 };

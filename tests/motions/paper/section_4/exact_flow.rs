@@ -3,7 +3,7 @@
 
 use crate::common::oracle::hamiltonian_motion;
 use crate::paper::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
-use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use contact_geom::{ChartVector, VelocityPoint, numbers::MaxAbsOrNan};
 use discrete_herglotz::{
     Stepper,

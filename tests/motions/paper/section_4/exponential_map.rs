@@ -1,8 +1,8 @@
 //! Statement 29 (section 4.1, theorem): where `exp_h` fails to be a local diffeomorphism, at conjugate points, and its
 //! branches beyond them.
 
+use contact_examples::systems::{ChargedParticle, HarmonicOscillator, OneCoordinate, Pendulum, TwoCoordinates};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{ChargedParticle, HarmonicOscillator, OneCoordinate, Pendulum, TwoCoordinates};
 use contact_geom::{Lagrangian, Scalar, VelocityPoint, numbers::MaxAbsOrNan};
 use exact_lagrangian::{ContactExponential, ExactError};
 

@@ -3,10 +3,10 @@
 
 use crate::common::lagrangians::LogarithmicWall;
 use crate::common::oracle::motion;
-use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{
+use contact_examples::systems::{
     Chain, FreeParticle, HarmonicOscillator, LaneEmden, OneCoordinate, Pendulum, System, SystemVisitor, visit_catalogue,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, Dual, GeometryError, Lagrangian, Scalar, VelocityPoint,
     numbers::{MaxAbsOrNan, MaxOrNan},

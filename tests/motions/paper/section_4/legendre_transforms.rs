@@ -1,8 +1,8 @@
 //! Statement 35 (section 4.2, theorem): `F(+-)L_h^e = FL o R_h^(e+-)` fails for the formula that the paper prints.
 
 use crate::paper::section_5::free_particle::Printed;
+use contact_examples::systems::{FreeParticle, OneCoordinate};
 use contact_geom::DiscretePoint;
-use contact_geom::systems::{FreeParticle, OneCoordinate};
 use discrete_herglotz::{
     StepError,
     theory::{legendre_minus, legendre_plus},

@@ -1,8 +1,8 @@
 //! Statements 28 and 31 (section 4.1): the non-holonomic flow off the constraint, and the projection of its exponential
 //! map at a conjugate point.
 
+use contact_examples::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{CoupledInZ, HarmonicOscillator, OneCoordinate};
 use exact_lagrangian::principle::{ExtendedPoint, NonHolonomic};
 
 /// Off `M_L` the flow of Chetaev's equations keeps the constraint function `Phi` constant, and the defect measures it.

@@ -2,8 +2,8 @@
 //! of its routes.
 
 use crate::paper::table::{AlongMotion, EXACT_TOLERANCE, OverMotions};
+use contact_examples::systems::{HarmonicOscillator, OneCoordinate, Pendulum, System, visit_catalogue};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, System, visit_catalogue};
 use contact_geom::{
     DiscretePoint, Lagrangian, Scalar, Statement, VelocityPoint,
     numbers::{MaxAbsOrNan, MaxOrNan},

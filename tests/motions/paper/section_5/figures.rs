@@ -1,6 +1,6 @@
 //! The exact series of the paper's figures against numbers that were computed with 60 digits.
 
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use contact_geom::{Energy, SmoothFunction, VelocityPoint};
 
 /// The paper's drag and step; the start is `q(0) = 0, q(h) = 1, z(0) = 0`.

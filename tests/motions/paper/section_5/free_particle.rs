@@ -2,7 +2,7 @@
 //! Lagrangian.
 
 use crate::common::{on_random, within};
-use contact_geom::systems::FreeParticle;
+use contact_examples::systems::FreeParticle;
 use contact_geom::{DiscretePoint, Scalar, VelocityPoint, numbers::MaxOrNan};
 use discrete_herglotz::{
     DiscreteLagrangian, StepError,

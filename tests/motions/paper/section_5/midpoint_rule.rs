@@ -2,7 +2,7 @@
 //! does not vanish.
 
 use crate::common::{on_random, step_from, within};
-use contact_geom::systems::{Duffing, OneCoordinate, Pendulum, System};
+use contact_examples::systems::{Duffing, OneCoordinate, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, numbers::MaxOrNan};
 use discrete_herglotz::{
     InputError,

@@ -2,7 +2,7 @@
 //! form.
 
 use crate::common::{on_random, within};
-use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
+use contact_examples::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{DiscretePoint, VelocityPoint, numbers::MaxOrNan};
 use discrete_herglotz::{DiscreteLagrangian, rules::LeftMidpoint, theory::discrete_flow};
 use exact_lagrangian::QuadraticExact;

@@ -2,7 +2,7 @@
 //! flow.
 
 use crate::paper::table::discretise;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
 use discrete_herglotz::rules::Method;
 use exact_lagrangian::{ExactLagrangian, Order, error_orders};
 

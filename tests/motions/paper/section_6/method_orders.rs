@@ -6,7 +6,7 @@
 use crate::common::oracle::motion;
 use crate::common::slope;
 use crate::paper::table::discretise;
-use contact_geom::systems::{
+use contact_examples::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, OneCoordinate, QuadraticInZ, Relativistic, System, TwoCoordinates,
 };
 use contact_geom::{PhasePoint, legendre, numbers::MaxAbsOrNan};

@@ -21,8 +21,8 @@ pub struct ConstrainedMotion<const N: usize, const M: usize> {
 /// `W a - G^T lambda = L_q + L_z L_v - (L_vq v + L_vz L + L_vt)`, `G a = -c_qq(v, v)`.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion},
-/// systems::constrained::RigidPendulum}; let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
+/// use contact_examples::systems::constrained::RigidPendulum;
+/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion}}; let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
 /// let x = VelocityPoint::new([0.0, -1.0], [2.0, 0.0], 0.0);
 /// let motion = constrained_motion(&system, &system, 0.0, &x, Redundancy::Refuse)?;
 /// // The tension g + v^2 pulls upward; G = 2 q.
@@ -50,7 +50,8 @@ pub fn constrained_motion<const N: usize, const M: usize>(
 /// `W a - omega^T mu = L_q + L_z L_v - (L_vq v + L_vz L + L_vt)`, `omega a = -omega'(q)[v] v`.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, constraints::nonholonomic_motion, systems::constrained::KnifeEdge};
+/// use contact_examples::systems::constrained::KnifeEdge;
+/// use contact_geom::{VelocityPoint, constraints::nonholonomic_motion};
 /// let blade = KnifeEdge { slope: 1.3, gamma: 0.0 };
 /// let x = VelocityPoint::new([0.0; 3], [0.5, 0.0, 2.0], 0.0);
 /// let motion = nonholonomic_motion(&blade, &blade, 0.0, &x)?;

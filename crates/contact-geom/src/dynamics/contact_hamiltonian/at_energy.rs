@@ -18,7 +18,8 @@ use nalgebra::SVector;
 /// and does not grow.
 ///
 /// ```
-/// use contact_geom::{AtEnergy, HamiltonianDerivatives, PhasePoint, systems::hamiltonian::HeatedOscillator};
+/// use contact_examples::systems::hamiltonian::HeatedOscillator;
+/// use contact_geom::{AtEnergy, HamiltonianDerivatives, PhasePoint};
 /// let oscillator = HeatedOscillator::default(); // p^2/2 + q^2/2 + z/10
 /// let start = PhasePoint::new([1.0], [2.0], 3.0);
 /// let field = AtEnergy::of(oscillator, &start).contact_field(0.0, &start);

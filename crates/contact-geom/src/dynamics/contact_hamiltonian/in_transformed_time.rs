@@ -14,7 +14,8 @@ use nalgebra::SVector;
 /// With `K = H - E0`, [`AtEnergy`](crate::AtEnergy), it is Poincare's transformation: that of the evolution field of H.
 ///
 /// ```
-/// use contact_geom::{AtEnergy, HamiltonianDerivatives, PhasePoint, TimesRate, systems::hamiltonian::HeatedOscillator};
+/// use contact_examples::systems::hamiltonian::HeatedOscillator;
+/// use contact_geom::{AtEnergy, HamiltonianDerivatives, PhasePoint, TimesRate};
 /// let start = PhasePoint::new([1.0], [2.0], 3.0);
 /// let hamiltonian = AtEnergy::of(HeatedOscillator::default(), &start);
 /// // A rate that depends on (q, p, z): the energy itself, 2.8.
@@ -59,7 +60,8 @@ impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> Contact
 /// that of [`Lagrangian::dt_dtau`](crate::Lagrangian::dt_dtau) the rate may depend on time, momenta and action, and H on time.
 ///
 /// ```
-/// use contact_geom::{HamiltonianDerivatives, InTransformedTime, PhasePoint, systems::hamiltonian::HeatedOscillator};
+/// use contact_examples::systems::hamiltonian::HeatedOscillator;
+/// use contact_geom::{HamiltonianDerivatives, InTransformedTime, PhasePoint};
 /// let h = HeatedOscillator::default(); // p^2/2 + q^2/2 + z/10
 /// let moving = InTransformedTime::<_, _, 1> { hamiltonian: h, rate: h };
 /// let start: PhasePoint<2> = moving.start(5.0, &PhasePoint::new([1.0], [2.0], 3.0));

@@ -4,8 +4,8 @@ use super::*;
 use crate::gauss::Gauss;
 use crate::test_lagrangians::{How, OnLine, OneSided};
 use crate::{DiscreteLagrangian, DiscreteStep, solve::Solver};
+use contact_examples::systems::QuadraticInZ;
 use contact_geom::Structure;
-use contact_geom::systems::QuadraticInZ;
 use pulp::Arch;
 
 /// The condensed route and the general one.

@@ -9,7 +9,7 @@ use crate::run::request::{Request, Shared};
 use crate::run::{OutputRequest, Until};
 use crate::test_lagrangians::{InPlane, OnLine, Unstated};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
-use contact_geom::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
+use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;

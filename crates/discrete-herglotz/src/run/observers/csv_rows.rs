@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 /// Writes rows as CSV during the run, without keeping them: a header, then the numbers of each row with all digits.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::{OneCoordinate, Pendulum}};
+/// use contact_examples::systems::{OneCoordinate, Pendulum};
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{CsvRows, GaussCollocation, Problem, Rows, Steps, Until};
 /// let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
@@ -77,7 +78,8 @@ mod tests {
     use super::*;
     use crate::test_lagrangians::OnLine;
     use crate::{GaussCollocation, Problem, Status, Steps, Until};
-    use contact_geom::{VelocityPoint, systems::Pendulum};
+    use contact_examples::systems::Pendulum;
+    use contact_geom::VelocityPoint;
 
     fn run(observer: &mut impl Observer<1>) -> Status {
         let pendulum = OnLine::from(Pendulum { gamma: -0.1 });

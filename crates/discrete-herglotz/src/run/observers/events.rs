@@ -39,7 +39,8 @@ use std::ops::ControlFlow;
 /// this one do not see the step in which the event lies.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Steps, Until};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;

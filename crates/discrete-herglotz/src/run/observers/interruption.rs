@@ -34,8 +34,8 @@ mod tests {
     use super::*;
     use crate::test_lagrangians::OnLine;
     use crate::{AnyIntegrator, Ensemble, InputError, Problem, Status, Steps, Until};
+    use contact_examples::systems::Pendulum;
     use contact_geom::VelocityPoint;
-    use contact_geom::systems::Pendulum;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// Trial runs end at the first interrupt request, whatever other search would follow.

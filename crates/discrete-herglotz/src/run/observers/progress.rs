@@ -11,7 +11,8 @@ const DEFAULT_STRIDE: usize = 1 << 10;
 /// Reports the completed fraction of the span of a run, from 0 to 1, at each hundredth: for a progress bar.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use contact_examples::systems::Pendulum;
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{GaussCollocation, Problem, Progress, Steps, Until};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;

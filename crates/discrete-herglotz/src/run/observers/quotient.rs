@@ -12,7 +12,8 @@ type Quantity<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 
 /// paper).
 ///
 /// ```
-/// use contact_geom::{PhasePoint, VelocityPoint, systems::Kepler};
+/// use contact_examples::systems::Kepler;
+/// use contact_geom::{PhasePoint, VelocityPoint};
 /// use discrete_herglotz::{GaussCollocation, Problem, Quotient, Steps, Until};
 /// let kepler = Kepler::<2> { mu: 1.0, gamma: -0.01 };
 /// let problem = Problem::new(&kepler, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 1.1], 0.0))?;

@@ -8,8 +8,9 @@ use std::ops::ControlFlow;
 /// ([`at_switch`](contact_geom::Lagrangian::at_switch)), with the states before and after.
 ///
 /// ```
+/// use contact_examples::systems::UniformField;
 /// use contact_geom::switching::{Impact, Impacts, Surface};
-/// use contact_geom::{Scalar, VelocityPoint, nalgebra::SVector, systems::UniformField};
+/// use contact_geom::{Scalar, VelocityPoint, nalgebra::SVector};
 /// use discrete_herglotz::{GaussCollocation, Problem, Resets, Steps, Until};
 /// struct Floor;
 /// impl Surface<1> for Floor {

@@ -5,7 +5,7 @@ use crate::rules::Composition;
 use crate::solve::Solver;
 use crate::test_lagrangians::{Curved, InPlane, Inertia, OnLine, Tides};
 use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, Stepper};
-use contact_geom::systems::{Duffing, Pendulum, QuadraticInZ};
+use contact_examples::systems::{Duffing, Pendulum, QuadraticInZ};
 use contact_geom::{ChartVector, DiscretePoint, PhasePoint, Scalar, numbers::MaxAbsOrNan};
 
 /// A discrete Lagrangian that implements only the value, with the default steps of the trait.

@@ -3,7 +3,7 @@
 use super::{ActionFlow, ActionMap, ActionSplitting, Riccati, RiccatiMap, Splitting, action_flow};
 use crate::test_lagrangians::{Curved, Magnetic, OnLine, Rate};
 use crate::{InputError, SplittingScheme};
-use contact_geom::systems::QuadraticInZ;
+use contact_examples::systems::QuadraticInZ;
 use contact_geom::{PhasePoint, Scalar, Structure};
 
 /// The closed form of the Riccati flow is a one-parameter group with the stated rate, and NaN after the blow-up.

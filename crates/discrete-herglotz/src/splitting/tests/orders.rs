@@ -4,7 +4,7 @@ use super::{ActionSplitting, Outcome, SCHEMES, Splitting, distance, run};
 use crate::rules::{Composition, Midpoint};
 use crate::test_lagrangians::{Curved, InPlane, Inertia, OnLine, Tides};
 use crate::{InputError, SplittingScheme, Stepper};
-use contact_geom::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
+use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The time after which errors are measured.

@@ -4,7 +4,7 @@ use super::{ActionSplitting, Outcome, SCHEMES, Splitting, Strang, run};
 use crate::rules::{Composition, Flow, Midpoint};
 use crate::test_lagrangians::{Curved, Fall, Free, InPlane, Inertia, OnLine, Quartic, Tides};
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
-use contact_geom::systems::{Duffing, LaneEmden};
+use contact_examples::systems::{Duffing, LaneEmden};
 use contact_geom::{ChartVector, Lagrangian, PhasePoint};
 
 /// `sigma_d = e^(gamma h)`, and the number of evaluations is that of the stages.

@@ -1,8 +1,8 @@
 //! Narrow forces, forces that are not smooth, motions that come to rest, and subnormal numbers.
 
 use super::*;
+use contact_examples::systems::Duffing;
 use contact_geom::Hints;
-use contact_geom::systems::Duffing;
 
 /// A feature that a free particle meets.
 #[derive(Clone, Copy)]

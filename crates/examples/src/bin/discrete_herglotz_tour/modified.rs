@@ -1,7 +1,8 @@
 //! The modified Hamiltonians of a splitting: their defects against the step size, and the smallest of them.
 
+use contact_examples::systems::Pendulum;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
-use contact_geom::{VelocityPoint, systems::Pendulum};
+use contact_geom::VelocityPoint;
 use discrete_herglotz::hamiltonian::{MAX_MODIFIED_ORDER, ModifiedDefect, modified_defects};
 use discrete_herglotz::{Problem, SplittingScheme};
 

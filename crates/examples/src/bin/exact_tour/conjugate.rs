@@ -1,8 +1,8 @@
 //! A fan of motions from one point, and the conjugate points at which neighbouring motions meet again.
 
+use contact_examples::systems::Pendulum;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
 use exact_lagrangian::{ContactExponential, herglotz_flow};
 use std::f64::consts::PI;
 

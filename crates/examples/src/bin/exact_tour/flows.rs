@@ -1,7 +1,7 @@
 //! Three discrete flows with the same long step, compared with the motion.
 
+use contact_examples::systems::{CoupledInZ, System};
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
-use contact_geom::systems::{CoupledInZ, System};
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian,

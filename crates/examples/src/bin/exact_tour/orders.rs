@@ -1,7 +1,7 @@
 //! Variational error analysis of every method on every system, with a figure for one system.
 
+use contact_examples::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
-use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
 use contact_geom::{Statement, VelocityPoint, legendre};
 use discrete_herglotz::rules::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, Order, error_orders};

@@ -1,8 +1,8 @@
 //! Sections of the exact discrete Lagrangian beside two discretisations of the same Lagrangian.
 
+use contact_examples::systems::Pendulum;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::DiscretePoint;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::{
     DiscreteLagrangian,
     rules::{LeftMidpoint, Midpoint},

@@ -1,7 +1,7 @@
 //! The statements of section 4 on every system, over six decades of the time step.
 
+use contact_examples::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use contact_examples::{Checks, Directory, Failure, Subject, fractions, number, progress_bar};
-use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use exact_lagrangian::{ContactExponential, ExactError, statements};
 use indicatif::ProgressBar;
 

@@ -4,10 +4,10 @@
 //! With one coordinate `d eta = dq ^ dp`. The step of a splitting has the constant `sigma_d = e^(gamma h)`, and `Phi^* eta = sigma_d eta`
 //! says that the map `(q, p) -> (q, p)` contracts every area by `e^(gamma h)` in each step, however long the step is.
 
+use contact_examples::systems::Pendulum;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::Vector2;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::systems::Pendulum;
 use contact_geom::{GeometryError, PhasePoint, VelocityPoint, herglotz_field};
 use discrete_herglotz::splitting::Splitting;
 use discrete_herglotz::{SplittingScheme, Stepper};

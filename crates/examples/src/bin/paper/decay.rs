@@ -1,8 +1,8 @@
 //! Two figures beyond the paper's: how the conformal factor and a momentum decay, and how the theorems predict it.
 
+use contact_examples::systems::{Kepler, Pendulum, System};
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::systems::{Kepler, Pendulum, System};
 use contact_geom::{
     Darboux, DiscretePoint, OneParameterGroup, Symmetry, legendre, support::conformality_with_jacobian,
 };

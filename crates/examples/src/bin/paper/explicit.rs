@@ -1,6 +1,6 @@
 //! The paper's explicit formulas for `q2` in section 5, as printed.
 
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 
 /// A system whose discrete Herglotz equations the paper solves for `q2` explicitly.
 pub trait Explicit {

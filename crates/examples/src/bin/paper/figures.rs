@@ -2,9 +2,9 @@
 
 use crate::published::{PublishedRow, faulty_action};
 use crate::series::{GAMMA, Row, STEP, true_start};
+use contact_examples::systems::HarmonicOscillator;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::HarmonicOscillator;
 
 const TIME: &str = "time t (dimensionless)";
 const POSITION: &str = "position q (dimensionless)";

@@ -30,8 +30,8 @@ mod tables;
 
 use area::Area;
 use clap::Parser;
+use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use contact_examples::{Directory, Failure, finish, number, print};
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
 use discrete_herglotz::rules::{LeftMidpoint, Rectangle};
 use published::PublishedRow;
 use series::{GAMMA, Row, STEP};

@@ -3,7 +3,7 @@
 use crate::closed_exact::ClosedExact;
 use crate::series::{GAMMA, Row, STEP, log_hamiltonian, start, true_start};
 use contact_examples::Failure;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use discrete_herglotz::rules::Flow;
 
 /// A row of the curves that the paper calls exact.

@@ -1,8 +1,8 @@
 //! Section 2: the statements about flows, and about Hamiltonians that no regular Lagrangian has.
 
+use contact_examples::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_geom::{
     AsFunction, ChartVector, ContactForm, Darboux, GeometryError, Smooth, SmoothFunction, Statement,
     hamiltonian::{DarbouxField, dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality},

@@ -1,8 +1,8 @@
 //! Section 3: every statement for every system and every discretisation.
 
+use contact_examples::systems::System;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::System;
 use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legendre};
 use discrete_herglotz::theory::statements::{STATEMENTS, residual};
 use discrete_herglotz::{

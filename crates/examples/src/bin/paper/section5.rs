@@ -4,9 +4,9 @@ use crate::closed_exact::ClosedExact;
 use crate::explicit::Explicit;
 use crate::section3::{STEPS, straight_step};
 use crate::series::{Example, GAMMA, STEP};
+use contact_examples::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, VelocityPoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,

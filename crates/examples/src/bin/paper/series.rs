@@ -2,7 +2,7 @@
 
 use crate::explicit::Explicit;
 use contact_examples::Failure;
-use contact_geom::systems::{FreeParticle, HarmonicOscillator, System};
+use contact_examples::systems::{FreeParticle, HarmonicOscillator, System};
 use contact_geom::{ChartVector, DiscretePoint, Energy, GeometryError, PhasePoint, SmoothFunction, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, rules::Flow, theory::legendre_minus};
 

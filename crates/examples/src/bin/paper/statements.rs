@@ -1,8 +1,8 @@
 //! The walk over the catalogue that checks the paper's statements.
 
 use crate::{section2, section3, section5};
+use contact_examples::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use contact_examples::{Checks, Subject, fractions, progress_bar};
-use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use indicatif::ProgressBar;
 
 /// Checks every statement on everything that it applies to.

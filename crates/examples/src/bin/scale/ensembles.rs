@@ -3,9 +3,9 @@
 
 use crate::peer::python;
 use contact_examples::Report;
+use contact_examples::systems::Pendulum;
 use contact_examples::{Failure, print};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::Pendulum;
 use discrete_herglotz::{AnyIntegrator, Ensemble, InputError, SplittingScheme, Steps, Until, ensemble::EnsembleError};
 use std::time::Instant;
 

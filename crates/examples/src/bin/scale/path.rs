@@ -4,8 +4,8 @@
 use crate::sparse_path;
 use contact_examples::Failure;
 use contact_examples::Report;
+use contact_examples::systems::Chain;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::systems::Chain;
 use contact_geom::{
     ChartVector, Hessian, Lagrangian, Scalar, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},

@@ -2,9 +2,9 @@
 
 use crate::peer::python;
 use contact_examples::Report;
+use contact_examples::systems::Bodies;
 use contact_examples::{Failure, print};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, numbers::max_or_nan};
 use discrete_herglotz::{Problem, SplittingScheme, Start, Stepper, StepperOptions, gauss::GaussStepper};
 use sparse_herglotz::systems::OuterSolarSystem;

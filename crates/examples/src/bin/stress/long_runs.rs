@@ -5,8 +5,8 @@ use crate::motion::{FAMILIES, Problem, distance};
 use crate::parallel::parallel;
 use crate::statistics::quantile;
 use contact_examples::Report;
+use contact_examples::systems::HarmonicOscillator;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
-use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{
     ChartVector, PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},

@@ -5,8 +5,8 @@ use crate::formula::{Force, Formula};
 use crate::motion::{FAMILIES, Problem, RunEnd, Verdict, distance, norm};
 use crate::parallel::parallel;
 use contact_examples::Report;
+use contact_examples::systems::HarmonicOscillator;
 use contact_examples::{Failure, number};
-use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 
 /// Exponents of two, for scales from 3e-151 to 3e150; their squares, the scales of z, are still normal numbers.

@@ -1,8 +1,8 @@
 //! The problems: Lagrangians, initial values, durations, and reference solutions.
 
+use contact_examples::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ};
 
 /// The Lagrangian of P1.
 pub const OSCILLATOR: HarmonicOscillator = HarmonicOscillator { gamma: -0.05 };
