@@ -22,8 +22,7 @@ pub struct InputTest {
 type Exceptions = &'static [(&'static str, &'static str)];
 
 /// Asserts that checks and exceptions together are exactly the entry points of a crate.
-fn complete(name: &str, tests: &[&[InputTest]], exceptions: Exceptions) {
-    let entries = entries::of_crate(name);
+fn complete(name: &str, entries: &BTreeSet<String>, tests: &[&[InputTest]], exceptions: Exceptions) {
     assert!(entries.len() > 50, "only {} entries of {name} found: {entries:?}", entries.len());
     let tested: BTreeSet<&str> = tests.iter().copied().flatten().flat_map(|t| t.entries).copied().collect();
     let excepted = |entry: &str| {
@@ -53,13 +52,15 @@ fn run(tests: &[&[InputTest]]) {
 }
 
 #[test]
-fn every_entry_point_of_contact_geom_is_tested() {
-    complete("contact-geom", geometry::TESTS, geometry::EXCEPTIONS);
+fn every_entry_point_of_contact_geom_and_of_the_gallery_is_tested() {
+    let mut entries = entries::of_crate("contact-geom");
+    entries.append(&mut entries::of_folder("examples", "systems"));
+    complete("contact-geom", &entries, geometry::TESTS, geometry::EXCEPTIONS);
 }
 
 #[test]
 fn every_entry_point_of_discrete_herglotz_is_tested() {
-    complete("discrete-herglotz", discrete::TESTS, discrete::EXCEPTIONS);
+    complete("discrete-herglotz", &entries::of_crate("discrete-herglotz"), discrete::TESTS, discrete::EXCEPTIONS);
 }
 
 #[test]

@@ -4,8 +4,7 @@
 //! critical, where `zdot = L` (Herglotz' principle). This crate evaluates the geometry at a point: the contact forms of
 //! T\*Q x R, TQ x R and Q x Q x R with their Reeb fields, pullbacks and conformal factors, contact Hamiltonian and
 //! Herglotz vector fields, the Legendre transformation, symmetries and their dissipated momenta. It contains no time
-//! steps, iterations or tolerances. [`statements`] checks the theory on any system; [`systems`] is a catalogue of
-//! examples.
+//! steps, iterations or tolerances. [`statements`] checks the theory on any system.
 //!
 //! ```
 //! use contact_geom::{herglotz_field, nalgebra::SVector, Lagrangian, Scalar, VelocityPoint};
@@ -63,7 +62,8 @@ pub mod support {
     pub use crate::dynamics::constraint::{independent_rows, least_norm, restricted};
     pub use crate::dynamics::nearest_name::nearest_name;
     pub use crate::dynamics::{
-        derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, rounding_at_state,
+        derived_gradient, derived_hessian, extended, gradient_rounding, herglotz_rates, indexed_names,
+        rounding_at_state, split_last,
     };
     pub use crate::forms::{conformality_with_jacobian, generic, seed};
     pub use crate::number::{KernelDual, legendre_polynomials, linear};

@@ -22,7 +22,6 @@ use crate::{
     principle::{MotionCurve, NonHolonomic, VariedCurve, action, action_derivative},
     through,
 };
-use contact_examples::systems::System;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, PhasePoint, Scalar,
@@ -52,12 +51,12 @@ pub const STATEMENTS: [Statement; 12] = [
     Statement::LegendrianGraph,
 ];
 
-/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the
+/// The residual of a statement for a Lagrangian at a time and a point of TQ x R, with a time step h; `None` where the
 /// statement is not one of [`STATEMENTS`].
 ///
 /// # Errors
 /// Those of the motion over h (over 2h for [`Statement::ExactFlow`]).
-pub fn residual<S: System<N>, const N: usize>(
+pub fn residual<S: Lagrangian<N>, const N: usize>(
     statement: Statement,
     system: &S,
     t: f64,
@@ -168,7 +167,7 @@ fn apart(a: f64, b: f64, size: f64) -> f64 {
     (a - b).abs() / size
 }
 
-impl<S: System<N>, const N: usize> Sample<'_, S, N> {
+impl<S: Lagrangian<N>, const N: usize> Sample<'_, S, N> {
     /// The exact discrete Lagrangian on the branch of the motion from `x`, and its point of Q x Q x R.
     fn exact(&self) -> Result<(ExactLagrangian<&S, N>, DiscretePoint<N>), ExactError<N>> {
         let exact = ExactLagrangian::new(self.system, self.h)?.near(self.x.v);

@@ -1,8 +1,8 @@
-//! What the programs of the workspace share: output of results, figures, the record of checked statements, and failures
-//! with their exit codes.
+//! The gallery of [`systems`], and what the programs of the workspace share: output of results, figures, the record of
+//! checked statements, and failures with their exit codes.
 //!
-//! Without features, the crate depends on `contact-geom` alone; `figure` adds the module of that name, and `programs` all
-//! that the programs need.
+//! Without features there is the gallery alone, which depends on `contact-geom`; `figure` adds the module of that name, and
+//! `programs` all that the programs need.
 
 #[cfg(feature = "programs")]
 mod arguments;
@@ -16,6 +16,7 @@ pub mod figure;
 mod output;
 #[cfg(feature = "programs")]
 mod report;
+pub mod systems;
 #[cfg(all(test, feature = "programs"))]
 mod tables;
 

@@ -8,6 +8,11 @@ use std::path::{Path, PathBuf};
 /// methods and constructors as `Type::function`, functions of traits as `Trait::function`. The sources are formatted by
 /// rustfmt, so that what starts a line is at the top level.
 pub fn of_crate(name: &str) -> BTreeSet<String> {
+    of_folder(name, "")
+}
+
+/// Those of a folder of a crate.
+pub fn of_folder(name: &str, within: &str) -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
     let lib = fs::read_to_string(root.join("lib.rs")).unwrap();
     let of_the_crate = exported(&lib);
@@ -18,7 +23,7 @@ pub fn of_crate(name: &str) -> BTreeSet<String> {
     let of_folders: Vec<String> = of_folders.collect();
     let of_folders: BTreeSet<&str> = of_folders.iter().flat_map(|text| exported(text)).collect();
     let mut entries = BTreeSet::new();
-    for file in sources(&root) {
+    for file in sources(&root.join(within)) {
         let relative = file.strip_prefix(&root).unwrap().with_extension("");
         // Tests are at the end of a file, or in a file of their own.
         let text = fs::read_to_string(&file).unwrap();

@@ -1,4 +1,4 @@
-//! Invalid input to contact-geom. Its formulas are pointwise: a NaN is returned or refused, never lost.
+//! Invalid input to contact-geom and to the gallery of systems. Their formulas are pointwise: a NaN is returned or refused, never lost.
 
 mod constraints;
 mod forms;
@@ -83,6 +83,9 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Surface::with_parameters", "the implementor's; tests/derivatives/gradients/impacts"),
     ("Impact::parameter_name", "takes no number"),
     ("nearest_name", "takes no number"),
+    ("indexed_names", "takes the number of the names"),
+    ("extended", "copies its arguments"),
+    ("split_last", "copies its argument"),
     ("$name::new", "stores its arguments; check() and every start check them"),
 ];
 

@@ -27,7 +27,7 @@ pub use action::{OneParameterGroup, Symmetry};
 pub use breaks::Breaks;
 pub use contact_hamiltonian::{
     AsFunction, AtEnergy, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, InTransformedTime, Lifted,
-    NoMomentum, OfHamiltonian, ParametricHamiltonian, TimesRate, VectorField, momentum,
+    NoMomentum, OfHamiltonian, ParametricHamiltonian, TimesRate, VectorField, extended, momentum, split_last,
 };
 pub use control::Control;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
@@ -43,8 +43,7 @@ pub use herglotz::{
 };
 pub use impact::{Impact, Impacts, Surface};
 pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
-pub use parameters::{Parametric, ParametricForce, UnknownParameter};
-pub(crate) use parameters::{indexed_names, parametric_fields};
+pub use parameters::{Parametric, ParametricForce, UnknownParameter, indexed_names};
 pub use probe::check_closed_derivatives;
 pub use rounding::{gradient_rounding, rounding_at_state};
 pub use structure::{Defect, Defects, Structure};

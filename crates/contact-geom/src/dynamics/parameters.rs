@@ -9,9 +9,8 @@ use thiserror::Error;
 /// is how motions are differentiated with respect to them.
 ///
 /// All methods have defaults for a Lagrangian without parameters: `impl Parametric<1> for Mine {}`. A Lagrangian with
-/// parameters implements all of them but [`force_at`](Self::force_at); the fields of the systems of the
-/// [catalogue](crate::systems) are parameters. A formula that is generic over the type of its coefficients
-/// ([`ScalarOver`](crate::numbers::ScalarOver)) is written once for [`Lagrangian::value`] and
+/// parameters implements all of them but [`force_at`](Self::force_at). A formula that is generic over the type of its
+/// coefficients ([`ScalarOver`](crate::numbers::ScalarOver)) is written once for [`Lagrangian::value`] and
 /// [`value_at`](Self::value_at).
 ///
 /// ```
@@ -271,43 +270,6 @@ impl<const N: usize, L: Parametric<N>, F: ParametricForce<N>> Parametric<N> for 
 }
 
 /// The names `name[0]`, `name[1]`, ... of the entries of an array.
-pub(crate) fn indexed_names(name: &str, length: usize) -> impl Iterator<Item = String> {
+pub fn indexed_names(name: &str, length: usize) -> impl Iterator<Item = String> {
     (0..length).map(move |i| format!("{name}[{i}]"))
 }
-
-/// Implements [`Parametric`] for a system whose fields, all numbers, are its parameters; `formula` takes them in this
-/// order.
-macro_rules! parametric_fields {
-    ([$($generic:tt)*] $system:ty, $n:expr, $($field:ident),+) => {
-        impl<$($generic)*> $crate::Parametric<{ $n }> for $system {
-            fn parameter_names(&self) -> Vec<String> {
-                [$(stringify!($field)),+].map(String::from).into()
-            }
-            fn parameters(&self) -> Vec<f64> {
-                vec![$(self.$field),+]
-            }
-            #[inline(always)]
-            fn parameter_count(&self) -> usize {
-                [$(stringify!($field)),+].len()
-            }
-            fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
-                let [$($field),+] = *theta else { return None };
-                #[allow(clippy::needless_update)] // Some systems have further fields.
-                Some(Self { $($field,)+ ..*self })
-            }
-            #[inline(always)]
-            fn value_at<T: $crate::Scalar>(
-                &self,
-                theta: &[T],
-                t: T,
-                q: &nalgebra::SVector<T, { $n }>,
-                v: &nalgebra::SVector<T, { $n }>,
-                z: T,
-            ) -> T {
-                let [$($field),+] = *theta else { return T::from(f64::NAN) };
-                self.formula([$($field),+], t, q, v, z)
-            }
-        }
-    };
-}
-pub(crate) use parametric_fields;

@@ -1,7 +1,6 @@
 //! Statements on forces, which the paper does not contain.
 
-use super::AnyFunction;
-use crate::systems::System;
+use super::{AnyFunction, System};
 use crate::{
     ChartVector, Derivatives, Dual, Energy, Force, Forced, GeometryError, Scalar, SmoothFunction, VelocityPoint,
     herglotz_field, numbers::MaxOrNan,

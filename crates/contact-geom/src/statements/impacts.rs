@@ -1,7 +1,7 @@
 //! Statements on impacts, which the paper does not contain.
 
+use super::System;
 use crate::switching::Impact;
-use crate::systems::System;
 use crate::{Derivatives, GeometryError, VelocityPoint, numbers::MaxOrNan};
 use nalgebra::SVector;
 

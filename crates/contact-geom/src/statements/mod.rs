@@ -8,7 +8,6 @@
 #![deny(clippy::disallowed_methods)]
 
 use crate::switching::Impact;
-use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
     ChartVector, ContactForm, Darboux, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
     LagrangianForm, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient, Scalar, Smooth,
@@ -26,8 +25,10 @@ use nalgebra::SVector;
 
 mod forces;
 mod impacts;
+mod system;
 
 pub use forces::AnyForce;
+pub use system::System;
 
 /// The statements of section 2, and on forces and impacts, that [`residual`] evaluates.
 pub const STATEMENTS: [Statement; 13] = [
@@ -403,30 +404,6 @@ pub trait ClosedFlow {
     fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T>;
     /// The Hamiltonian.
     fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T;
-}
-
-impl ClosedFlow for FreeParticle {
-    fn name(&self) -> &'static str {
-        System::name(self)
-    }
-    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
-        self.solution(t, &(*x).into()).into()
-    }
-    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
-        x.y[0] * x.y[0] * 0.5 - x.z * self.gamma
-    }
-}
-
-impl ClosedFlow for HarmonicOscillator {
-    fn name(&self) -> &'static str {
-        System::name(self)
-    }
-    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
-        self.solution(t, &(*x).into()).into()
-    }
-    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
-        x.y[0] * x.y[0] * 0.5 + x.x[0] * x.x[0] * 0.5 - x.z * self.gamma
-    }
 }
 
 /// The contact Hamiltonian `c z^2 / 2`, nonlinear in z: its flow scales `z` by `1/(1 + c z t/2)` and `p` by the square

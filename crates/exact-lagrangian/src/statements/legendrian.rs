@@ -2,12 +2,11 @@
 
 use super::Sample;
 use crate::ExactError;
-use contact_examples::systems::System;
-use contact_geom::{ChartVector, Dual, legendre, legendrian_defect, support::seed};
+use contact_geom::{ChartVector, Dual, Lagrangian, legendre, legendrian_defect, support::seed};
 
 /// Statement 48: the graph of `phi_h` on T\*Q x R at `r = ln sigma_h` is Legendrian, with the coordinates of TQ x R as
 /// parameters of the graph. The derivatives are those of the flow on dual numbers.
-pub(super) fn graph<S: System<N>, const N: usize>(at: &Sample<'_, S, N>) -> Result<f64, ExactError<N>> {
+pub(super) fn graph<S: Lagrangian<N>, const N: usize>(at: &Sample<'_, S, N>) -> Result<f64, ExactError<N>> {
     let motion = at.exponential.varied(at.t, at.x)?;
     let time = |t: f64| Dual::<f64, ChartVector<N>>::constant(t);
     let x0 = legendre(at.system, time(at.t), &seed(&ChartVector::from(*at.x)).into());

@@ -4,7 +4,8 @@ use super::closed_form::relative_exp_m1;
 use super::{System, between, parametric_fields};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{Coefficient, ScalarOver};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use contact_geom::statements::ClosedFlow;
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 
 /// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the
 /// mass is one.
@@ -95,6 +96,18 @@ impl System<1> for FreeParticle {
 
     fn symmetries(&self) -> Vec<Symmetry<1>> {
         vec![Symmetry::Translation(SVector::from([1.0]))]
+    }
+}
+
+impl ClosedFlow for FreeParticle {
+    fn name(&self) -> &'static str {
+        System::name(self)
+    }
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
+        self.solution(t, &(*x).into()).into()
+    }
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
+        x.y[0] * x.y[0] * 0.5 - x.z * self.gamma
     }
 }
 

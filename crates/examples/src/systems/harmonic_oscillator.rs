@@ -4,6 +4,7 @@ use super::closed_form::{relative_exp_m1, relative_sin};
 use super::{System, between, parametric_fields};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{Coefficient, ScalarOver};
+use contact_geom::statements::ClosedFlow;
 use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 
 /// The harmonic oscillator with linear drag, `L = v^2/2 - q^2/2 + gamma z`. Dimensionless: time in units of the inverse
@@ -126,6 +127,18 @@ impl System<1> for HarmonicOscillator {
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<1, T>) -> Option<T> {
         Some((x.p[0] * x.p[0] + x.q[0] * x.q[0]) * 0.5 - x.z * self.gamma)
+    }
+}
+
+impl ClosedFlow for HarmonicOscillator {
+    fn name(&self) -> &'static str {
+        System::name(self)
+    }
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
+        self.solution(t, &(*x).into()).into()
+    }
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
+        x.y[0] * x.y[0] * 0.5 + x.x[0] * x.x[0] * 0.5 - x.z * self.gamma
     }
 }
 

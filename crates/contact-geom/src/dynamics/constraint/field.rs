@@ -22,7 +22,8 @@ pub struct ConstrainedMotion<const N: usize, const M: usize> {
 ///
 /// ```
 /// use contact_examples::systems::constrained::RigidPendulum;
-/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion}}; let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
+/// use contact_geom::{VelocityPoint, constraints::{Redundancy, constrained_motion}};
+/// let system = RigidPendulum::<2> { gravity: 9.81, gamma: 0.0 };
 /// let x = VelocityPoint::new([0.0, -1.0], [2.0, 0.0], 0.0);
 /// let motion = constrained_motion(&system, &system, 0.0, &x, Redundancy::Refuse)?;
 /// // The tension g + v^2 pulls upward; G = 2 q.

@@ -90,7 +90,7 @@ impl<H: ContactHamiltonian<N>, G: ContactHamiltonian<N>, const N: usize, const M
 
     #[inline(always)]
     fn value<T: Scalar>(&self, _tau: T, q: &SVector<T, M>, p: &SVector<T, M>, z: T) -> T {
-        let [(position, t), (momentum, energy)] = [first::<T, N, M>(q), first::<T, N, M>(p)];
+        let [(position, t), (momentum, energy)] = [split_last::<T, N, M>(q), split_last::<T, N, M>(p)];
         let h = self.hamiltonian.value(t, &position, &momentum, z) + energy;
         self.rate.value(t, &position, &momentum, z) * h
     }
@@ -109,13 +109,13 @@ impl<H: ContactHamiltonian<N>, G: ContactHamiltonian<N>, const N: usize, const M
 
 /// The first N entries of a vector with N + 1 entries, and the last one.
 #[inline(always)]
-pub(crate) fn first<T: Scalar, const N: usize, const M: usize>(x: &SVector<T, M>) -> (SVector<T, N>, T) {
+pub fn split_last<T: Scalar, const N: usize, const M: usize>(x: &SVector<T, M>) -> (SVector<T, N>, T) {
     const { assert!(M == N + 1, "M is the number of coordinates N of the Hamiltonian, and one more") };
     (SVector::from_fn(|i, _| x[i]), x[N])
 }
 
 /// A state with one more coordinate and its momentum.
-pub(crate) fn extended<const N: usize, const M: usize>(x: &PhasePoint<N>, q: f64, p: f64) -> PhasePoint<M> {
+pub fn extended<const N: usize, const M: usize>(x: &PhasePoint<N>, q: f64, p: f64) -> PhasePoint<M> {
     const { assert!(M == N + 1, "M is the number of coordinates N of the Hamiltonian, and one more") };
     let with = |of: &SVector<f64, N>, last: f64| SVector::from_fn(|i, _| if i < N { of[i] } else { last });
     PhasePoint { q: with(&x.q, q), p: with(&x.p, p), z: x.z }
@@ -125,53 +125,4 @@ pub(crate) fn extended<const N: usize, const M: usize>(x: &PhasePoint<N>, q: f64
 impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> crate::ParametricHamiltonian<N>
     for TimesRate<K, G>
 {
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::systems::hamiltonian::{HeatedOscillator, Piston, SpinOrbit};
-    use crate::{AtEnergy, ChartVector, HamiltonianDerivatives};
-
-    /// Some hundred units of round-off.
-    const ROUND_OFF: f64 = 256.0 * f64::EPSILON;
-
-    /// `X_(g K) = g X_K + K (X_g + g R)` at any point, so that the two are parallel on K = 0.
-    #[test]
-    fn the_field_of_a_product() {
-        let (k, g) = (Piston::default(), HeatedOscillator { rate: 0.7, ..HeatedOscillator::default() });
-        for (q, p, z) in [(1.0, 0.5, 0.3), (0.6, -1.0, 2.0), (2.0, 0.1, -1.0)] {
-            let x = PhasePoint::new([q], [p], z);
-            let (of_k, of_g) = (k.value(0.0, &x.q, &x.p, z), g.value(0.0, &x.q, &x.p, z));
-            let (x_k, mut x_g) = (k.contact_field(0.0, &x), g.contact_field(0.0, &x));
-            x_g.z += of_g;
-            let expected = x_k.scale(of_g).plus(x_g.scale(of_k));
-            let found = TimesRate { hamiltonian: k, rate: g }.contact_field(0.0, &x);
-            assert!(found.minus(expected).amax() <= ROUND_OFF * (1.0 + expected.amax()), "{found:?}");
-            // On a level of K, the evolution field times the rate.
-            let found = TimesRate { hamiltonian: AtEnergy::of(k, &x), rate: g }.contact_field(0.0, &x);
-            let evolution = ChartVector { z: x_k.z + of_k, ..x_k };
-            let off = found.minus(evolution.scale(of_g)).amax();
-            assert!(off <= ROUND_OFF * (1.0 + evolution.amax() * of_g.abs()), "{off:e}");
-        }
-    }
-
-    /// The field of a Hamiltonian that depends on time, with a rate that depends on everything.
-    #[test]
-    fn the_field_with_the_time_as_a_coordinate() {
-        let h = SpinOrbit { amplitude: 0.3, ..SpinOrbit::default() };
-        let g = HeatedOscillator { rate: 0.7, ..HeatedOscillator::default() };
-        let moving = InTransformedTime::<_, _, 1> { hamiltonian: h, rate: g };
-        for (t, q, p, z) in [(0.3, 1.0, 0.5, 0.3), (2.0, 0.6, -1.0, 2.0), (-1.0, 2.0, 0.1, -1.0)] {
-            let x = PhasePoint::new([q], [p], z);
-            let start: PhasePoint<2> = moving.start(t, &x);
-            let (field, of_h) = (moving.contact_field(9.0, &start), h.contact_field(t, &x));
-            let rate = g.value(t, &x.q, &x.p, z);
-            for (found, expected) in
-                [(field.x[0], of_h.x[0]), (field.x[1], 1.0), (field.y[0], of_h.y[0]), (field.z, of_h.z)]
-            {
-                assert!((found - rate * expected).abs() <= ROUND_OFF * (1.0 + (rate * expected).abs()));
-            }
-        }
-    }
 }

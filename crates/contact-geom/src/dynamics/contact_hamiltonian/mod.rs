@@ -5,7 +5,7 @@ use nalgebra::SVector;
 
 mod at_energy;
 mod derivatives;
-pub(crate) mod in_transformed_time;
+mod in_transformed_time;
 mod lifted;
 mod momentum;
 mod of_hamiltonian;
@@ -14,7 +14,7 @@ mod structure;
 
 pub use at_energy::AtEnergy;
 pub use derivatives::HamiltonianDerivatives;
-pub use in_transformed_time::{InTransformedTime, TimesRate};
+pub use in_transformed_time::{InTransformedTime, TimesRate, extended, split_last};
 pub use lifted::{Lifted, VectorField};
 pub use momentum::{NoMomentum, momentum};
 pub use of_hamiltonian::OfHamiltonian;
