@@ -3,9 +3,9 @@
 use crate::evaluation::{At, whole_vector};
 use crate::parser::{Parser, ValueName, not_holonomic};
 use crate::{Formula, FormulaError, FormulaLagrangian, Graph, Id, Node, Operation};
-use contact_geom::Scalar;
 use contact_geom::constraints::Constraint;
 use contact_geom::nalgebra::SVector;
+use contact_geom::{Scalar, vector};
 
 /// What a Hamiltonian does not have, and what to do.
 const NO_CONSTRAINTS: (&str, &str) = ("holonomic constraints", "give a Lagrangian");
@@ -109,7 +109,7 @@ impl Graph {
 impl<const N: usize> Constraint<N, N> for FormulaLagrangian<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
-        let mut c = SVector::<T, N>::from_fn(|_, _| T::zero());
+        let mut c: SVector<T, N> = vector!(|_| T::zero());
         let at = At::new(T::zero(), q, q, T::zero());
         self.derived.constraints.evaluate::<T, N>(at, &mut [c.as_mut_slice()]);
         whole_vector(&c)

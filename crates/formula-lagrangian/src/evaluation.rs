@@ -4,7 +4,7 @@ use crate::Function;
 use crate::functions::{atan2, hypot};
 use crate::tape::{Code, InputRegisters, Instruction, PREVIOUS, Tape};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Scalar, table::Table};
+use contact_geom::{Scalar, table::Table, vector};
 
 /// The sizes of the register arrays on the stack; a tape that needs more registers has them on the heap. The registers
 /// are cleared before each evaluation, so that a short tape has a small array.
@@ -152,7 +152,7 @@ pub(crate) fn whole<T: Scalar>(x: T) -> T {
 /// The same for each component of a vector.
 #[inline(always)]
 pub(crate) fn whole_vector<T: Scalar, const N: usize>(x: &SVector<T, N>) -> SVector<T, N> {
-    SVector::from_fn(|i, _| whole(x[i]))
+    vector!(|i| whole(x[i]))
 }
 
 /// Copies numbers to consecutive registers, starting at `first`.

@@ -5,10 +5,10 @@ use crate::drag::ProvedForce;
 use crate::evaluation::{At, whole, whole_vector};
 use crate::forces::Work;
 use crate::{Formula, FormulaError};
-use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::nalgebra::{ArrayStorage, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
-    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint,
+    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, vector,
 };
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with gradient and second derivatives in closed form and with
@@ -137,7 +137,7 @@ impl<const N: usize> FormulaLagrangian<N> {
 /// Zeros, into which results are written.
 #[inline(always)]
 pub(crate) fn blank<T: Scalar, const N: usize>() -> ChartVector<N, T> {
-    let zero = SVector::from_fn(|_, _| T::zero());
+    let zero = vector!(|_| T::zero());
     ChartVector { x: zero, y: zero, z: T::zero() }
 }
 
@@ -177,14 +177,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
-        let mut force = SVector::<T, N>::from_fn(|_, _| T::zero());
+        let mut force: SVector<T, N> = vector!(|_| T::zero());
         self.derived.force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
         Some(whole_vector(&force))
     }
 
     #[inline(always)]
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
-        let (mut value, mut force) = (T::zero(), SVector::<T, N>::from_fn(|_, _| T::zero()));
+        let (mut value, mut force): (T, SVector<T, N>) = (T::zero(), vector!(|_| T::zero()));
         let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
         self.derived.with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((whole(value), whole_vector(&force)))
@@ -199,7 +199,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
-        let mut w: SMatrix<T, N, N> = SMatrix::from_fn(|_, _| T::zero());
+        let mut w: SMatrix<T, N, N> = SMatrix::from_array_storage(ArrayStorage([[T::zero(); N]; N]));
         self.derived.mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
         Some(w)
     }
@@ -215,7 +215,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        let mut force = SVector::<T, N>::from_fn(|_, _| T::zero());
+        let mut force: SVector<T, N> = vector!(|_| T::zero());
         match &self.derived.applied {
             None => force,
             Some(tape) => {

@@ -3,7 +3,7 @@
 use crate::evaluation::At;
 use crate::{FormulaHamiltonian, FormulaLagrangian};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Parametric, ParametricHamiltonian, Scalar, VelocityPoint};
+use contact_geom::{Parametric, ParametricHamiltonian, Scalar, VelocityPoint, vector};
 
 /// The parameters of the formula in their order, also those that it does not use.
 ///
@@ -52,7 +52,7 @@ impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn force_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        let mut force = SVector::<T, N>::from_fn(|_, _| T::zero());
+        let mut force: SVector<T, N> = vector!(|_| T::zero());
         if self.derived.parametric_force.len() > 0 {
             let at = At { q: x.q.as_slice(), v: x.v.as_slice(), z: x.z, t };
             self.derived.parametric_force.evaluate(theta, at, force.as_mut_slice());

@@ -3,7 +3,7 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::support::indexed_names;
-use contact_geom::{ChartVector, Lagrangian, Parametric, Scalar, Structure, VelocityPoint};
+use contact_geom::{ChartVector, Lagrangian, Parametric, Scalar, Structure, VelocityPoint, vector};
 
 /// Bodies in space with Newtonian gravitation between all pairs, and linear drag,
 /// `L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the coordinates `3i, 3i + 1, 3i + 2`
@@ -78,7 +78,7 @@ impl<const N: usize> Bodies<N> {
 
     #[inline(always)]
     fn forces<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
-        let mut force = SVector::from_fn(|_, _| T::zero());
+        let mut force: SVector<T, N> = vector!(|_| T::zero());
         for j in 0..N / 3 {
             for i in 0..j {
                 let (r, square) = Self::pair(q, i, j);
@@ -103,7 +103,7 @@ impl<const N: usize> Lagrangian<N> for Bodies<N> {
 
     #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
-        let y = SVector::from_fn(|d, _| x.v[d] * self.masses[d]);
+        let y: SVector<T, N> = vector!(|d| x.v[d] * self.masses[d]);
         Some(ChartVector { x: self.forces(&x.q), y, z: T::from(self.gamma) })
     }
 

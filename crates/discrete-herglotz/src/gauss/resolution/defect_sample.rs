@@ -235,6 +235,7 @@ impl Between {
 }
 
 /// The weighted sum of the stages; the weights after the last stage are 0.
+#[inline(always)]
 fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
 }
@@ -400,7 +401,10 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
         if curve.acts {
             expected += relative(tail(&curve.l) * h, size_z);
         }
-        let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
+        let mut ends = [0.0; 2];
+        for i in 0..2 {
+            ends[i] = weighted(&g.ends[i], &curve.l) / curve.rates[i];
+        }
         DefectSample {
             defect,
             of_momenta,

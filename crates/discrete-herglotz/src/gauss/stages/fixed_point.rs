@@ -64,6 +64,7 @@ impl FixedPointIteration {
     /// An iteration that ends when a change is at most `enough` times the round-off of the terms, or when the next
     /// change is predicted to be at most `left` times it. The remaining error has the same direction in every step and
     /// accumulates in proportion to the number of steps, whereas round-off accumulates like its square root.
+    #[inline(always)]
     pub fn until(enough: f64, left: f64) -> Self {
         FixedPointIteration { enough, left, ..FixedPointIteration::default() }
     }

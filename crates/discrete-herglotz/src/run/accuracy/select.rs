@@ -97,8 +97,7 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
     trials.tests_newton_steps = stages > DEFAULT_STAGES;
     // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
     // known.
-    let divides = const { L::HINTS.proved || L::HINTS.switching_functions };
-    trials.tests_uneven_steps = divides;
+    trials.tests_uneven_steps = const { L::HINTS.proved || L::HINTS.switching_functions };
     let mut found = by_equal_steps(trials, &gauss(stages), stages);
     trials.tests_newton_steps = false;
     if let Err(Ended::Switch { reason: SwitchReason::FewerStages, .. }) = found {
@@ -106,7 +105,10 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
         found = by_equal_steps(trials, &gauss(stages), stages);
     }
     (trials.tests_transformation, trials.tests_uneven_steps) = (false, false);
-    if let Err(Ended::Switch { reason: SwitchReason::Divided, .. }) = found {
+    // Written so that divided steps are not compiled where they are never taken.
+    if const { L::HINTS.proved || L::HINTS.switching_functions }
+        && let Err(Ended::Switch { reason: SwitchReason::Divided, .. }) = found
+    {
         match divided_steps(trials) {
             Ok(selection) => return Ok(selection),
             Err(interrupted @ InputError::Interrupted) => return Err(interrupted),
@@ -115,8 +117,8 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
     }
     // If a part of the motion requires much shorter steps than the rest, the steps are divided; if this fails too, the
     // first error is returned.
-    if let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
-        && divides
+    if const { L::HINTS.proved || L::HINTS.switching_functions }
+        && let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
         && !matches!(cause, SelectionFailure::RoundOff | SelectionFailure::Chaos { .. })
     {
         return divided_steps(trials).map_err(|divided| match divided {
@@ -124,6 +126,9 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
             InputError::Interrupted => divided,
             _ => *refused,
         });
+    }
+    if const { !L::HINTS.time_transformation } {
+        return Ok(found?);
     }
     let Err(Ended::Switch { reason: SwitchReason::TimeTransformation, .. }) = found else { return Ok(found?) };
     // If the search in transformed time fails, equal steps are tried.
