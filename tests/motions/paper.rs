@@ -14,7 +14,7 @@ mod steps;
 mod table;
 
 use contact_geom::{Statement, statements as continuous};
-use discrete_herglotz::theory::statements as discrete;
+use discrete_herglotz::statements as discrete;
 use exact_lagrangian::statements as exact;
 use std::collections::BTreeSet;
 use table::Row;

@@ -82,18 +82,18 @@ pub mod switching {
 pub use dynamics::{
     AsFunction, AtEnergy, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced,
     HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, InTransformedTime, Lagrangian,
-    Legendre, Lifted, LiftedAction, NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup, Parametric,
-    ParametricForce, ParametricHamiltonian, Quotient, Regularity, Structure, Symmetry, TimesRate, UnknownParameter,
+    LagrangianForm, Legendre, Lifted, LiftedAction, NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup,
+    Parametric, ParametricForce, ParametricHamiltonian, Quotient, Structure, Symmetry, TimesRate, UnknownParameter,
     VectorField, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
     legendre_jacobian, momentum, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{
     ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form,
-    LagrangianForm, LegendrianDefect, OnParameters, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction,
-    VelocityPoint, conformality, legendrian_defect,
+    LegendrianDefect, OnParameters, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, VelocityPoint, conformality,
+    legendrian_defect,
 };
-pub use number::{Dual, Scalar};
+pub use number::{Dual, Regularity, Scalar};
 pub use statement::Statement;
 
 pub use nalgebra;

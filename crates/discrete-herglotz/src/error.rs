@@ -1,6 +1,9 @@
 //! Errors of the input and of the steps, and the status of a run.
 
-use crate::constraints::ConstraintError;
+mod constraints;
+
+pub use constraints::ConstraintError;
+
 use contact_geom::GeometryError;
 use thiserror::Error;
 

@@ -7,7 +7,7 @@
 //!
 //! A [`Problem`] is a Lagrangian with an initial state. With an [`Integrator`] and a choice of [`Steps`] it becomes a
 //! [`Run`], whose output goes to [`Observer`]s. A [`Method`](rules::Method) constructs a discrete Lagrangian from a
-//! Lagrangian; [`statements`](theory::statements) evaluates the statements of the paper for a discrete Lagrangian.
+//! Lagrangian; [`statements`] evaluates the statements of the paper for a discrete Lagrangian.
 //!
 //! ```
 //! use contact_examples::systems::DoublePendulum;
@@ -43,6 +43,7 @@ mod run;
 pub mod sensitivity;
 pub mod solve;
 pub mod splitting;
+pub mod statements;
 mod status;
 mod switching;
 #[cfg(test)]

@@ -41,17 +41,19 @@ mod memory;
 mod monitor;
 mod potential;
 mod potential_list;
+mod rattle;
 mod splitting;
 mod stages;
 mod system;
 pub mod systems;
 
-pub use constraints::{Distance, DistanceToPoint, LocalConstraint, SparseRattle};
+pub use constraints::{Distance, DistanceToPoint, LocalConstraint};
 pub use elements::{ElementData, FIXED};
 pub use error::SparseError;
 pub use implicit::{SparseGauss, SparseMidpoint};
 pub use local_lagrangian::LocalLagrangian;
 pub use potential::{Difference, Potential};
+pub use rattle::SparseRattle;
 pub use splitting::SparseSplitting;
 pub use system::{SparseSystem, State};
 

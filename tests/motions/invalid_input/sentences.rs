@@ -71,7 +71,7 @@ fn geometry_errors() {
         GeometryError::Undefined { .. } => {
             let ld = Rectangle::new(One::from(Odd::Explosive), 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
-            discrete_herglotz::theory::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
+            discrete_herglotz::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];
     });
     // The message names the remedy.

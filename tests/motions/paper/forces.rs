@@ -8,7 +8,7 @@ use contact_examples::systems::{Kepler, System};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Force, Forced, Lagrangian, Scalar, Statement, VelocityPoint, legendre, statements::AnyForce};
 use discrete_herglotz::gauss::VirtualWork;
-use discrete_herglotz::theory::statements::forced_residual;
+use discrete_herglotz::statements::forced_residual;
 
 /// The statement about motions at a point of a system.
 pub const AT_POINTS: &[Row] = &[Row::new(Statement::ForcedEnergy, TOLERANCE)];

@@ -10,7 +10,7 @@ use contact_geom::{Statement, VelocityPoint, legendre, statements as continuous}
 use discrete_herglotz::{
     InputError,
     rules::{AnyDiscreteLagrangian, Method},
-    theory::statements as discrete,
+    statements as discrete,
 };
 use exact_lagrangian::{ExactError, statements as exact};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -15,6 +15,7 @@ mod impact;
 mod impact_parameters;
 mod lagrangian;
 mod lagrangian_enum;
+mod lagrangian_form;
 mod law_derivatives;
 pub(crate) mod nearest_name;
 pub(crate) mod parameters;
@@ -38,11 +39,12 @@ pub use hamiltonian::{
     lie_derivative,
 };
 pub use herglotz::{
-    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
-    legendre, legendre_jacobian, regularity,
+    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, herglotz_field, herglotz_rates, legendre,
+    legendre_jacobian, regularity,
 };
 pub use impact::{Impact, Impacts, Surface};
 pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};
+pub use lagrangian_form::LagrangianForm;
 pub use parameters::{Parametric, ParametricForce, UnknownParameter, indexed_names};
 pub use probe::check_closed_derivatives;
 pub use rounding::{gradient_rounding, rounding_at_state};

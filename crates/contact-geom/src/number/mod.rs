@@ -9,6 +9,7 @@ mod module;
 #[cfg(feature = "num-dual")]
 mod num_dual;
 mod operators;
+mod regularity;
 pub(crate) mod rounded;
 mod scalar;
 mod vector;
@@ -18,5 +19,6 @@ pub use dual::{Dual, KernelDual};
 pub use legendre_polynomials::legendre_polynomials;
 pub use max_or_nan::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan, max_or_nan};
 pub use module::{AugmentedVector, TangentVector};
+pub use regularity::Regularity;
 pub use scalar::Scalar;
 pub use vector::vector_of;

@@ -12,7 +12,6 @@
 
 mod constrained;
 mod drag_rattle;
-mod error;
 mod lagrange_d_alembert;
 mod linear_system;
 mod lobatto;
@@ -22,9 +21,9 @@ mod nonholonomic;
 mod start;
 mod variation;
 
+pub use crate::error::ConstraintError;
 pub use constrained::{Constrained, ConstrainedMethod};
 pub use drag_rattle::{DragRattle, RattleStep};
-pub use error::ConstraintError;
 pub use lagrange_d_alembert::LagrangeDAlembert;
 pub use lobatto::{ContactLobatto, LobattoStep};
 pub use nonholonomic::Nonholonomic;

@@ -6,10 +6,10 @@
 use crate::DenseStep;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::gauss::tables::condensed::Condensed;
+use crate::integration::SolvedStages;
 use crate::integration::dense_step::Series;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::saved;
-use crate::sensitivity::SolvedStages;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint};
 

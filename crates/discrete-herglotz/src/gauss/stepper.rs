@@ -23,11 +23,11 @@ use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::GaussRoute;
 use crate::gauss::work_summary::work_summary;
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
 use crate::resolution::thresholds::FEW_STAGES;
-use crate::sensitivity::SolvedStages;
 use crate::solve::mass_matrix::is_identity;
 use crate::{
     DenseStep, InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions, UnresolvedStep,

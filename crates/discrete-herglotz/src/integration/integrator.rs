@@ -1,6 +1,6 @@
 //! Integrators: the trait, the properties of a method and the options of its stepper.
 
-use crate::rules::Node;
+use crate::integration::Node;
 use crate::{InputError, Problem, SplittingScheme, StepError, Stepper};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, PhasePoint, VelocityPoint};

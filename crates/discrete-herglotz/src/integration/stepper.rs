@@ -1,7 +1,7 @@
 //! Steppers: a method applied to one motion.
 
 use crate::integration::{Piece, Reset};
-use crate::sensitivity::{SolvedPart, SolvedStages};
+use crate::integration::{SolvedPart, SolvedStages};
 use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;

@@ -1,7 +1,7 @@
 //! Discrete Lagrangians by quadrature of the action: the common part of the rules of [`crate::rules`].
 
+use crate::integration::Node;
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
-use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
 use crate::solve::newton::{Linearised, NewtonStart, max_abs, newton};
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};

@@ -1,6 +1,6 @@
 //! The step equations of a quadrature rule, with derivatives of L only along the directions that a Newton step needs.
 
-use crate::rules::node::Node;
+use crate::integration::Node;
 pub(crate) use crate::solve::mass_matrix::BLOCK;
 use crate::solve::unknowns::Unknowns;
 use contact_geom::nalgebra::{SMatrix, SVector};

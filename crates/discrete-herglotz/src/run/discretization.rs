@@ -1,14 +1,14 @@
 //! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
+use crate::integration::StepEnds;
+use crate::integration::WholeStep;
+use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::integration::{AtState, at_state};
 use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
-use crate::run::motion::{Motion, NearbyVelocity};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, Shared, StepSelection};
-use crate::sensitivity::flows::StepEnds;
-use crate::sensitivity::step_tangent::WholeStep;
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};

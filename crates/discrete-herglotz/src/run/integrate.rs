@@ -1,10 +1,10 @@
 //! The main loop of a run.
 
+use crate::integration::motion::Motion;
 use crate::run::checks::rest::{REST, is_at_rest};
 use crate::run::checks::{Checks, TakenSteps, single_step_stop};
 use crate::run::end_within_step::end_within_step;
 use crate::run::findings::Findings;
-use crate::run::motion::Motion;
 use crate::run::observers::observer::Observer;
 use crate::run::observers::output_request::{OutputRequest, RunInfo};
 use crate::run::observers::step_view::{StepView, Stop};

@@ -8,7 +8,6 @@ pub(crate) mod discretization;
 mod end_within_step;
 mod findings;
 mod integrate;
-mod motion;
 mod observers;
 mod outcome;
 mod plan;
@@ -20,7 +19,6 @@ pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use builder::Run;
 pub(crate) use checks::energy::may_drift;
 pub use checks::energy_drift::{EnergyDrift, EnergySample};
-pub(crate) use motion::Motion;
 pub use observers::checkpoint::Checkpoint;
 #[cfg(feature = "csv")]
 pub use observers::csv_rows::CsvRows;

@@ -1,9 +1,10 @@
 //! Columns that are carried along the steps of a run.
 
+use crate::integration::WholeStep;
 use crate::run::discretization::Discretization;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::row_times::RowTimes;
-use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep, WholeStep};
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::{SwitchTime, TangentRow, row};
 use crate::sensitivity::{EndState, SensitivityError};
 use contact_geom::Parametric;

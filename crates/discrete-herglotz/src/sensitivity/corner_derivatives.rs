@@ -5,10 +5,11 @@
 //! `((v- - v+) . dp- + [L_q] . dq + [L_z] dz + [L_t] dt + [L_theta] dtheta - lambda (v+ . dg_q + dg_t)) / (v+ . g_q + g_t)`
 //! with the jumps [] from before to after, each at its own velocity.
 
+use crate::integration::PartPoint;
+use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::switch::{Argument, Switch, difference};
-use crate::sensitivity::{PartPoint, SensitivityError};
 use crate::{StepError, theory::legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};

@@ -4,14 +4,15 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::integration::QuantityDerivatives;
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
-use crate::sensitivity::SolvedStages;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
 use crate::sensitivity::stage_system::StageSystem;
 use crate::sensitivity::step_maps::{Direction, StepMaps};

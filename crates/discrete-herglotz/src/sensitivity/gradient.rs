@@ -1,7 +1,11 @@
 //! Gradients of functions of the end of a run, by the adjoint.
 
+use crate::integration::Motion;
+use crate::integration::PartPoint;
+use crate::integration::WholeStep;
 use crate::run::discretization::Discretization;
-use crate::run::{Motion, Outcome, Plan, Row, Rows, Run, Until};
+use crate::run::{Outcome, Plan, Row, Rows, Run, Until};
+use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
 use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
 use crate::sensitivity::gradient_parts::PartCovectors;
@@ -9,9 +13,8 @@ use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::row_times::{check_times, is_same_time};
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep, WholeStep};
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::no_tangent;
-use crate::sensitivity::{PartPoint, SensitivityError};
 use crate::{InputError, Problem, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};

@@ -6,12 +6,13 @@
 //! function to the function, as a multiple of its own derivatives carried back over the same part.
 
 use crate::StepError;
+use crate::integration::{PartEnd, SolvedPart};
 use crate::run::discretization::Discretization;
+use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
 use crate::sensitivity::gradient::RowCovectors;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent};
 use crate::sensitivity::switch::Switch;
-use crate::sensitivity::{PartEnd, SensitivityError, SolvedPart};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{ChartVector, Parametric};

@@ -1,10 +1,11 @@
 //! Derivatives of L and of the force with respect to parameters and time, at a point.
 
+use crate::integration::QuantityDerivatives;
 use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{Stages, blocks};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::stage_derivatives::StageDerivatives;
-use contact_geom::nalgebra::{ArrayStorage, SVector};
+use contact_geom::nalgebra::SVector;
 use contact_geom::support::{KernelDual, seed};
 use contact_geom::{ChartVector, Derivatives, Dual, Parametric, PhasePoint, VelocityPoint, vector};
 use num_traits::{One, Zero};
@@ -22,33 +23,6 @@ type WithGradient<const N: usize> = Dual<Dual<f64, ChartVector<N>>, SVector<Dual
 
 /// A number with its derivatives along two directions, and the mixed one.
 type AlongTwo = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
-
-/// The derivatives of L, of its gradient, and of the force with respect to a quantity: `L_theta`,
-/// `(L_qtheta, L_vtheta, L_ztheta)`, `f_theta`.
-pub(crate) struct QuantityDerivatives<const N: usize> {
-    pub l: f64,
-    pub gradient: ChartVector<N>,
-    pub force: SVector<f64, N>,
-}
-
-impl<const N: usize> QuantityDerivatives<N> {
-    pub const ZERO: Self = QuantityDerivatives {
-        l: 0.0,
-        gradient: ChartVector {
-            x: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-            y: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-            z: 0.0,
-        },
-        force: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-    };
-
-    /// Adds a multiple of other derivatives.
-    pub fn add(&mut self, factor: f64, other: &Self) {
-        self.l += factor * other.l;
-        self.gradient = self.gradient.plus(other.gradient.scale(factor));
-        self.force += other.force * factor;
-    }
-}
 
 /// Evaluates derivatives with respect to the parameters of a Lagrangian, with buffers for their values.
 pub(crate) struct ParameterDerivatives<const N: usize> {

@@ -1,11 +1,12 @@
 //! The derivatives of a system that the tangent of a collocation step needs.
 
 use crate::StepError;
+use crate::integration::QuantityDerivatives;
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
-use crate::sensitivity::SolvedStages;
 use crate::sensitivity::linear_stages::StageTangent;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use contact_geom::nalgebra::SVector;

@@ -1,14 +1,14 @@
 //! The tangent of the steps of a run, for every integrator that has one. Steps with several parts are those of
 //! [`tangent_parts`](crate::sensitivity::tangent_parts) and [`gradient_parts`](crate::sensitivity::gradient_parts).
 
+use crate::integration::{SolvedPart, StepEnds, WholeStep};
 use crate::run::discretization::Discretization;
+use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::engine::Engine;
-use crate::sensitivity::flows::{FlowEngine, StepEnds};
+use crate::sensitivity::flows::FlowEngine;
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::{SensitivityError, SolvedPart, SolvedStages};
 use crate::{Problem, StepError, Stepper};
-use contact_geom::nalgebra::SVector;
 use contact_geom::{Parametric, PhasePoint};
 
 /// A step that was taken, with what its tangent needs.
@@ -17,42 +17,6 @@ pub(crate) enum TakenStep<const N: usize> {
     Whole(WholeStep<N>),
     /// The parts of a step that ends parts at zeros of switching functions and at breaks.
     Parts(Vec<SolvedPart<N>>),
-}
-
-/// A step, or a part of one, that nothing interrupts.
-#[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
-pub(crate) enum WholeStep<const N: usize> {
-    /// The stages of a collocation step.
-    Collocation(SolvedStages<N>),
-    /// The ends of a step that consists of sub-flows.
-    Flow(StepEnds<N>),
-}
-
-impl<const N: usize> WholeStep<N> {
-    /// The time and the state at the start.
-    pub fn start(&self) -> (f64, &PhasePoint<N>) {
-        match self {
-            WholeStep::Collocation(step) => (step.t, &step.start),
-            WholeStep::Flow(step) => (step.t, &step.start),
-        }
-    }
-
-    /// The length.
-    pub fn length(&self) -> f64 {
-        match self {
-            WholeStep::Collocation(step) => step.h,
-            WholeStep::Flow(step) => step.h,
-        }
-    }
-
-    /// A velocity within the step.
-    pub fn velocity(&self) -> SVector<f64, N> {
-        match self {
-            WholeStep::Collocation(step) => SVector::from_fn(|d, _| step.v[d].0[0]),
-            WholeStep::Flow(step) => (step.end.q - step.start.q) / step.h,
-        }
-    }
 }
 
 /// The tangent of the steps of an integrator, forward or as its adjoint.

@@ -1,10 +1,11 @@
 //! The derivatives of a switching function and of a reset at its zero.
 
+use crate::integration::{PartPoint, Passage};
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::corner_derivatives::CornerDerivatives;
 use crate::sensitivity::end_state::{EndCovector, VelocityDependence};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use crate::sensitivity::{PartPoint, Passage, SensitivityError, ridders};
+use crate::sensitivity::{SensitivityError, ridders};
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;

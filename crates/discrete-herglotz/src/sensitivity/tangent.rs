@@ -1,6 +1,7 @@
 //! Forward derivatives of a run.
 
-use crate::run::{Motion, Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
+use crate::integration::Motion;
+use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::end_state::VelocityDependence;

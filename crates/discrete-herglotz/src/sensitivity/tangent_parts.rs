@@ -5,11 +5,12 @@
 //! `dt = -dg / g'`, where dg is the derivative of g for a fixed time and g' its rate in the length of the part: that of
 //! the discrete motion. Then the reset follows, and the next part starts at this time.
 
+use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::switch::Switch;
 use crate::sensitivity::tangent::{SwitchTime, row};
-use crate::sensitivity::{EndState, PartEnd, PartPoint, SensitivityError, SolvedPart};
+use crate::sensitivity::{EndState, SensitivityError};
 use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
 

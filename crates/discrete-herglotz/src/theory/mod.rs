@@ -7,7 +7,6 @@ mod legendre;
 mod legendre_inverse;
 mod momentum;
 mod path;
-pub mod statements;
 
 pub use discrete_forces::{DiscreteForces, ForceSlopes, discrete_forces};
 pub use discrete_lagrangian::{derived_jet, derived_second_jet};

@@ -3,7 +3,7 @@
 use crate::{RuntimeError, StatementResidual};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, numbers::max_or_nan};
-use discrete_herglotz::{AnyIntegrator, DiscreteLagrangian, gauss::Gauss, theory::statements};
+use discrete_herglotz::{AnyIntegrator, DiscreteLagrangian, gauss::Gauss, statements};
 use formula_lagrangian::{Formula, FormulaError};
 
 /// Two positions of a motion that are one step apart, and the action at the first.

@@ -96,7 +96,7 @@ impl<C: LocalConstraint<K, P>, const K: usize, const P: usize> ConstraintList fo
 }
 
 /// The pattern of the Jacobian of all constraints, one row for each, by rows.
-pub(super) struct JacobianPattern {
+pub(crate) struct JacobianPattern {
     /// The index of the first entry of each row, and the number of entries at the end.
     pub row_starts: Vec<usize>,
     /// The padded index of the unknown of each entry.
@@ -144,7 +144,7 @@ impl JacobianPattern {
 }
 
 /// The values of all constraints.
-pub(super) fn values(lists: &[Box<dyn ConstraintList>], q: &[f64], values: &mut [f64]) {
+pub(crate) fn values(lists: &[Box<dyn ConstraintList>], q: &[f64], values: &mut [f64]) {
     let mut done = 0;
     for list in lists {
         done += list.values(q, &mut values[done..]);
@@ -152,7 +152,7 @@ pub(super) fn values(lists: &[Box<dyn ConstraintList>], q: &[f64], values: &mut 
 }
 
 /// The entries of the Jacobian, by rows.
-pub(super) fn gradients(lists: &[Box<dyn ConstraintList>], q: &[f64], entries: &mut [f64]) {
+pub(crate) fn gradients(lists: &[Box<dyn ConstraintList>], q: &[f64], entries: &mut [f64]) {
     let mut done = 0;
     for list in lists {
         done += list.gradients(q, &mut entries[done..]);
@@ -160,7 +160,7 @@ pub(super) fn gradients(lists: &[Box<dyn ConstraintList>], q: &[f64], entries: &
 }
 
 /// The second derivatives `v.c_qq v` of all constraints.
-pub(super) fn curvatures(lists: &[Box<dyn ConstraintList>], q: &[f64], v: &[f64], curvatures: &mut [f64]) {
+pub(crate) fn curvatures(lists: &[Box<dyn ConstraintList>], q: &[f64], v: &[f64], curvatures: &mut [f64]) {
     let mut done = 0;
     for list in lists {
         done += list.curvatures(q, v, &mut curvatures[done..]);
@@ -168,7 +168,7 @@ pub(super) fn curvatures(lists: &[Box<dyn ConstraintList>], q: &[f64], v: &[f64]
 }
 
 /// The list and the element of a constraint.
-pub(super) fn element_of(lists: &[Box<dyn ConstraintList>], mut constraint: usize) -> [usize; 2] {
+pub(crate) fn element_of(lists: &[Box<dyn ConstraintList>], mut constraint: usize) -> [usize; 2] {
     for list in lists {
         let mut count = 0;
         list.visit(&mut |_| count += 1);

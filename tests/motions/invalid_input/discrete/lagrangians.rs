@@ -16,11 +16,12 @@ use discrete_herglotz::{
     rules::{Method, Midpoint, Rectangle, Trapezoidal},
     solve::{Solver, last_correction},
     splitting::{ActionStrang, Riccati, Strang},
+    statements,
     theory::{
         DiscretePath, HamiltonianFlow, derived_jet, derived_second_jet, discrete_action, discrete_flow,
         discrete_flow_jacobian, discrete_forces, discrete_momentum, discrete_regularity, discrete_symmetry_defect,
         hamiltonian_flow, hamiltonian_flow_jacobian, legendre_inverse, legendre_minus, legendre_minus_inverse,
-        legendre_plus, legendre_plus_inverse, sigma_d, statements,
+        legendre_plus, legendre_plus_inverse, sigma_d,
     },
 };
 

@@ -3,7 +3,7 @@
 
 use crate::common::{TOLERANCE, around, on_some, step_from};
 use contact_examples::systems::{System, SystemVisitor, visit_catalogue};
-use discrete_herglotz::theory::statements;
+use discrete_herglotz::statements;
 use exact_lagrangian::ExactLagrangian;
 
 #[test]

@@ -1,11 +1,11 @@
 //! The error estimate of a run with given steps.
 
 use crate::Interrupt;
+use crate::integration::motion::NearbyVelocity;
 use crate::run::accuracy::limits::MAX_UNCHECKED_STEPS;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
-use crate::run::motion::NearbyVelocity;
 use contact_geom::{Lagrangian, PhasePoint};
 
 impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {

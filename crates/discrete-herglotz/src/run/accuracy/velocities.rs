@@ -1,9 +1,9 @@
 //! The velocities of a motion at some times, and its largest speed.
 
 use crate::Problem;
+use crate::integration::motion::NearbyVelocity;
 use crate::run::accuracy::equilibrium_round_off::accumulated_roundings;
 use crate::run::accuracy::track::{in_units, norm};
-use crate::run::motion::NearbyVelocity;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use crate::{InputError, SelectionFailure, theory::legendre_inverse};

@@ -1,7 +1,7 @@
 //! The sign changes of an event function within a step.
 
 use crate::StepError;
-use crate::run::motion::{Motion, NearbyVelocity};
+use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
 use crate::run::observers::last_step::LastStep;

@@ -1,7 +1,7 @@
 //! The last step of a run, with dense output.
 
 use crate::integration::Piece;
-use crate::run::motion::Motion;
+use crate::integration::motion::Motion;
 use crate::solve::chebyshev::node;
 use crate::{DenseStep, StepError, Stepper};
 use contact_geom::PhasePoint;

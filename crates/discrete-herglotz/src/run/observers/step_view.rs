@@ -1,7 +1,7 @@
 //! The view of a step for observers, and the request of an observer to end the run.
 
+use crate::integration::motion::Motion;
 use crate::run::findings::Findings;
-use crate::run::motion::Motion;
 use crate::run::observers::last_step::LastStep;
 use crate::run::resume_state::ResumeState;
 use crate::{Reset, StepError, Stepper};

@@ -1,10 +1,11 @@
 //! Steps of contact Gauss collocation on a contact Hamiltonian.
 
+use super::SubFlows;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
-use super::{StepEnds, SubFlows};
 use crate::StepError;
 use crate::gauss::routes::hamiltonian::{StepDerivatives, step_derivatives};
+use crate::integration::StepEnds;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use contact_geom::{Parametric, PhasePoint};
 

@@ -1,9 +1,11 @@
 //! Steps of a custom discrete Lagrangian, and steps under constraints.
 
+use super::SubFlows;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
-use super::{StepEnds, SubFlows};
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
+use crate::integration::QuantityDerivatives;
+use crate::integration::StepEnds;
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::{Integrator, Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};

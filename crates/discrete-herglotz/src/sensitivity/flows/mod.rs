@@ -19,28 +19,20 @@ mod sub_flow;
 mod tangent_matrix;
 mod velocity_drag;
 
+use crate::integration::StepEnds;
 use crate::integration::StepFormula;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::{Integrator, Problem, StepError};
 use collocation::HamiltonianSteps;
+use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{Parametric, PhasePoint};
 use discrete::DiscreteSteps;
 use rules::Rules;
 use splittings::{ActionFlows, DragFlows, LinearDragFlows};
 use std::sync::Arc;
 use sub_flow::SubFlow;
-
-/// The ends of a step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StepEnds<const N: usize> {
-    pub t: f64,
-    pub h: f64,
-    pub start: PhasePoint<N>,
-    pub end: PhasePoint<N>,
-}
 
 /// A method whose steps are compositions of sub-flows.
 trait SubFlows<const N: usize> {

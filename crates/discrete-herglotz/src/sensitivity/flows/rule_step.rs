@@ -3,8 +3,9 @@
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::StepError;
+use crate::integration::QuantityDerivatives;
 use crate::rules::Node;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity, QuantityDerivatives};
+use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::solve::ITERATION_LIMIT;
 use contact_geom::nalgebra::{DMatrix, DVector, Dyn, LU, SMatrix, SVector};
 use contact_geom::numbers::max_or_nan;

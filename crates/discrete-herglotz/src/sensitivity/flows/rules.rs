@@ -1,9 +1,10 @@
 //! Steps of quadrature rules, and compositions of them.
 
+use super::SubFlows;
 use super::rule_step::RuleStep;
 use super::sub_flow::SubFlow;
-use super::{StepEnds, SubFlows};
 use crate::StepError;
+use crate::integration::StepEnds;
 use crate::rules::Node;
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use contact_geom::Parametric;

@@ -1,7 +1,7 @@
 //! The stepper as seen by a run: its steps, its state, and its words for a resumed run.
 
+use crate::integration::{SolvedPart, SolvedStages};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
-use crate::sensitivity::{SolvedPart, SolvedStages};
 use crate::status::first;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::as_stepper::AsStepper;

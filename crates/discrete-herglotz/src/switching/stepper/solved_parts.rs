@@ -1,7 +1,7 @@
 //! The parts of the last step with their stages and with what happened at their ends, for derivatives.
 
-use crate::sensitivity::step_tangent::WholeStep;
-use crate::sensitivity::{PartEnd, PartPoint, SolvedPart};
+use crate::integration::WholeStep;
+use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::surfaces::TimedState;

@@ -4,7 +4,7 @@ use contact_examples::systems::System;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legendre};
-use discrete_herglotz::theory::statements::{STATEMENTS, residual};
+use discrete_herglotz::statements::{STATEMENTS, residual};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,
     rules::{Method, Quadrature, Rule, RuleVisitor},

@@ -1,8 +1,8 @@
 //! Starts of motions under constraints of elements: checks and projections.
 
-use super::jacobian::element_of;
 use super::solver::ConstraintSolver;
 use crate::SparseError;
+use crate::constraints::jacobian::element_of;
 use crate::implicit::{NewtonConvergence, NewtonDecision, max_norm};
 use discrete_herglotz::{StepError, constraints::OffConstraint, solve::ITERATION_LIMIT};
 

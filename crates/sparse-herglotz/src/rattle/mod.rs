@@ -1,6 +1,9 @@
 //! RATTLE with a drag for large systems with constraints, and its compositions.
 
-use super::solver::ConstraintSolver;
+mod gram;
+mod solver;
+mod start;
+
 use crate::SparseError;
 use crate::blocks::BLOCK_SIZE;
 use crate::drag::Drag;
@@ -9,6 +12,7 @@ use crate::monitor::{EnergyMonitor, RunProgress, StepInfo};
 use crate::system::{MassSource, SparseSystem, State};
 use discrete_herglotz::constraints::OffConstraint;
 use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, UnresolvedStep};
+use solver::ConstraintSolver;
 
 /// RATTLE between two halves of a linear drag, `D_(h/2) o RATTLE_h o D_(h/2)`, and its symmetric compositions of order
 /// up to 10, for `L = sum m_i v_i^2/2 - V(t, q) + gamma z` on constraints `c_e(q_e) = 0` of elements: chains, nets and

@@ -1,7 +1,7 @@
 //! Statements on symmetries and their momenta.
 
 use crate::DiscreteLagrangian;
-use crate::theory::statements::measures::jets;
+use crate::statements::measures::jets;
 use crate::theory::{discrete_flow, discrete_momentum};
 use contact_geom::{
     ChartVector, ContactForm, DiscretePoint, EtaMinus, EtaPlus, GeometryError, OneParameterGroup, Scalar, Smooth,

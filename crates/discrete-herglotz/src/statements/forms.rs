@@ -1,7 +1,7 @@
 //! Statements on the contact forms eta+ and eta-.
 
 use crate::DiscreteLagrangian;
-use crate::theory::statements::measures::{jets, pull, relative};
+use crate::statements::measures::{jets, pull, relative};
 use crate::theory::{derived_jet, derived_second_jet, discrete_flow, discrete_flow_jacobian};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{

@@ -1,7 +1,7 @@
 //! The matrix of the multipliers, `G M^-1 G^T`, and its factors.
 
-use super::jacobian::JacobianPattern;
 use crate::SparseError;
+use crate::constraints::jacobian::JacobianPattern;
 use crate::implicit::{CholeskyFactors, FullPattern, LowerPattern, LuFactors};
 use discrete_herglotz::StepError;
 

@@ -1,7 +1,7 @@
 //! Statements on the Legendre transformations and on the flows.
 
 use crate::DiscreteLagrangian;
-use crate::theory::statements::measures::{jets, pull, relative, relative_vector};
+use crate::statements::measures::{jets, pull, relative, relative_vector};
 use crate::theory::{
     DiscretePath, HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian,
     legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse,

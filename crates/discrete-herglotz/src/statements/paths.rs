@@ -1,6 +1,6 @@
 //! Statements on the discrete action along paths.
 
-use crate::theory::statements::measures::relative_vector;
+use crate::statements::measures::relative_vector;
 use crate::theory::{DiscretePath, discrete_action, discrete_flow};
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::SVector;

@@ -1,8 +1,7 @@
 //! The parts of a step that ends parts at zeros of switching functions and at breaks.
 
 use crate::StepError;
-use crate::run::Motion;
-use crate::sensitivity::step_tangent::WholeStep;
+use crate::integration::{Motion, WholeStep};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, PhasePoint, VelocityPoint};
 

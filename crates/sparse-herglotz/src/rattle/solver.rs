@@ -1,8 +1,8 @@
 //! The multipliers of RATTLE: positions on the constraints, and velocities tangent to them.
 
 use super::gram::GramMatrix;
-use super::jacobian::{ConstraintList, JacobianPattern, curvatures, gradients, values};
 use crate::SparseError;
+use crate::constraints::jacobian::{ConstraintList, JacobianPattern, curvatures, gradients, values};
 use crate::implicit::{NewtonConvergence, NewtonDecision, max_norm};
 use crate::memory::memory_limit;
 use crate::system::SparseSystem;

@@ -4,7 +4,7 @@ use crate::DiscreteLagrangian;
 use crate::gauss::VirtualWork;
 use crate::rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 use crate::solve::Solver;
-use crate::theory::statements::measures::pull;
+use crate::statements::measures::pull;
 use crate::theory::{discrete_forces, discrete_momentum, hamiltonian_flow_jacobian, legendre_minus, legendre_plus};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
