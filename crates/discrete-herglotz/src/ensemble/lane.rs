@@ -65,6 +65,7 @@ fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bo
 }
 
 /// Flags members as interrupted: each then has a run of its own, which reports how far it came.
+#[inline(never)]
 pub(crate) fn interrupt<const N: usize>(members: &mut [Lane<N>]) {
     members.iter_mut().for_each(|lane| lane.status = LaneStatus::Interrupted);
 }

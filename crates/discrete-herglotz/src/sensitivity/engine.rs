@@ -215,8 +215,10 @@ impl<'a, const N: usize> Engine<'a, N> {
         self.linear.solve::<S>(&self.maps, &self.given, &mut covector.rates)?;
         self.add_derivatives::<S>(step, k, covector);
         let (rates, maps) = (&covector.rates, &self.maps);
-        covector.p = SVector::from_fn(|d, _| w_q[d] + end_value::<S>(maps, &rates.v[d]));
-        covector.q = SVector::from_fn(|d, _| covector.q[d] - end_value::<S>(maps, &rates.p_rate[d]));
+        for d in 0..N {
+            covector.p[d] = w_q[d] + end_value::<S>(maps, &rates.v[d]);
+            covector.q[d] -= end_value::<S>(maps, &rates.p_rate[d]);
+        }
         covector.z += end_value::<S>(maps, &rates.r_rate);
         covector.warm = true;
         Ok(())
@@ -240,7 +242,10 @@ impl<'a, const N: usize> Engine<'a, N> {
         }
         if self.timed {
             let time = self.derivative_in(Quantity::Time, &covector.rates, &weights);
-            let moved = Stages(std::array::from_fn(|i| weights.0[i] * self.forward.times.0[i] / step.h));
+            let mut moved = product(&weights, &self.forward.times);
+            for moved in &mut moved.0 {
+                *moved /= step.h;
+            }
             covector.time += time;
             covector.step += k as f64 * time + self.derivative_in(Quantity::Time, &covector.rates, &moved);
         }
@@ -303,12 +308,19 @@ impl<const N: usize> WithSimd for Pull<'_, '_, N> {
 /// and of r'.
 #[inline(always)]
 fn extrapolate<S: Simd, const N: usize>(maps: &StepMaps, rates: &mut StageTangent<N>, [of_motion, of_r]: [f64; 2]) {
-    let apply = |rates: &mut Stages, factor: f64| {
-        let next = maps.extrapolated::<S>(rates);
-        *rates = next.map(|x| factor * x);
-    };
-    rates.v.iter_mut().for_each(|v| apply(v, of_motion));
-    apply(&mut rates.z_rate, of_motion);
-    apply(&mut rates.r_rate, of_r);
-    rates.p_rate.iter_mut().for_each(|rate| apply(rate, of_r));
+    for d in 0..N {
+        extrapolate_rates::<S>(maps, &mut rates.v[d], of_motion);
+        extrapolate_rates::<S>(maps, &mut rates.p_rate[d], of_r);
+    }
+    extrapolate_rates::<S>(maps, &mut rates.z_rate, of_motion);
+    extrapolate_rates::<S>(maps, &mut rates.r_rate, of_r);
+}
+
+#[inline(always)]
+fn extrapolate_rates<S: Simd>(maps: &StepMaps, rates: &mut Stages, factor: f64) {
+    let mut next = maps.extrapolated::<S>(rates);
+    for x in &mut next.0 {
+        *x *= factor;
+    }
+    *rates = next;
 }

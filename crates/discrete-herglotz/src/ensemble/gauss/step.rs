@@ -223,16 +223,17 @@ fn combined<S: Simd, const K: usize, const N: usize>(
     s: usize,
 ) -> [SimdBatch<S, K>; N] {
     let (mut sum, mut odd) = ([SimdBatch::zero(); N], [SimdBatch::zero(); N]);
-    let (coefficients, values) = (row[..s].chunks_exact(2), values[..s].chunks_exact(2));
-    if let ([c], [value]) = (coefficients.remainder(), values.remainder()) {
+    let (row, values) = (&row[..s], &values[..s]);
+    if s % 2 == 1 {
         for d in 0..N {
-            odd[d] = SimdBatch::splat(*c) * value[d];
+            odd[d] = SimdBatch::splat(row[s - 1]) * values[s - 1][d];
         }
     }
-    for (c, value) in coefficients.zip(values) {
+    for pair in 0..s / 2 {
+        let (i, j) = (2 * pair, 2 * pair + 1);
         for d in 0..N {
-            sum[d] = SimdBatch::splat(c[0]).mul_add(value[0][d], sum[d]);
-            odd[d] = SimdBatch::splat(c[1]).mul_add(value[1][d], odd[d]);
+            sum[d] = SimdBatch::splat(row[i]).mul_add(values[i][d], sum[d]);
+            odd[d] = SimdBatch::splat(row[j]).mul_add(values[j][d], odd[d]);
         }
     }
     for d in 0..N {

@@ -196,8 +196,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
         StepStart { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
     }
 
+    #[inline(always)]
     fn is_finite(&self) -> bool {
-        self.q.iter().chain(&self.v).chain([&self.z]).all(|x| x.value.is_finite())
+        let mut finite = self.z.value.is_finite();
+        for i in 0..N {
+            finite &= self.q[i].value.is_finite() && self.v[i].value.is_finite();
+        }
+        finite
     }
 
     /// Takes one step.
@@ -218,11 +223,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
             self.z.add(Unevaluated { head: change, tail: 0.0 } + self.grow * self.z.value);
         }
         for i in 0..N {
-            let row = |of_q: &[Unevaluated; N], of_v: &[Unevaluated; N], shift: Unevaluated| {
-                (0..N).fold(shift, |sum, j| sum.plus(of_q[j].times(q[j]).plus(of_v[j].times(v[j]))))
-            };
-            self.q[i].add(row(&self.qq[i], &self.qv[i], self.shift_q[i]));
-            self.v[i].add(row(&self.vq[i], &self.vv[i], self.shift_v[i]));
+            let (mut dq, mut dv) = (self.shift_q[i], self.shift_v[i]);
+            for j in 0..N {
+                dq = dq.plus(self.qq[i][j].times(q[j]).plus(self.qv[i][j].times(v[j])));
+                dv = dv.plus(self.vq[i][j].times(q[j]).plus(self.vv[i][j].times(v[j])));
+            }
+            self.q[i].add(dq);
+            self.v[i].add(dv);
         }
     }
 

@@ -79,18 +79,40 @@ impl<const N: usize> StageTangent<N> {
     };
 
     /// Adds a multiple of the rates of another tangent; the values at the stages follow from the rates.
+    #[inline(always)]
     pub fn add_multiple(&mut self, factor: f64, other: &Self) {
-        let pairs = self.v.iter_mut().chain(&mut self.p_rate).zip(other.v.iter().chain(&other.p_rate));
-        let others = [(&mut self.z_rate, &other.z_rate), (&mut self.r_rate, &other.r_rate)];
-        for (to, from) in pairs.chain(others) {
-            to.0.iter_mut().zip(&from.0).for_each(|(to, from)| *to += factor * from);
+        for d in 0..N {
+            add_scaled(&mut self.v[d], factor, &other.v[d]);
+            add_scaled(&mut self.p_rate[d], factor, &other.p_rate[d]);
         }
+        add_scaled(&mut self.z_rate, factor, &other.z_rate);
+        add_scaled(&mut self.r_rate, factor, &other.r_rate);
     }
 
     /// Multiplies the rates by a factor.
+    #[inline(always)]
     pub fn scale(&mut self, factor: f64) {
-        let rates = self.v.iter_mut().chain(&mut self.p_rate).chain([&mut self.z_rate, &mut self.r_rate]);
-        rates.flat_map(|rates| &mut rates.0).for_each(|rate| *rate *= factor);
+        for d in 0..N {
+            scale(&mut self.v[d], factor);
+            scale(&mut self.p_rate[d], factor);
+        }
+        scale(&mut self.z_rate, factor);
+        scale(&mut self.r_rate, factor);
+    }
+}
+
+/// `to += factor from`.
+#[inline(always)]
+fn add_scaled(to: &mut Stages, factor: f64, from: &Stages) {
+    for (to, from) in to.0.iter_mut().zip(&from.0) {
+        *to += factor * from;
+    }
+}
+
+#[inline(always)]
+fn scale(to: &mut Stages, factor: f64) {
+    for to in &mut to.0 {
+        *to *= factor;
     }
 }
 
@@ -172,8 +194,6 @@ impl<const N: usize> LinearStages<N> {
     /// Sets the coefficients from the derivatives at the stages.
     #[inline(always)]
     pub fn set(&mut self, at: &StageDerivatives<N>) {
-        let rho = &at.rho.0;
-        let times = |a: &Stages| Stages(std::array::from_fn(|i| rho[i] * a.0[i]));
         self.inverse_mass = at.inverse_mass;
         self.l_v = at.l_v;
         self.l_z = at.l_z;
@@ -181,18 +201,18 @@ impl<const N: usize> LinearStages<N> {
         self.z_q = at.l_q;
         for d in 0..N {
             for e in 0..N {
-                self.p_q[d][e] = times(&at.qq[d][e]);
+                self.p_q[d][e] = product(&at.rho, &at.qq[d][e]);
                 if self.has_velocity_terms {
-                    self.v_q[d][e] = times(&at.qv[e][d]);
-                    self.p_v[d][e] = times(&at.qv[d][e]);
+                    self.v_q[d][e] = product(&at.rho, &at.qv[e][d]);
+                    self.p_v[d][e] = product(&at.rho, &at.qv[d][e]);
                 }
             }
         }
         if self.coupled {
-            self.r_z = times(&at.zz);
+            self.r_z = product(&at.rho, &at.zz);
             for d in 0..N {
-                self.v_z[d] = times(&at.vz[d]);
-                self.p_z[d] = times(&at.qz[d]);
+                self.v_z[d] = product(&at.rho, &at.vz[d]);
+                self.p_z[d] = product(&at.rho, &at.qz[d]);
                 (self.r_q[d], self.r_v[d]) = (self.p_z[d], self.v_z[d]);
             }
         }
@@ -201,18 +221,18 @@ impl<const N: usize> LinearStages<N> {
             match self.direction {
                 Direction::Forward => {
                     add(&mut self.p_r[d], &force.value[d]);
-                    add(&mut self.p_z[d], &times(&force.z[d]));
+                    add(&mut self.p_z[d], &product(&at.rho, &force.z[d]));
                     for e in 0..N {
-                        add(&mut self.p_q[d][e], &times(&force.q[d][e]));
-                        add(&mut self.p_v[d][e], &times(&force.v[d][e]));
+                        add(&mut self.p_q[d][e], &product(&at.rho, &force.q[d][e]));
+                        add(&mut self.p_v[d][e], &product(&at.rho, &force.v[d][e]));
                     }
                 }
                 Direction::Backward => {
                     add(&mut self.z_q[d], &force.value[d]);
-                    add(&mut self.r_q[d], &times(&force.z[d]));
+                    add(&mut self.r_q[d], &product(&at.rho, &force.z[d]));
                     for e in 0..N {
-                        add(&mut self.p_q[d][e], &times(&force.q[e][d]));
-                        add(&mut self.v_q[d][e], &times(&force.v[e][d]));
+                        add(&mut self.p_q[d][e], &product(&at.rho, &force.q[e][d]));
+                        add(&mut self.v_q[d][e], &product(&at.rho, &force.v[e][d]));
                     }
                 }
             }

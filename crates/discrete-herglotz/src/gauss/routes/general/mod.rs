@@ -444,7 +444,9 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         add(&mut self.p, &dp);
         self.z.add(single(dz));
         self.one_minus_rho = one_minus_rho;
-        self.known = from_fn(|d| self.v[d].0[s - 1]);
+        for d in 0..N {
+            self.known[d] = self.v[d].0[s - 1];
+        }
         self.warm = true;
         IterationOutcome::Done
     }

@@ -279,7 +279,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
         add(&mut self.p, &dp);
         self.z.add(dz);
         self.one_minus_rho = one_minus_rho;
-        self.known = from_fn(|d| self.v[d].0[s - 1]);
+        for d in 0..N {
+            self.known[d] = self.v[d].0[s - 1];
+        }
         self.warm = true;
         IterationOutcome::Done
     }
