@@ -187,7 +187,7 @@ fn what_is_refused_ends_all_ranks() {
     refused(&[(2, "--members 0")], "the ensemble has no members");
     refused(&[(1, "--members 0")], "the ensemble has no members");
     refused(&[(2, "--time NaN")], "member 0: ");
-    refused(&[(2, "--patience=-1")], "--patience: ");
+    refused(&[(2, "--patience=-1")], "--patience");
     // Ranks that disagree, and a rank other than 0 that has nothing to run.
     refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has a different ensemble from rank 0");
     refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has a different ensemble from rank 0");

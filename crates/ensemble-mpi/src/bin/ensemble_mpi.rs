@@ -1,9 +1,4 @@
-//! An ensemble of damped pendula on MPI ranks.
-//!
-//! ```text
-//! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --seed I --checkpoint FILE --out FILE --means
-//!     --patience S --rates]
-//! ```
+//! An ensemble of damped pendula on MPI ranks: `mpirun -np 2 ensemble_mpi`.
 //!
 //! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index.
 //! Writes a CSV file with the final states of the members or their means, with 17 digits each: the same bytes for any
@@ -14,12 +9,12 @@ use clap::Parser;
 use contact_examples::systems::Pendulum;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, Ensemble, Status, Steps, Until, ensemble::Member};
-use ensemble_mpi::{Merged, MpiError, Options, run};
+use ensemble_mpi::{MpiError, run};
 use mpi::topology::Communicator;
-use std::cell::Cell;
+use std::fmt::Arguments as Text;
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -52,7 +47,7 @@ struct Arguments {
     means: bool,
     /// How many seconds to wait for the next shard of a rank; by default without limit.
     #[arg(long, value_name = "SECONDS")]
-    patience: Option<f64>,
+    patience: Option<u64>,
     /// Print statistics of what rank 0 has handed out and received.
     #[arg(long)]
     rates: bool,
@@ -71,58 +66,49 @@ fn random(seed: u64, index: u64) -> f64 {
 
 /// The final states of members, or their means, as lines of a file that gets its name when it is complete.
 struct Table {
-    path: PathBuf,
-    file: BufWriter<File>,
-    /// The number of members that completed and the sums of their q, p and z, where only the means are requested.
-    sums: Option<(usize, [f64; 3])>,
+    part: PathBuf,
+    /// Created with the first line, so that no file is left where the ensemble is refused.
+    file: Option<BufWriter<File>>,
+    means: bool,
+    /// The number of members that completed, and the sums of their q, p and z.
+    completed: (usize, [f64; 3]),
 }
 
 impl Table {
-    fn partial(path: &std::path::Path) -> PathBuf {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".part");
-        name.into()
+    fn line(&mut self, line: Text<'_>) -> io::Result<()> {
+        if self.file.is_none() {
+            self.file = Some(BufWriter::new(File::create(&self.part)?));
+            self.line(format_args!("{}", if self.means { "members,q,p,z" } else { "index,status,t,q,p,z" }))?;
+        }
+        self.file.as_mut().map_or(Ok(()), |file| writeln!(file, "{line}"))
     }
 
-    fn create(path: PathBuf, means: bool) -> std::io::Result<Self> {
-        let mut file = BufWriter::new(File::create(Self::partial(&path))?);
-        writeln!(file, "{}", if means { "members,q,p,z" } else { "index,status,t,q,p,z" })?;
-        Ok(Table { path, file, sums: means.then_some((0, [0.0; 3])) })
+    fn row(&mut self, Member { index, ending, .. }: &Member<1>) -> io::Result<()> {
+        let end = match ending {
+            Ok(end) => end,
+            Err(_) if self.means => return Ok(()),
+            Err(cause) => return self.line(format_args!("{index},\"{cause}\",,,,")),
+        };
+        let x = [end.state.q[0], end.state.p[0], end.state.z];
+        if !self.means {
+            let (status, t, [q, p, z]) = (end.status, end.t, x);
+            return self.line(format_args!("{index},\"{status}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}"));
+        }
+        if end.status == Status::Completed {
+            self.completed.0 += 1;
+            self.completed.1.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+        }
+        Ok(())
     }
 
-    fn row(&mut self, member: &Member<1>) -> std::io::Result<()> {
-        if let Some((count, sums)) = &mut self.sums {
-            if let Ok(end) = member.ending
-                && end.status == Status::Completed
-            {
-                *count += 1;
-                for (sum, x) in sums.iter_mut().zip([end.state.q[0], end.state.p[0], end.state.z]) {
-                    *sum += x;
-                }
-            }
-            return Ok(());
+    fn finish(mut self, path: &Path) -> io::Result<()> {
+        if self.means {
+            let (count, sums) = self.completed;
+            let [q, p, z] = sums.map(|sum| sum / count as f64);
+            self.line(format_args!("{count},{q:.16e},{p:.16e},{z:.16e}"))?;
         }
-        match member.ending {
-            Ok(end) => {
-                let (index, [t, q, p, z]) = (member.index, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
-                writeln!(self.file, "{index},\"{}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}", end.status)
-            }
-            Err(cause) => writeln!(self.file, "{},\"{cause}\",,,,", member.index),
-        }
-    }
-
-    fn finish(mut self) -> std::io::Result<()> {
-        if let Some((count, sums)) = self.sums {
-            match count {
-                0 => writeln!(self.file, "0,,,")?,
-                _ => {
-                    let [q, p, z] = sums.map(|sum| sum / count as f64);
-                    writeln!(self.file, "{count},{q:.16e},{p:.16e},{z:.16e}")?;
-                }
-            }
-        }
-        self.file.flush()?;
-        std::fs::rename(Self::partial(&self.path), self.path)
+        self.file.as_mut().map_or(Ok(()), BufWriter::flush)?;
+        std::fs::rename(self.part, path)
     }
 }
 
@@ -133,74 +119,59 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let world = universe.world();
-    let is_root = world.rank() == 0;
-    let fail = |message: &dyn std::fmt::Display, code: u8| {
-        if is_root {
-            eprintln!("error: {message}");
-        }
-        ExitCode::from(code)
-    };
-    let patience = match arguments.patience.map(Duration::try_from_secs_f64).transpose() {
-        Ok(patience) => patience,
-        Err(cause) => return fail(&format!("--patience: {cause}; give a number of seconds"), 2),
-    };
-
     let pendulum = Pendulum { gamma: -0.01 };
     let start = |index: usize| {
         let number = |k: u64| random(arguments.seed, 2 * index as u64 + k);
         VelocityPoint::new([2.0 * number(0)], [number(1)], 0.0)
     };
-    let tenths = Cell::new(0);
     let mut ensemble = Ensemble::new(&pendulum, 0.0, arguments.members, start)
         .by(arguments.method)
-        .steps(Steps::Count(arguments.steps))
-        .progress(|part| {
-            if (10.0 * part) as u32 > tenths.replace((10.0 * part) as u32) {
-                eprintln!("{:3.0} %", 100.0 * part);
-            }
-        });
+        .steps(Steps::Count(arguments.steps));
     if let Some(path) = &arguments.checkpoint {
         ensemble = ensemble.checkpoint(path);
     }
-    // Created with the first member, so that no file is left where the ensemble is refused.
-    let mut table: Option<std::io::Result<Table>> = None;
-    let clock = Instant::now();
-    let merged = run(&world, &ensemble, Until::Time(arguments.time), Options { patience }, |member| {
-        let open = table.get_or_insert_with(|| Table::create(arguments.out.clone(), arguments.means));
-        if let Ok(rows) = open
-            && let Err(cause) = rows.row(member)
-        {
-            *open = Err(cause);
-        }
-    });
+    let mut part = arguments.out.clone().into_os_string();
+    part.push(".part");
+    let mut table = Table { part: part.into(), file: None, means: arguments.means, completed: (0, [0.0; 3]) };
+    let (clock, mut written) = (Instant::now(), Ok(()));
+    let merged =
+        run(&world, &ensemble, Until::Time(arguments.time), arguments.patience.map(Duration::from_secs), |member| {
+            if written.is_ok() {
+                written = table.row(member);
+            }
+        });
     let merged = match merged {
         Ok(Some(merged)) => merged,
         Ok(None) => return ExitCode::SUCCESS,
-        Err(lost @ MpiError::RankLost { .. }) => {
-            eprintln!("error: {lost}");
-            world.abort(2);
+        Err(cause) => {
+            if world.rank() == 0 || matches!(cause, MpiError::Ensemble(_)) {
+                eprintln!("error: rank {}: {cause}", world.rank());
+            }
+            if matches!(cause, MpiError::RankLost { .. }) {
+                world.abort(2);
+            }
+            return ExitCode::from(2);
         }
-        Err(cause) => return fail(&cause, 2),
     };
-    if let Some(Err(cause)) = table.map(|table| table.and_then(Table::finish)) {
-        return fail(&format!("{}: {cause}", arguments.out.display()), 1);
+    if let Err(cause) = written.and_then(|()| table.finish(&arguments.out)) {
+        eprintln!("error: {}: {cause}", arguments.out.display());
+        return ExitCode::FAILURE;
     }
-    report(&merged, clock.elapsed(), arguments.rates);
-    ExitCode::SUCCESS
-}
-
-fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, rates: bool) {
+    let tally = merged.tally;
     println!("{} members: {} completed, {} failed", tally.members, tally.completed, tally.failed);
-    println!("{resumed} shards read from the checkpoint");
-    if !rates {
-        return;
+    println!("{} shards read from the checkpoint", merged.resumed);
+    if arguments.rates {
+        println!("total time: {:.3} s", clock.elapsed().as_secs_f64());
+        println!("shards by rank: {:?}", merged.shards);
+        let all: usize = merged.shards.iter().sum();
+        let received = (all - merged.shards[0]).max(1);
+        let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
+        println!("bytes of a shard received: {}", merged.bytes / received);
+        println!(
+            "microseconds of rank 0 to receive a shard and assign the next: {:.1}",
+            micro(merged.messages, received)
+        );
+        println!("microseconds of rank 0 to merge a shard: {:.1}", micro(merged.merging, all));
     }
-    println!("total time: {:.3} s", elapsed.as_secs_f64());
-    println!("shards by rank: {:?}", traffic.shards);
-    let all: usize = traffic.shards.iter().sum();
-    let received: usize = traffic.shards.iter().skip(1).sum();
-    let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
-    println!("bytes of a shard received: {}", traffic.bytes / received.max(1));
-    println!("microseconds of rank 0 to receive a shard and assign the next: {:.1}", micro(traffic.messages, received));
-    println!("microseconds of rank 0 to merge a shard: {:.1}", micro(traffic.merging, all));
+    ExitCode::SUCCESS
 }
