@@ -124,12 +124,11 @@ fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
     // The workers that can be given a shard, in turn, once for each. A worker has at most two: one that it computes, and
     // one to continue with while a result is sent.
     let mut free: VecDeque<usize> = workers.clone().chain(workers).collect();
-    let all_free = free.len();
     // The number of open shards of each worker, and when it last sent a result or was given work while it was idle.
     let (mut open, mut last_heard) = (vec![0; ranks], vec![Instant::now(); ranks]);
     let mut merged = Merged { shards: vec![0; ranks], ..Merged::default() };
     let result = std::thread::scope(|scope| {
-        let mut merge = merge?;
+        let (mut merge, all_free) = (merge?, free.len());
         let mut missing = merge.missing().into_iter().peekable();
         merged.resumed = sharded.count() - missing.len();
         let (hand_out, handed_out) = mpsc::channel::<usize>();
@@ -146,11 +145,10 @@ fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
                     last_heard[worker] = clock;
                 }
                 open[worker] += 1;
-                if worker > 0 {
-                    world.process_at_rank(worker as i32).send(&[shard as u64][..]);
-                } else {
+                match worker {
                     // Sending fails where the thread has panicked, which `computed` tells.
-                    let _ = hand_out.send(shard);
+                    0 => drop(hand_out.send(shard)),
+                    _ => world.process_at_rank(worker as i32).send(&[shard as u64][..]),
                 }
             }
             merged.messages += clock.elapsed();
@@ -172,11 +170,11 @@ fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
                     merged.messages += clock.elapsed();
                     break (status.source_rank() as usize, words);
                 }
-                let is_lost =
-                    |rank: &usize| open[*rank] > 0 && patience.is_some_and(|p| last_heard[*rank].elapsed() > p);
-                if let Some(rank) = (1..ranks).find(is_lost) {
-                    let seconds = patience.unwrap_or_default().as_secs_f64();
-                    return Err(MpiError::RankLost { rank, open: open[rank], seconds });
+                if let Some(patience) = patience
+                    && let Some(rank) =
+                        (1..ranks).find(|rank| open[*rank] > 0 && last_heard[*rank].elapsed() > patience)
+                {
+                    return Err(MpiError::RankLost { rank, open: open[rank], seconds: patience.as_secs_f64() });
                 }
                 std::thread::sleep(PROBE_INTERVAL);
             };

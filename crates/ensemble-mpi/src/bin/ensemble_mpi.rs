@@ -1,17 +1,16 @@
 //! An ensemble of damped pendula on MPI ranks: `mpirun -np 2 ensemble_mpi`.
 //!
 //! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index.
-//! Writes a CSV file with the final states of the members or their means, with 17 digits each: the same bytes for any
-//! number of ranks, and for runs that were killed and resumed from the checkpoint. The exit code is 2 where the input
-//! is refused, a checkpoint cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
+//! Writes a CSV file with the final states of the members, with 17 digits each: the same bytes for any number of ranks,
+//! and for runs that were resumed from the checkpoint. The exit code is 2 where the input is refused, a checkpoint
+//! cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
 
 use clap::Parser;
 use contact_examples::systems::Pendulum;
 use contact_geom::VelocityPoint;
-use discrete_herglotz::{AnyIntegrator, Ensemble, Status, Steps, Until, ensemble::Member};
+use discrete_herglotz::{AnyIntegrator, Ensemble, Steps, Until, ensemble::Member};
 use ensemble_mpi::{MpiError, run};
 use mpi::topology::Communicator;
-use std::fmt::Arguments as Text;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -33,18 +32,12 @@ struct Arguments {
     /// The integrator.
     #[arg(long, default_value = "blanes_moan_6")]
     method: AnyIntegrator,
-    /// The seed of the random initial states, in addition to the index.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     /// A file with the shards that are done, from which the run is resumed.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
     /// The file for the final states.
     #[arg(long, value_name = "FILE", default_value = "ensemble_mpi.csv")]
     out: PathBuf,
-    /// Write only the means of the final states.
-    #[arg(long)]
-    means: bool,
     /// How many seconds to wait for the next shard of a rank; by default without limit.
     #[arg(long, value_name = "SECONDS")]
     patience: Option<u64>,
@@ -54,59 +47,36 @@ struct Arguments {
 }
 
 /// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at an index: a number in `[-1, 1)`.
-fn random(seed: u64, index: u64) -> f64 {
-    let mixed = |x: u64| {
-        let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
-    let word = mixed(mixed(seed).wrapping_add((index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-    (word >> 11) as f64 * f64::EPSILON - 1.0
+fn random(index: u64) -> f64 {
+    let x = (index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((x ^ (x >> 31)) >> 11) as f64 * f64::EPSILON - 1.0
 }
 
-/// The final states of members, or their means, as lines of a file that gets its name when it is complete.
+/// The final states of members as lines of a file that gets its name when it is complete.
 struct Table {
     part: PathBuf,
-    /// Created with the first line, so that no file is left where the ensemble is refused.
+    /// Created with the first member, so that no file is left where the ensemble is refused.
     file: Option<BufWriter<File>>,
-    means: bool,
-    /// The number of members that completed, and the sums of their q, p and z.
-    completed: (usize, [f64; 3]),
 }
 
 impl Table {
-    fn line(&mut self, line: Text<'_>) -> io::Result<()> {
-        if self.file.is_none() {
-            self.file = Some(BufWriter::new(File::create(&self.part)?));
-            self.line(format_args!("{}", if self.means { "members,q,p,z" } else { "index,status,t,q,p,z" }))?;
-        }
-        self.file.as_mut().map_or(Ok(()), |file| writeln!(file, "{line}"))
-    }
-
     fn row(&mut self, Member { index, ending, .. }: &Member<1>) -> io::Result<()> {
-        let end = match ending {
-            Ok(end) => end,
-            Err(_) if self.means => return Ok(()),
-            Err(cause) => return self.line(format_args!("{index},\"{cause}\",,,,")),
-        };
-        let x = [end.state.q[0], end.state.p[0], end.state.z];
-        if !self.means {
-            let (status, t, [q, p, z]) = (end.status, end.t, x);
-            return self.line(format_args!("{index},\"{status}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}"));
+        if self.file.is_none() {
+            writeln!(self.file.insert(BufWriter::new(File::create(&self.part)?)), "index,status,t,q,p,z")?;
         }
-        if end.status == Status::Completed {
-            self.completed.0 += 1;
-            self.completed.1.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+        let Some(file) = &mut self.file else { return Ok(()) };
+        match ending {
+            Ok(end) => {
+                let (status, [t, q, p, z]) = (end.status, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
+                writeln!(file, "{index},\"{status}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}")
+            }
+            Err(cause) => writeln!(file, "{index},\"{cause}\",,,,"),
         }
-        Ok(())
     }
 
     fn finish(mut self, path: &Path) -> io::Result<()> {
-        if self.means {
-            let (count, sums) = self.completed;
-            let [q, p, z] = sums.map(|sum| sum / count as f64);
-            self.line(format_args!("{count},{q:.16e},{p:.16e},{z:.16e}"))?;
-        }
         self.file.as_mut().map_or(Ok(()), BufWriter::flush)?;
         std::fs::rename(self.part, path)
     }
@@ -114,15 +84,12 @@ impl Table {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let Some(universe) = mpi::initialize() else {
-        eprintln!("error: the MPI library is already initialized");
-        return ExitCode::from(2);
-    };
+    let Some(universe) = mpi::initialize() else { return ExitCode::from(2) };
     let world = universe.world();
     let pendulum = Pendulum { gamma: -0.01 };
     let start = |index: usize| {
-        let number = |k: u64| random(arguments.seed, 2 * index as u64 + k);
-        VelocityPoint::new([2.0 * number(0)], [number(1)], 0.0)
+        let index = 2 * index as u64;
+        VelocityPoint::new([2.0 * random(index)], [random(index + 1)], 0.0)
     };
     let mut ensemble = Ensemble::new(&pendulum, 0.0, arguments.members, start)
         .by(arguments.method)
@@ -132,7 +99,7 @@ fn main() -> ExitCode {
     }
     let mut part = arguments.out.clone().into_os_string();
     part.push(".part");
-    let mut table = Table { part: part.into(), file: None, means: arguments.means, completed: (0, [0.0; 3]) };
+    let mut table = Table { part: part.into(), file: None };
     let (clock, mut written) = (Instant::now(), Ok(()));
     let merged =
         run(&world, &ensemble, Until::Time(arguments.time), arguments.patience.map(Duration::from_secs), |member| {
