@@ -8,7 +8,6 @@ use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
 use std::collections::VecDeque;
 use std::sync::mpsc::{self, TryRecvError};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// The number of ranks up to which rank 0 also computes, on a thread in addition to the one that hands out shards. With
 /// more ranks its core adds little, and from a few hundred ranks on it is busy with messages (docs/scaling.md).
@@ -36,7 +35,7 @@ pub struct Merged {
 }
 
 /// The reason why an ensemble on several ranks cannot start or continue.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MpiError {
     /// This rank cannot construct or merge the ensemble.
@@ -136,9 +135,8 @@ fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
         scope.spawn(move || handed_out.into_iter().try_for_each(|shard| done.send(sharded.compute(shard))));
         loop {
             let clock = Instant::now();
-            let bound = merge.bound(ranks);
             while let Some(worker) = free.front().copied()
-                && let Some(shard) = missing.next_if(|shard| *shard < bound)
+                && let Some(shard) = missing.next_if(|shard| *shard < merge.bound(ranks))
             {
                 free.pop_front();
                 if open[worker] == 0 {
