@@ -186,11 +186,11 @@ fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
         }
     });
     if !matches!(result, Err(MpiError::RankLost { .. })) {
-        for rank in 1..ranks {
+        for (rank, open) in open.into_iter().enumerate().skip(1) {
             let worker = world.process_at_rank(rank as i32);
             worker.send(&[0u64; 0][..]);
             // The results that are under way after an error.
-            (0..open[rank]).for_each(|_| drop(worker.receive_vec::<u64>()));
+            (0..open).for_each(|_| drop(worker.receive_vec::<u64>()));
         }
     }
     result.map(|()| merged)
