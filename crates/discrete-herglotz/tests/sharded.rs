@@ -35,12 +35,11 @@ fn plain(of: &Ensemble<'_, Pendulum, 1>) -> (Vec<String>, Tally) {
 /// The same from shards that are added in the given order.
 fn merged(of: &Ensemble<'_, Pendulum, 1>, order: &[usize]) -> (Vec<String>, Tally) {
     let (sharded, mut all) = (of.in_shards(UNTIL).unwrap(), Vec::new());
-    let mut merge = of.merge(&sharded).unwrap();
-    let fold = &mut |member: &_| all.push(format!("{member:?}"));
-    merge.resume(fold).unwrap();
+    let mut fold = |member: &_| all.push(format!("{member:?}"));
+    let mut merge = of.merge(&sharded, &mut fold).unwrap();
     for shard in order {
-        merge.add(&sharded.compute(*shard), fold).unwrap();
-        assert!(merge.has(*shard));
+        merge.add(&sharded.compute(*shard)).unwrap();
+        assert!(!merge.missing().contains(shard));
     }
     let tally = merge.tally();
     (all, tally)
@@ -104,7 +103,8 @@ fn a_checkpoint_with_gaps_is_gone_on_from() {
 fn what_is_no_shard_is_refused() {
     let of = ensemble(20);
     let sharded = of.in_shards(UNTIL).unwrap();
-    let mut merge = of.merge(&sharded).unwrap();
+    let mut fold = |_: &_| {};
+    let mut merge = of.merge(&sharded, &mut fold).unwrap();
     let good = sharded.compute(5);
     let mut no_such_shard = good.clone();
     no_such_shard[0] = 6;
@@ -117,11 +117,11 @@ fn what_is_no_shard_is_refused() {
     no_bool[3] = 2;
     let of_none = sharded.compute(6);
     for words in [&[][..], &good[..9], &no_such_shard, &too_long, &longer, &no_bool, &of_none, &[u64::MAX; 3]] {
-        let refused = merge.add(words, &mut |_| {});
+        let refused = merge.add(words);
         assert!(matches!(refused, Err(EnsembleError::ForeignShard)), "{refused:?}");
     }
-    merge.add(&good, &mut |_| {}).unwrap();
-    assert!(merge.has(5) && !merge.has(4) && !merge.is_complete());
+    merge.add(&good).unwrap();
+    assert_eq!(merge.missing(), [0, 1, 2, 3, 4]);
 }
 
 /// Results that wait to be merged occupy memory, unless there is a checkpoint.
@@ -129,13 +129,14 @@ fn what_is_no_shard_is_refused() {
 fn the_window_is_bounded_without_a_checkpoint() {
     let of = ensemble(2);
     let sharded = of.in_shards(UNTIL).unwrap();
-    let mut merge = of.merge(&sharded).unwrap();
+    let mut fold = |_: &_| {};
+    let mut merge = of.merge(&sharded, &mut fold).unwrap();
     assert_eq!((merge.bound(2), merge.bound(10_000)), (16, 80_000));
-    merge.add(&sharded.compute(0), &mut |_| {}).unwrap();
-    assert_eq!((merge.handed_on(), merge.bound(2)), (1, 17));
+    merge.add(&sharded.compute(0)).unwrap();
+    assert_eq!((merge.missing(), merge.bound(2)), (vec![1, 2, 3, 4, 5], 17));
     let path = std::env::temp_dir().join(format!("sharded-window-{}", std::process::id()));
     let kept = ensemble(2).checkpoint(&path);
-    assert_eq!(kept.merge(&sharded).unwrap().bound(2), usize::MAX);
+    assert_eq!(kept.merge(&sharded, &mut fold).unwrap().bound(2), usize::MAX);
     std::fs::remove_file(path).unwrap();
 }
 

@@ -7,45 +7,10 @@
 //! that is killed at any point loses only the shards that are being computed, and the next job computes those that are
 //! missing.
 //!
-#![cfg_attr(
-    feature = "mpi",
-    doc = r#"
-```no_run
-use contact_examples::systems::Pendulum;
-use contact_geom::VelocityPoint;
-use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
-use ensemble_mpi::{Options, run};
+//! An example is the program `src/bin/ensemble_mpi.rs`. Costs, limits and a plan for 1e4 cores: `docs/scaling.md`.
 
-let universe = mpi::initialize().ok_or("MPI is in use")?;
-let pendulum = Pendulum { gamma: -0.01 };
-let start = |i: usize| VelocityPoint::new([1e-5 * i as f64], [0.5], 0.0);
-let ensemble = Ensemble::new(&pendulum, 0.0, 100_000, start)
-    .by(SplittingScheme::BLANES_MOAN_6)
-    .steps(Steps::Size(0.25))
-    .checkpoint("pendula.shards");
-let mut sum = 0.0;
-let merged = run(&universe.world(), &ensemble, Until::Time(100.0), Options::default(), |member| {
-    sum += member.ending.map_or(0.0, |ending| ending.state.q[0]);
-})?;
-// On rank 0 only.
-if let Some(merged) = merged {
-    println!("{} completed, the sum of the angles is {sum}", merged.tally.completed);
-}
-# Ok::<(), Box<dyn std::error::Error>>(())
-```
-"#
-)]
-//!
-//! Costs, limits and a plan for 1e4 cores: `docs/scaling.md`.
-
-mod dispatch;
-#[cfg(feature = "mpi")]
-mod error;
 #[cfg(feature = "mpi")]
 mod ranks;
 
-pub use dispatch::Dispatch;
 #[cfg(feature = "mpi")]
-pub use error::MpiError;
-#[cfg(feature = "mpi")]
-pub use ranks::{Merged, Options, Traffic, run};
+pub use ranks::{Merged, MpiError, run};

@@ -1,22 +1,13 @@
 //! Runs one ensemble on all ranks of a communicator.
 
-use crate::{Dispatch, MpiError};
 use contact_geom::Lagrangian;
-use discrete_herglotz::{
-    Ensemble, Until,
-    ensemble::{EnsembleError, Member, Merge, ShardedEnsemble, Tally},
-};
+use discrete_herglotz::ensemble::{EnsembleError, Member, Merge, ShardedEnsemble, Tally};
+use discrete_herglotz::{Ensemble, Until};
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
-use mpi::{Rank, Tag};
-use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
+use std::collections::VecDeque;
+use std::sync::mpsc::{self, TryRecvError};
 use std::time::{Duration, Instant};
-
-/// Tag of messages from rank 0: the number of a shard, or an empty message where there are no more.
-const SHARD_TO_COMPUTE: Tag = 1;
-
-/// Tag of messages to rank 0: the words of a shard.
-const COMPUTED_SHARD: Tag = 2;
 
 /// The number of ranks up to which rank 0 also computes, on a thread in addition to the one that hands out shards. With
 /// more ranks its core adds little, and from a few hundred ranks on it is busy with messages (docs/scaling.md).
@@ -25,285 +16,184 @@ const MAX_RANKS_WITH_COMPUTING_ROOT: usize = 64;
 /// The time between two probes of an idle rank for messages: short compared with a shard, long compared with a probe.
 const PROBE_INTERVAL: Duration = Duration::from_micros(50);
 
-/// Options of a run on several ranks.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Options {
-    /// How long rank 0 waits for a result of a rank that has open shards, which must be longer than a shard takes.
-    /// There is no limit where it is `None`, since launchers end a job themselves when one of its processes ends.
-    pub patience: Option<Duration>,
-}
-
 /// The result of an ensemble on several ranks, on rank 0.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Merged {
     /// How the members ended.
     pub tally: Tally,
     /// The shards that were in the checkpoint.
     pub resumed: usize,
-    /// The traffic of rank 0.
-    pub traffic: Traffic,
-}
-
-/// The shards and bytes that rank 0 has received, and the time that it spent on them.
-#[derive(Clone, Debug, Default)]
-#[non_exhaustive]
-pub struct Traffic {
     /// The number of shards that each rank has computed.
     pub shards: Vec<usize>,
-    /// The bytes of the shards that were received from other ranks.
+    /// The bytes of the shards that rank 0 has received from other ranks.
     pub bytes: usize,
-    /// The time for receiving shards and for handing out the next ones.
+    /// The time in which rank 0 received shards and handed out the next ones.
     pub messages: Duration,
-    /// The time for merging all shards: the checkpoint and the fold.
+    /// The time in which rank 0 merged shards: the checkpoint and the fold.
     pub merging: Duration,
+}
+
+/// The reason why an ensemble on several ranks cannot start or continue.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MpiError {
+    /// This rank cannot construct or merge the ensemble.
+    #[error(transparent)]
+    Ensemble(#[from] EnsembleError),
+    /// Two ranks have constructed different ensembles, or one of them cannot construct its own.
+    #[error(
+        "rank {rank} has a different ensemble from rank 0, or none; start all ranks with the same program, members, \
+         integrator, steps, end and requests"
+    )]
+    AnotherEnsemble {
+        /// The first rank whose ensemble is not that of rank 0.
+        rank: usize,
+    },
+    /// No result of a rank has arrived for longer than the patience of [`run`]. Collective calls are no longer
+    /// possible: end the job with [`abort`](Communicator::abort).
+    #[error(
+        "rank {rank} has sent no message for {seconds} s, and {open} of its shards are incomplete; run again from \
+         the checkpoint, or set a patience that is longer than the time of a shard"
+    )]
+    RankLost {
+        /// The rank.
+        rank: usize,
+        /// The number of its open shards, which are lost.
+        open: usize,
+        /// How long rank 0 has waited for it.
+        seconds: f64,
+    },
 }
 
 /// Runs an ensemble on all ranks of a communicator, which construct the same ensemble and call this function
 /// collectively. On rank 0 the fold is given the members in the order of their index, and its result is bitwise that of
-/// [`Ensemble::run`]; on all other ranks the result is `None`. Each rank computes on one thread; a single rank runs the
-/// ensemble as [`Ensemble::run`] does. The checkpoint is that of rank 0.
+/// [`Ensemble::run`]; on all other ranks the result is `None`. Each rank computes on one thread. The checkpoint is that
+/// of rank 0.
+///
+/// `patience` is how long rank 0 waits for a result of a rank that has open shards, which must be longer than a shard
+/// takes. Without it there is no limit, since launchers end a job themselves when one of its processes ends.
 ///
 /// # Errors
-/// [`MpiError`], on all ranks, where the ensemble of a rank cannot run or differs from that of rank 0, or where rank 0
-/// cannot read or write the checkpoint. What was computed before is in the checkpoint. A rank that is silent for too
-/// long is an error on rank 0.
+/// [`MpiError`], on all ranks, where the ensemble of a rank cannot run or differs from that of rank 0. On rank 0 alone,
+/// where it cannot read or write the checkpoint, or a rank is silent for too long; what was computed before is in the
+/// checkpoint.
 ///
 /// # Panics
 /// A panic on a rank, in the fold or in a Lagrangian, ends all ranks.
-pub fn run<'a, L: Lagrangian<N> + Sync, const N: usize>(
+pub fn run<L: Lagrangian<N> + Sync, const N: usize>(
     world: &SimpleCommunicator,
-    ensemble: &Ensemble<'a, L, N>,
+    ensemble: &Ensemble<'_, L, N>,
     until: Until,
-    options: Options,
+    patience: Option<Duration>,
     mut fold: impl FnMut(&Member<N>),
 ) -> Result<Option<Merged>, MpiError> {
     let _guard = AbortOnPanic(world);
-    let sharded = agree(world, ensemble.in_shards(until), ShardedEnsemble::fingerprint)?;
-    if world.rank() != 0 {
-        agree(world, Ok(()), |()| 0)?;
-        work(world, &sharded);
-        return agree(world, Ok(()), |()| 0).map(|()| None);
-    }
-    let mut merge = agree(world, ensemble.merge(&sharded), |_| 0)?;
-    let resumed = (0..sharded.count()).filter(|shard| merge.has(*shard)).count();
-    let mut distributor = Distributor::new(world, sharded.count(), options);
-    let result = match world.size() {
-        1 => ensemble.run(until, fold).map_err(MpiError::from),
-        _ => distributor.merge_all(&sharded, &mut merge, &mut fold).map(|()| merge.tally()),
-    };
-    let own = match result {
-        Err(MpiError::Ensemble(cause)) => Err(cause),
-        Err(lost) => return Err(lost),
-        Ok(tally) => Ok(Some(Merged { tally, resumed, traffic: distributor.traffic.clone() })),
-    };
-    distributor.dismiss();
-    agree(world, own, |_| 0)
-}
-
-/// Collective agreement of all ranks: returns the own value where all ranks have one and their `value`s are equal.
-fn agree<T>(
-    world: &SimpleCommunicator,
-    own: Result<T, EnsembleError>,
-    value: impl Fn(&T) -> u64,
-) -> Result<T, MpiError> {
-    let mine = own.as_ref().map_or([0, 0], |own| [1, value(own)]);
-    let mut all = vec![0u64; 2 * world.size() as usize];
-    world.all_gather_into(&mine[..], &mut all[..]);
-    if let Some(rank) = all.chunks_exact(2).position(|of| of[0] == 0) {
-        let speaker = world.process_at_rank(rank as Rank);
-        let mut message = own.as_ref().err().map_or(Vec::new(), |cause| cause.to_string().into_bytes());
-        let mut length = message.len() as u64;
-        speaker.broadcast_into(&mut length);
-        if world.rank() as usize != rank {
-            message = vec![0; length as usize];
-        }
-        speaker.broadcast_into(&mut message[..]);
-        let message = String::from_utf8_lossy(&message).into_owned();
-        return Err(own.err().map_or(MpiError::Refused { rank, message }, MpiError::Ensemble));
-    }
-    if let Some(rank) = all.chunks_exact(2).position(|of| of[1] != all[1]) {
+    let own = ensemble.in_shards(until);
+    let mut all = vec![0u64; world.size() as usize];
+    world.all_gather_into(&own.as_ref().map_or(0, ShardedEnsemble::fingerprint), &mut all[..]);
+    let sharded = own?;
+    if let Some(rank) = all.iter().position(|of| *of != all[0]) {
         return Err(MpiError::AnotherEnsemble { rank });
     }
-    Ok(own?)
-}
-
-/// Computes the shards that rank 0 hands out, until there are no more.
-fn work<L: Lagrangian<N> + Sync, const N: usize>(world: &SimpleCommunicator, sharded: &ShardedEnsemble<'_, '_, L, N>) {
+    if world.rank() == 0 {
+        return distribute(world, &sharded, ensemble.merge(&sharded, &mut fold), patience).map(Some);
+    }
     let root = world.process_at_rank(0);
     loop {
         // A blocking receive of Open MPI would keep a core busy.
-        while root.immediate_probe_with_tag(SHARD_TO_COMPUTE).is_none() {
+        while root.immediate_probe().is_none() {
             std::thread::sleep(PROBE_INTERVAL);
         }
-        let (shard, _) = root.receive_vec_with_tag::<u64>(SHARD_TO_COMPUTE);
-        let Some(shard) = shard.first() else { return };
-        root.send_with_tag(&sharded.compute(*shard as usize)[..], COMPUTED_SHARD);
+        // An empty message says that there are no more shards.
+        let [shard] = root.receive_vec::<u64>().0[..] else { return Ok(None) };
+        root.send(&sharded.compute(shard as usize)[..]);
     }
 }
 
-/// The computing thread of rank 0: the channels for numbers of shards and for their words.
-struct OwnThread {
-    hand_out: Sender<usize>,
-    computed: Receiver<Vec<u64>>,
-}
-
-/// The state of rank 0, which hands out shards and merges them.
-struct Distributor<'w> {
-    world: &'w SimpleCommunicator,
+/// Hands out and merges the shards that are missing, on rank 0. Worker 0 is a thread of it that computes.
+fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
+    world: &SimpleCommunicator,
+    sharded: &ShardedEnsemble<'_, '_, L, N>,
+    merge: Result<Merge<'_, '_, '_, L, N>, EnsembleError>,
     patience: Option<Duration>,
-    /// Worker 0 is the computing thread of rank 0.
-    dispatch: Dispatch,
-    /// When each rank last sent a result, or was given work while it was idle.
-    last_heard: Vec<Instant>,
-    /// Workers that can be given another shard, once the bound on waiting results permits it.
-    ready_workers: Vec<usize>,
-    traffic: Traffic,
-}
-
-impl<'w> Distributor<'w> {
-    fn new(world: &'w SimpleCommunicator, count: usize, options: Options) -> Self {
-        let ranks = world.size() as usize;
-        Distributor {
-            world,
-            patience: options.patience,
-            dispatch: Dispatch::new(count, ranks),
-            last_heard: vec![Instant::now(); ranks],
-            ready_workers: Vec::new(),
-            traffic: Traffic { shards: vec![0; ranks], ..Traffic::default() },
-        }
-    }
-
-    /// Hands out and merges shards until all are merged.
-    fn merge_all<L: Lagrangian<N> + Sync, const N: usize>(
-        &mut self,
-        sharded: &ShardedEnsemble<'_, '_, L, N>,
-        merge: &mut Merge<'_, '_, '_, L, N>,
-        fold: &mut impl FnMut(&Member<N>),
-    ) -> Result<(), MpiError> {
-        merge.resume(fold)?;
-        let ranks = self.last_heard.len();
-        std::thread::scope(|scope| {
-            let (hand_out, handed_out) = mpsc::channel::<usize>();
-            let (done, computed) = mpsc::channel();
-            let first = if ranks <= MAX_RANKS_WITH_COMPUTING_ROOT {
-                scope.spawn(move || {
-                    for shard in handed_out {
-                        if done.send(sharded.compute(shard)).is_err() {
-                            return;
-                        }
-                    }
-                });
-                0
-            } else {
-                1
-            };
-            let own = OwnThread { hand_out, computed };
-            self.ready_workers = (first..ranks).collect();
-            self.feed(merge, &own);
-            while !self.dispatch.is_over(|shard| merge.has(shard)) {
-                match own.computed.try_recv() {
-                    Ok(words) => {
-                        self.take(0, &words, merge, fold)?;
-                        self.feed(merge, &own);
-                    }
+) -> Result<Merged, MpiError> {
+    let ranks = world.size() as usize;
+    let workers = usize::from(ranks > MAX_RANKS_WITH_COMPUTING_ROOT)..ranks;
+    // The workers that can be given a shard, in turn, once for each. A worker has at most two: one that it computes, and
+    // one to continue with while a result is sent.
+    let mut free: VecDeque<usize> = workers.clone().chain(workers).collect();
+    // The number of open shards of each worker, and when it last sent a result or was given work while it was idle.
+    let (mut open, mut last_heard) = (vec![0; ranks], vec![Instant::now(); ranks]);
+    let mut merged = Merged { shards: vec![0; ranks], ..Merged::default() };
+    let result = std::thread::scope(|scope| {
+        let (mut merge, all_free) = (merge?, free.len());
+        let mut missing = merge.missing().into_iter().peekable();
+        merged.resumed = sharded.count() - missing.len();
+        let (hand_out, handed_out) = mpsc::channel::<usize>();
+        let (done, computed) = mpsc::channel();
+        scope.spawn(move || handed_out.into_iter().try_for_each(|shard| done.send(sharded.compute(shard))));
+        loop {
+            let clock = Instant::now();
+            while let Some(worker) = free.front().copied()
+                && let Some(shard) = missing.next_if(|shard| *shard < merge.bound(ranks))
+            {
+                free.pop_front();
+                if open[worker] == 0 {
+                    last_heard[worker] = clock;
+                }
+                open[worker] += 1;
+                match worker {
+                    // Sending fails where the thread has panicked, which `computed` tells.
+                    0 => drop(hand_out.send(shard)),
+                    _ => world.process_at_rank(worker as i32).send(&[shard as u64][..]),
+                }
+            }
+            merged.messages += clock.elapsed();
+            if free.len() == all_free {
+                merged.tally = merge.tally();
+                return Ok(());
+            }
+            let (worker, words) = loop {
+                match computed.try_recv() {
+                    Ok(words) => break (0, words),
                     Err(TryRecvError::Empty) => {}
                     // The thread has panicked, and the end of the scope propagates the panic.
                     Err(TryRecvError::Disconnected) => return Ok(()),
                 }
                 let clock = Instant::now();
-                match self.world.any_process().immediate_probe_with_tag(COMPUTED_SHARD) {
-                    Some(status) => {
-                        let worker = self.world.process_at_rank(status.source_rank());
-                        let (words, _) = worker.receive_vec_with_tag::<u64>(COMPUTED_SHARD);
-                        self.traffic.bytes += 8 * words.len();
-                        self.traffic.messages += clock.elapsed();
-                        self.take(status.source_rank() as usize, &words, merge, fold)?;
-                        let clock = Instant::now();
-                        self.feed(merge, &own);
-                        self.traffic.messages += clock.elapsed();
-                    }
-                    None => {
-                        self.check_for_lost_ranks()?;
-                        std::thread::sleep(PROBE_INTERVAL);
-                    }
+                if let Some(status) = world.any_process().immediate_probe() {
+                    let (words, _) = world.process_at_rank(status.source_rank()).receive_vec::<u64>();
+                    merged.bytes += 8 * words.len();
+                    merged.messages += clock.elapsed();
+                    break (status.source_rank() as usize, words);
                 }
-            }
-            Ok(())
-        })
-    }
-
-    /// Merges a shard that a worker has computed.
-    fn take<L: Lagrangian<N> + Sync, const N: usize>(
-        &mut self,
-        worker: usize,
-        words: &[u64],
-        merge: &mut Merge<'_, '_, '_, L, N>,
-        fold: &mut impl FnMut(&Member<N>),
-    ) -> Result<(), MpiError> {
-        let clock = Instant::now();
-        self.last_heard[worker] = clock;
-        let shard = words.first().map_or(usize::MAX, |word| *word as usize);
-        if !self.dispatch.received(worker, shard) {
-            return Err(EnsembleError::ForeignShard.into());
-        }
-        self.traffic.shards[worker] += 1;
-        merge.add(words, fold)?;
-        self.traffic.merging += clock.elapsed();
-        if !self.ready_workers.contains(&worker) {
-            self.ready_workers.push(worker);
-        }
-        Ok(())
-    }
-
-    /// Hands out the shards that may be computed now to the workers that can be given one.
-    fn feed<L: Lagrangian<N> + Sync, const N: usize>(&mut self, merge: &Merge<'_, '_, '_, L, N>, own: &OwnThread) {
-        let bound = merge.bound(self.last_heard.len());
-        let mut ready_workers = std::mem::take(&mut self.ready_workers);
-        let mut handed_out = true;
-        // One shard to each worker in turn, so that few shards are distributed evenly.
-        while std::mem::take(&mut handed_out) {
-            for worker in &ready_workers {
-                let idle = self.dispatch.open(*worker).is_empty();
-                let Some(shard) = self.dispatch.next(*worker, bound, |shard| merge.has(shard)) else { continue };
-                handed_out = true;
-                if idle {
-                    self.last_heard[*worker] = Instant::now();
+                if let Some(patience) = patience
+                    && let Some(rank) =
+                        (1..ranks).find(|rank| open[*rank] > 0 && last_heard[*rank].elapsed() > patience)
+                {
+                    return Err(MpiError::RankLost { rank, open: open[rank], seconds: patience.as_secs_f64() });
                 }
-                if *worker == 0 {
-                    // Sending fails where the thread has panicked, which the loop over results detects.
-                    let _ = own.hand_out.send(shard);
-                } else {
-                    self.world.process_at_rank(*worker as Rank).send_with_tag(&[shard as u64][..], SHARD_TO_COMPUTE);
-                }
-            }
+                std::thread::sleep(PROBE_INTERVAL);
+            };
+            let clock = Instant::now();
+            last_heard[worker] = clock;
+            open[worker] -= 1;
+            free.push_back(worker);
+            merged.shards[worker] += 1;
+            merge.add(&words)?;
+            merged.merging += clock.elapsed();
         }
-        ready_workers.retain(|worker| self.dispatch.accepts_shard(*worker));
-        self.ready_workers = ready_workers;
-    }
-
-    /// Checks whether a rank with open shards has been silent for too long.
-    fn check_for_lost_ranks(&self) -> Result<(), MpiError> {
-        let Some(patience) = self.patience else { return Ok(()) };
-        for (rank, last_heard) in self.last_heard.iter().enumerate().skip(1) {
-            let open = self.dispatch.open(rank).len();
-            if open > 0 && last_heard.elapsed() > patience {
-                return Err(MpiError::RankLost { rank, open, seconds: patience.as_secs_f64() });
-            }
-        }
-        Ok(())
-    }
-
-    /// Tells all ranks that there are no more shards, and receives the results that are under way.
-    fn dismiss(&self) {
-        for rank in 1..self.last_heard.len() {
-            let worker = self.world.process_at_rank(rank as Rank);
-            worker.send_with_tag(&[0u64; 0][..], SHARD_TO_COMPUTE);
-            for _ in self.dispatch.open(rank) {
-                worker.receive_vec_with_tag::<u64>(COMPUTED_SHARD);
-            }
+    });
+    if !matches!(result, Err(MpiError::RankLost { .. })) {
+        for (rank, open) in open.into_iter().enumerate().skip(1) {
+            let worker = world.process_at_rank(rank as i32);
+            worker.send(&[0u64; 0][..]);
+            // The results that are under way after an error.
+            (0..open).for_each(|_| drop(worker.receive_vec::<u64>()));
         }
     }
+    result.map(|()| merged)
 }
 
 /// Ends all ranks when one of them panics, since the others would wait for it forever.

@@ -187,16 +187,16 @@ fn what_is_refused_ends_all_ranks() {
     refused(&[(2, "--members 0")], "the ensemble has no members");
     refused(&[(1, "--members 0")], "the ensemble has no members");
     refused(&[(2, "--time NaN")], "member 0: ");
-    refused(&[(2, "--patience=-1")], "--patience: ");
+    refused(&[(2, "--patience=-1")], "--patience");
     // Ranks that disagree, and a rank other than 0 that has nothing to run.
-    refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has a different ensemble from rank 0");
-    refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has a different ensemble from rank 0");
+    refused(&[(1, "--time 6"), (1, "--time 7")], "rank 1 has a different ensemble from rank 0");
+    refused(&[(2, ""), (1, "--time 7")], "rank 2 has a different ensemble from rank 0");
     refused(&[(1, ""), (1, "--members 0")], "rank 1: the ensemble has no members");
     // Checkpoints.
     let with = |more: &str| format!("--members 2000 --checkpoint {checkpoint} {more}");
     completed(2, &format!("{} --steps 10 --out {out}", with("")));
     fs::remove_file(&out).unwrap();
-    refused(&[(2, &with("--seed 1"))], "contains the shards of another ensemble");
+    refused(&[(2, &with("--time 7"))], "contains the shards of another ensemble");
     let mut bytes = fs::read(&checkpoint).unwrap();
     bytes[1000] ^= 1;
     fs::write(&checkpoint, &bytes).unwrap();

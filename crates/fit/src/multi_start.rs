@@ -10,8 +10,8 @@ pub struct MultiStart {
 }
 
 impl MultiStart {
-    /// The index of the best start: that with the lowest cost among those that ended at a minimum, and among the others
-    /// only if there is none of these. The first of equals.
+    /// The index of the best start: the lowest cost among starts that reached a minimum; if none did, among all. The
+    /// first of equals.
     pub fn best_index(&self) -> Option<usize> {
         let fits = || self.fits.iter().enumerate().filter_map(|(i, fit)| fit.as_ref().ok().map(|fit| (i, fit)));
         let is_at_minimum = |fit: &Fit| !matches!(fit.status, crate::FitStatus::EvaluationLimit { .. });

@@ -162,8 +162,8 @@ pub trait Lagrangian<const N: usize> {
         vector!(|_| T::zero())
     }
 
-    /// What integrators may rely on about the applied force. By default nothing, if [`Hints::forced`] is set, and
-    /// otherwise that there is none.
+    /// What integrators may rely on about the applied force. Default: `General` if
+    /// [`Hints::forced`] is set, otherwise `None`.
     fn force_structure(&self) -> ForceStructure<N> {
         if Self::HINTS.forced { ForceStructure::General } else { ForceStructure::None }
     }

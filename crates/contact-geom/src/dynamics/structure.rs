@@ -33,9 +33,8 @@ pub struct Structure {
 pub struct Defect {
     /// The name of the claim: a field of [`Structure`], or `closed_gradient` or `closed_hessian`.
     pub claim: &'static str,
-    /// The largest of the derivatives that the claim states to be zero, each relative to the size of the terms of which
-    /// it is a sum: a few units of round-off where the claim holds, of order one where it is violated, independent of
-    /// the units.
+    /// The largest derivative that should vanish, relative to the terms that it sums. Round-off if the claim holds, of
+    /// order one if not, in any units.
     pub size: f64,
 }
 

@@ -77,9 +77,8 @@ impl Corrections {
     }
 }
 
-/// The scale to which corrections of velocities are compared: their size, or for smaller ones that which moves a
-/// position by a millionth of it in a step, since the round-off of velocities that are computed from positions is that of
-/// the positions, divided by h.
+/// The scale of corrections of velocities: `|v|`, at least `1e-6 |q| / h`. Velocities that are computed from positions
+/// have their rounding error divided by h.
 fn velocity_scale(velocity: f64, position: f64, h: f64) -> f64 {
     velocity.max(1e-6 * position / h.abs()).max(f64::MIN_POSITIVE)
 }

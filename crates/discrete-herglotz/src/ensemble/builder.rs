@@ -204,16 +204,15 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
         let sharded = self.in_shards(until)?;
         let threads = self.some_threads()?;
-        let mut merge = self.merge(&sharded)?;
-        merge.resume(&mut fold)?;
+        let mut merge = self.merge(&sharded, &mut fold)?;
         // Several processes may have left gaps in a checkpoint.
-        let missing: Vec<usize> = (merge.handed_on()..sharded.count()).filter(|shard| !merge.has(*shard)).collect();
+        let missing = merge.missing();
         let mut error = None;
         shards::in_order(
             threads,
             missing.len(),
             |i| (missing[i], sharded.task.shard(missing[i])),
-            |(index, shard)| match merge.add_shard(index, shard, &mut fold) {
+            |(index, shard)| match merge.add_shard(index, shard) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(cause) => {
                     error = Some(cause);

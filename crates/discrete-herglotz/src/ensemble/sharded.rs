@@ -8,7 +8,7 @@ use crate::ensemble::member::{Member, Tally};
 use crate::ensemble::shards::MAX_SHARDS_PER_THREAD;
 use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard, Task};
 use contact_geom::Lagrangian;
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 
 /// An [`Ensemble`] after its checks, in shards of a few hundred members that are computed, sent and saved together.
 ///
@@ -19,19 +19,19 @@ use std::collections::VecDeque;
 /// ```
 /// use contact_examples::systems::Pendulum;
 /// use contact_geom::VelocityPoint;
-/// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
+/// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until, ensemble::Member};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };
 /// let start = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.5], 0.0);
 /// let ensemble = Ensemble::new(&pendulum, 0.0, 1000, start).by(SplittingScheme::STRANG).steps(Steps::Size(0.25));
 /// let sharded = ensemble.in_shards(Until::Time(10.0))?;
-/// let mut merge = ensemble.merge(&sharded)?;
 /// let mut indices = Vec::new();
-/// for shard in (0..sharded.count()).rev() {
-///     let words = sharded.compute(shard); // By any process.
-///     merge.add(&words, &mut |member| indices.push(member.index))?;
+/// let mut fold = |member: &Member<1>| indices.push(member.index);
+/// let mut merge = ensemble.merge(&sharded, &mut fold)?;
+/// for shard in merge.missing().into_iter().rev() {
+///     merge.add(&sharded.compute(shard))?; // Computed by any process.
 /// }
-/// assert!(merge.is_complete() && indices.iter().copied().eq(0..1000));
+/// assert!(indices.iter().copied().eq(0..1000));
 /// # Ok::<(), discrete_herglotz::ensemble::EnsembleError>(())
 /// ```
 pub struct ShardedEnsemble<'e, 'a, L, const N: usize> {
@@ -47,19 +47,22 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ok(ShardedEnsemble { task: self.task(until)? })
     }
 
-    /// Starts merging the shards of this ensemble; with a [checkpoint](Ensemble::checkpoint), after those that its file
-    /// contains.
+    /// Starts merging the shards of this ensemble. With a [checkpoint](Ensemble::checkpoint) the fold is called with the
+    /// members of the shards that its file contains, from the first shard to the first one that is missing.
     ///
     /// # Errors
-    /// [`EnsembleError`] if the checkpoint belongs to another ensemble, is damaged, or cannot be written.
+    /// [`EnsembleError`] if the checkpoint belongs to another ensemble, is damaged, or cannot be read or written.
     pub fn merge<'s, 'e>(
         &'s self,
         sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
+        fold: &'s mut dyn FnMut(&Member<N>),
     ) -> Result<Merge<'s, 'e, 'a, L, N>, EnsembleError> {
         let open = |path| Shards::open(path, sharded.fingerprint(), sharded.count());
         let file = self.checkpoint.as_deref().map(open).transpose()?;
-        let progress = self.progress.as_deref();
-        Ok(Merge { sharded, progress, file, waiting: VecDeque::new(), handed_on: 0, tally: Tally::default() })
+        let (waiting, tally) = (BTreeMap::new(), Tally::default());
+        let mut merge = Merge { ensemble: self, sharded, fold, file, waiting, merged: 0, tally };
+        merge.merge_waiting()?;
+        Ok(merge)
     }
 }
 
@@ -84,35 +87,26 @@ impl<L: Lagrangian<N> + Sync, const N: usize> ShardedEnsemble<'_, '_, L, N> {
 
 /// Merges shards of an ensemble in the order of their members, whatever the order in which they arrive.
 pub struct Merge<'s, 'e, 'a, L, const N: usize> {
+    ensemble: &'s Ensemble<'a, L, N>,
     sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
-    progress: Option<&'s (dyn Fn(f64) + 'a)>,
+    fold: &'s mut (dyn FnMut(&Member<N>) + 's),
     file: Option<Shards>,
-    /// The shards that arrived before their turn, in order; only if there is no file from which they can be read.
-    waiting: VecDeque<(usize, Shard<N>)>,
-    handed_on: usize,
+    /// The shards that arrived before their turn; only if there is no file from which they can be read.
+    waiting: BTreeMap<usize, Shard<N>>,
+    /// The number of shards whose members have been passed to the fold: all shards before this one.
+    merged: usize,
     tally: Tally,
 }
 
 impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
-    /// Whether a shard has arrived, or was in the checkpoint.
-    pub fn has(&self, shard: usize) -> bool {
-        let kept = |file: &Shards| file.has(shard);
-        shard < self.handed_on || self.place(shard).is_ok() || self.file.as_ref().is_some_and(kept)
+    /// The shards that have neither arrived nor are in the checkpoint, in order.
+    pub fn missing(&self) -> Vec<usize> {
+        (self.merged..self.sharded.count()).filter(|shard| !self.has(*shard)).collect()
     }
 
-    /// The position of a waiting shard, or the position at which it would be inserted.
-    fn place(&self, shard: usize) -> Result<usize, usize> {
-        self.waiting.binary_search_by_key(&shard, |(number, _)| *number)
-    }
-
-    /// The number of shards whose members have been passed to the fold: all shards before this one.
-    pub fn handed_on(&self) -> usize {
-        self.handed_on
-    }
-
-    /// Whether the members of all shards have been passed to the fold.
-    pub fn is_complete(&self) -> bool {
-        self.handed_on == self.sharded.count()
+    fn has(&self, shard: usize) -> bool {
+        let is_saved = |file: &Shards| file.has(shard);
+        shard < self.merged || self.waiting.contains_key(&shard) || self.file.as_ref().is_some_and(is_saved)
     }
 
     /// The tally of the members that have been passed to the fold.
@@ -125,19 +119,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     /// they wait in its file, and there is no bound.
     pub fn bound(&self, workers: usize) -> usize {
         let window = MAX_SHARDS_PER_THREAD.saturating_mul(workers.max(1));
-        if self.file.is_some() { usize::MAX } else { self.handed_on.saturating_add(window) }
-    }
-
-    /// Passes to the fold the shards that the checkpoint contains, from the first shard on without a gap. To be called
-    /// once before shards are computed.
-    ///
-    /// # Errors
-    /// [`EnsembleError`] if the checkpoint cannot be read.
-    pub fn resume(&mut self, fold: &mut impl FnMut(&Member<N>)) -> Result<(), EnsembleError> {
-        while let Some(shard) = self.waiting_next()? {
-            self.hand_on(shard, fold);
-        }
-        Ok(())
+        if self.file.is_some() { usize::MAX } else { self.merged.saturating_add(window) }
     }
 
     /// Adds a shard that was [computed](ShardedEnsemble::compute) by any process, saves it in the checkpoint, and
@@ -145,62 +127,55 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     ///
     /// # Errors
     /// [`EnsembleError`]: the words are not a shard of this ensemble, or the checkpoint cannot be written or read.
-    pub fn add(&mut self, words: &[u64], fold: &mut impl FnMut(&Member<N>)) -> Result<(), EnsembleError> {
+    pub fn add(&mut self, words: &[u64]) -> Result<(), EnsembleError> {
         let expected = |shard: usize| self.sharded.task.members_of(shard).len();
         match checkpoint::shard_of(words) {
             Some((index, shard)) if index < self.sharded.count() && shard.members.len() == expected(index) => {
-                self.add_shard(index, shard, fold)
+                self.add_shard(index, shard)
             }
             _ => Err(EnsembleError::ForeignShard),
         }
     }
 
-    pub(crate) fn add_shard(
-        &mut self,
-        index: usize,
-        shard: Shard<N>,
-        fold: &mut impl FnMut(&Member<N>),
-    ) -> Result<(), EnsembleError> {
+    pub(crate) fn add_shard(&mut self, index: usize, shard: Shard<N>) -> Result<(), EnsembleError> {
         if self.has(index) {
             return Ok(());
         }
         if let Some(file) = &mut self.file {
             file.write(index, &shard)?;
         }
-        if index == self.handed_on {
-            self.hand_on(shard, fold);
-            return self.resume(fold);
+        if index == self.merged {
+            self.merge_next(shard);
+            return self.merge_waiting();
         }
-        if let (None, Err(place)) = (&self.file, self.place(index)) {
-            self.waiting.insert(place, (index, shard));
+        if self.file.is_none() {
+            self.waiting.insert(index, shard);
         }
         Ok(())
     }
 
-    /// The next shard in the order, if it has arrived.
-    fn waiting_next(&mut self) -> Result<Option<Shard<N>>, EnsembleError> {
-        match &mut self.file {
-            Some(file) => file.read(self.handed_on, self.sharded.task.members_of(self.handed_on).len()),
-            None if self.waiting.front().is_some_and(|(number, _)| *number == self.handed_on) => {
-                Ok(self.waiting.pop_front().map(|(_, shard)| shard))
-            }
-            None => Ok(None),
+    /// Passes to the fold the shards that have arrived, up to the first one that is missing.
+    fn merge_waiting(&mut self) -> Result<(), EnsembleError> {
+        loop {
+            let next = match &mut self.file {
+                Some(file) => file.read(self.merged, self.sharded.task.members_of(self.merged).len())?,
+                None => self.waiting.remove(&self.merged),
+            };
+            let Some(shard) = next else { return Ok(()) };
+            self.merge_next(shard);
         }
     }
 
-    fn hand_on(&mut self, mut shard: Shard<N>, fold: &mut impl FnMut(&Member<N>)) {
-        let sharded = self.sharded;
+    fn merge_next(&mut self, mut shard: Shard<N>) {
         if !shard.with_causes {
-            sharded.task.run_again(&mut shard);
+            self.sharded.task.run_again(&mut shard);
         }
         self.tally.batch_kernel += shard.batch_kernel;
         for member in &shard.members {
             self.tally.add(member);
-            fold(member);
+            (self.fold)(member);
         }
-        self.handed_on += 1;
-        if let Some(report) = self.progress {
-            report(self.handed_on as f64 / sharded.count() as f64);
-        }
+        self.merged += 1;
+        self.ensemble.report_progress(self.merged, self.sharded.count());
     }
 }

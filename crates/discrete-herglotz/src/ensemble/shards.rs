@@ -1,5 +1,6 @@
 //! Work in shards on several threads, with results in order.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
@@ -18,8 +19,8 @@ struct Window<R> {
     next: usize,
     /// The number of shards that have been handed on.
     handed_on: usize,
-    /// The results that are completed and have not been handed on, with their numbers: a few.
-    done: Vec<(usize, R)>,
+    /// The results that are completed and have not been handed on.
+    done: BTreeMap<usize, R>,
     /// Whether no more results are requested, or a thread has panicked.
     over: bool,
 }
@@ -38,16 +39,6 @@ impl<R> Window<R> {
     fn take(&mut self) -> usize {
         self.next += 1;
         self.next - 1
-    }
-
-    /// The result of a shard, if it is completed.
-    fn result(&mut self, shard: usize) -> Option<R> {
-        let place = self.done.iter().position(|(number, _)| *number == shard)?;
-        Some(self.done.swap_remove(place).1)
-    }
-
-    fn is_done(&self, shard: usize) -> bool {
-        self.done.iter().any(|(number, _)| *number == shard)
     }
 }
 
@@ -91,7 +82,7 @@ pub(crate) fn in_order<R: Send>(
     work: impl Fn(usize) -> R + Sync,
     mut hand_on: impl FnMut(R) -> ControlFlow<()>,
 ) {
-    let window = Window { next: 0, handed_on: 0, done: Vec::new(), over: false };
+    let window = Window { next: 0, handed_on: 0, done: BTreeMap::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
     let threads = threads.min(count);
     let most = MAX_SHARDS_PER_THREAD * threads;
@@ -108,18 +99,18 @@ pub(crate) fn in_order<R: Send>(
                     let shard = window.take();
                     drop(window);
                     let result = work(shard);
-                    shared.change(|window| window.done.push((shard, result)));
+                    shared.change(|window| _ = window.done.insert(shard, result));
                 }
             });
         }
         let _guard = AtTheEnd(&shared, true);
         let mut shard = 0;
         while shard < count {
-            let mut window = shared.wait_while(|w| !w.over && !w.is_done(shard) && !w.has_work(count, most));
+            let mut window = shared.wait_while(|w| !w.over && !w.done.contains_key(&shard) && !w.has_work(count, most));
             if window.over {
                 return;
             }
-            if let Some(result) = window.result(shard) {
+            if let Some(result) = window.done.remove(&shard) {
                 drop(window);
                 if hand_on(result).is_break() {
                     return;
@@ -130,7 +121,7 @@ pub(crate) fn in_order<R: Send>(
                 let own = window.take();
                 drop(window);
                 let result = work(own);
-                shared.lock().done.push((own, result));
+                shared.lock().done.insert(own, result);
             }
         }
     });

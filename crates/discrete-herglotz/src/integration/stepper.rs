@@ -54,8 +54,8 @@ pub trait Stepper<const N: usize> {
         None
     }
 
-    /// The parts of the last step, for one that ends parts at zeros of switching functions or at breaks; empty for a step
-    /// in one part, and where [`solved_stages`](Self::solved_stages) of a part are not known.
+    /// The parts into which switching times and breaks divided the last step; empty if it was not divided or the
+    /// [stages](Self::solved_stages) of a part are unknown.
     fn solved_parts(&self) -> Vec<SolvedPart<N>> {
         Vec::new()
     }
@@ -75,7 +75,7 @@ pub trait Stepper<const N: usize> {
         false
     }
 
-    /// The entries for what its steps compute and skip; that for the action applies where the action is not requested.
+    /// Plan entries: what a step computes and skips. The one for the action is used if the action is not requested.
     fn work_summary(&self) -> Vec<PlanEntry> {
         Vec::new()
     }

@@ -9,7 +9,7 @@
 //!
 //! | Measure | Taken of | Reason |
 //! |---|---|---|
-//! | Two second differences of the velocity with opposite directions, [`monitor`] | every step of a discrete Lagrangian and of Gauss collocation with one or two stages, every substep of a composition, every drift of a splitting that was requested to check | An oscillation that is not resolved alternates; nothing but the velocities is needed, which every method has |
+//! | Two second differences of the velocity with opposite directions, [`monitor`] | every step of a discrete Lagrangian and of Gauss collocation with one or two stages, every substep of a composition, every drift of a splitting that was requested to check | An oscillation that is not resolved alternates; it needs only velocities, which every method has |
 //! | A single large second difference, [`monitor`] | the same steps, and those of Gauss collocation with more stages in a run | A jump of the force causes one as well, but so does a smooth force: the interval is suspect, and the next two measures decide |
 //! | Half steps, `run/checks/half_steps.rs` | suspect intervals; for methods other than Gauss collocation with at least three stages, also every step whose number is a power of two, and the last | The difference is the error of the step itself, and the measure needs no property of the method; it costs two steps |
 //! | Acceleration jump, `run/checks/acceleration_jump.rs` | suspect intervals, except for Gauss collocation with at least three stages | Half steps that begin on the same side of a jump agree with the step |
@@ -27,8 +27,8 @@
 //! error (`boundary/path_check.rs`).
 //!
 //! For a requested accuracy the steps are not given but found: trial runs with k, 2k and k + 1 steps must agree, and
-//! every step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the run with the
-//! selected steps takes no measure again but claims, rest, and for collocation those that its steps take anyway.
+//! every step of them is sampled for its defect (`run/accuracy`). Their result is an error, so that the final run
+//! repeats only the checks of claims and rest, and those that collocation steps include.
 
 pub(crate) mod monitor;
 pub(crate) mod thresholds;

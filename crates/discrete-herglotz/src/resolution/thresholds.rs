@@ -1,7 +1,7 @@
 //! The thresholds of the measures that are listed in [`crate::resolution`].
 //!
-//! Most are errors of a step that no user would accept, of a twentieth to a half, far above the errors of steps that
-//! resolve their motion: a flagged step is certainly wrong, whereas a step that is not flagged need not be accurate.
+//! Most thresholds are relative errors of a step, from 0.05 to 0.5, far above the errors of steps that resolve their
+//! motion: a flagged step is certainly wrong, whereas a step that is not flagged need not be accurate.
 //! The others are bounds on round-off, in units of the round-off of the terms from which a defect is computed.
 
 // Second differences of the velocity.

@@ -65,7 +65,7 @@ impl<const N: usize> ParameterDerivatives<N> {
         QuantityDerivatives { l: l.re, gradient: l.d, force: self.force(lagrangian, quantity, t, x, &SVector::zeros()) }
     }
 
-    /// Those of the contact Hamiltonian by which a Lagrangian is given, at a state: `H_theta` in the place of `L_theta`,
+    /// The same derivatives of a contact Hamiltonian at a state: `H_theta` in the place of `L_theta`,
     /// `(H_qtheta, H_ptheta, H_ztheta)`, and the derivative of the force with that of the velocity `H_p`. NaN for a
     /// Lagrangian that is not given by one.
     #[inline(never)]

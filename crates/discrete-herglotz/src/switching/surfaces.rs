@@ -261,7 +261,7 @@ impl Surfaces {
     }
 
     /// The other surfaces that the curve of a step crosses at the same point, which is the zero of one function. They
-    /// are crossed there at once: L on the other side of one of them alone need not be that of any motion.
+    /// are crossed together: crossing one alone may lead to a region that no motion enters.
     pub fn simultaneous<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,

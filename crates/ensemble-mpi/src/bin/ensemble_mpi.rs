@@ -1,25 +1,19 @@
-//! An ensemble of damped pendula on MPI ranks.
-//!
-//! ```text
-//! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --seed I --checkpoint FILE --out FILE --means
-//!     --patience S --rates]
-//! ```
+//! An ensemble of damped pendula on MPI ranks: `mpirun -np 2 ensemble_mpi`.
 //!
 //! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index.
-//! Writes a CSV file with the final states of the members or their means, with 17 digits each: the same bytes for any
-//! number of ranks, and for runs that were killed and resumed from the checkpoint. The exit code is 2 where the input
-//! is refused, a checkpoint cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
+//! Writes a CSV file with the final states of the members, with 17 digits each: the same bytes for any number of ranks,
+//! and for runs that were resumed from the checkpoint. The exit code is 2 where the input is refused, a checkpoint
+//! cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
 
 use clap::Parser;
 use contact_examples::systems::Pendulum;
 use contact_geom::VelocityPoint;
-use discrete_herglotz::{AnyIntegrator, Ensemble, Status, Steps, Until, ensemble::Member};
-use ensemble_mpi::{Merged, MpiError, Options, run};
+use discrete_herglotz::{AnyIntegrator, Ensemble, Steps, Until, ensemble::Member};
+use ensemble_mpi::{MpiError, run};
 use mpi::topology::Communicator;
-use std::cell::Cell;
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -38,169 +32,113 @@ struct Arguments {
     /// The integrator.
     #[arg(long, default_value = "blanes_moan_6")]
     method: AnyIntegrator,
-    /// The seed of the random initial states, in addition to the index.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     /// A file with the shards that are done, from which the run is resumed.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
     /// The file for the final states.
     #[arg(long, value_name = "FILE", default_value = "ensemble_mpi.csv")]
     out: PathBuf,
-    /// Write only the means of the final states.
-    #[arg(long)]
-    means: bool,
     /// How many seconds to wait for the next shard of a rank; by default without limit.
     #[arg(long, value_name = "SECONDS")]
-    patience: Option<f64>,
+    patience: Option<u64>,
     /// Print statistics of what rank 0 has handed out and received.
     #[arg(long)]
     rates: bool,
 }
 
 /// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at an index: a number in `[-1, 1)`.
-fn random(seed: u64, index: u64) -> f64 {
-    let mixed = |x: u64| {
-        let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
-    let word = mixed(mixed(seed).wrapping_add((index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-    (word >> 11) as f64 * f64::EPSILON - 1.0
+fn random(index: u64) -> f64 {
+    let x = (index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((x ^ (x >> 31)) >> 11) as f64 * f64::EPSILON - 1.0
 }
 
-/// The final states of members, or their means, as lines of a file that gets its name when it is complete.
+/// The final states of members as lines of a file that gets its name when it is complete.
 struct Table {
-    path: PathBuf,
-    file: BufWriter<File>,
-    /// The number of members that completed and the sums of their q, p and z, where only the means are requested.
-    sums: Option<(usize, [f64; 3])>,
+    part: PathBuf,
+    /// Created with the first member, so that no file is left where the ensemble is refused.
+    file: Option<BufWriter<File>>,
 }
 
 impl Table {
-    fn partial(path: &std::path::Path) -> PathBuf {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".part");
-        name.into()
-    }
-
-    fn create(path: PathBuf, means: bool) -> std::io::Result<Self> {
-        let mut file = BufWriter::new(File::create(Self::partial(&path))?);
-        writeln!(file, "{}", if means { "members,q,p,z" } else { "index,status,t,q,p,z" })?;
-        Ok(Table { path, file, sums: means.then_some((0, [0.0; 3])) })
-    }
-
-    fn row(&mut self, member: &Member<1>) -> std::io::Result<()> {
-        if let Some((count, sums)) = &mut self.sums {
-            if let Ok(end) = member.ending
-                && end.status == Status::Completed
-            {
-                *count += 1;
-                for (sum, x) in sums.iter_mut().zip([end.state.q[0], end.state.p[0], end.state.z]) {
-                    *sum += x;
-                }
-            }
-            return Ok(());
+    fn row(&mut self, Member { index, ending, .. }: &Member<1>) -> io::Result<()> {
+        if self.file.is_none() {
+            writeln!(self.file.insert(BufWriter::new(File::create(&self.part)?)), "index,status,t,q,p,z")?;
         }
-        match member.ending {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        match ending {
             Ok(end) => {
-                let (index, [t, q, p, z]) = (member.index, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
-                writeln!(self.file, "{index},\"{}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}", end.status)
+                let (status, [t, q, p, z]) = (end.status, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
+                writeln!(file, "{index},\"{status}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}")
             }
-            Err(cause) => writeln!(self.file, "{},\"{cause}\",,,,", member.index),
+            Err(cause) => writeln!(file, "{index},\"{cause}\",,,,"),
         }
     }
 
-    fn finish(mut self) -> std::io::Result<()> {
-        if let Some((count, sums)) = self.sums {
-            match count {
-                0 => writeln!(self.file, "0,,,")?,
-                _ => {
-                    let [q, p, z] = sums.map(|sum| sum / count as f64);
-                    writeln!(self.file, "{count},{q:.16e},{p:.16e},{z:.16e}")?;
-                }
-            }
-        }
-        self.file.flush()?;
-        std::fs::rename(Self::partial(&self.path), self.path)
+    fn finish(mut self, path: &Path) -> io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), BufWriter::flush)?;
+        std::fs::rename(self.part, path)
     }
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let Some(universe) = mpi::initialize() else {
-        eprintln!("error: the MPI library is already initialized");
-        return ExitCode::from(2);
-    };
+    let Some(universe) = mpi::initialize() else { return ExitCode::from(2) };
     let world = universe.world();
-    let is_root = world.rank() == 0;
-    let fail = |message: &dyn std::fmt::Display, code: u8| {
-        if is_root {
-            eprintln!("error: {message}");
-        }
-        ExitCode::from(code)
-    };
-    let patience = match arguments.patience.map(Duration::try_from_secs_f64).transpose() {
-        Ok(patience) => patience,
-        Err(cause) => return fail(&format!("--patience: {cause}; give a number of seconds"), 2),
-    };
-
     let pendulum = Pendulum { gamma: -0.01 };
     let start = |index: usize| {
-        let number = |k: u64| random(arguments.seed, 2 * index as u64 + k);
-        VelocityPoint::new([2.0 * number(0)], [number(1)], 0.0)
+        let index = 2 * index as u64;
+        VelocityPoint::new([2.0 * random(index)], [random(index + 1)], 0.0)
     };
-    let tenths = Cell::new(0);
     let mut ensemble = Ensemble::new(&pendulum, 0.0, arguments.members, start)
         .by(arguments.method)
-        .steps(Steps::Count(arguments.steps))
-        .progress(|part| {
-            if (10.0 * part) as u32 > tenths.replace((10.0 * part) as u32) {
-                eprintln!("{:3.0} %", 100.0 * part);
-            }
-        });
+        .steps(Steps::Count(arguments.steps));
     if let Some(path) = &arguments.checkpoint {
         ensemble = ensemble.checkpoint(path);
     }
-    // Created with the first member, so that no file is left where the ensemble is refused.
-    let mut table: Option<std::io::Result<Table>> = None;
-    let clock = Instant::now();
-    let merged = run(&world, &ensemble, Until::Time(arguments.time), Options { patience }, |member| {
-        let open = table.get_or_insert_with(|| Table::create(arguments.out.clone(), arguments.means));
-        if let Ok(rows) = open
-            && let Err(cause) = rows.row(member)
-        {
-            *open = Err(cause);
-        }
-    });
+    let mut part = arguments.out.clone().into_os_string();
+    part.push(".part");
+    let mut table = Table { part: part.into(), file: None };
+    let (clock, mut written) = (Instant::now(), Ok(()));
+    let merged =
+        run(&world, &ensemble, Until::Time(arguments.time), arguments.patience.map(Duration::from_secs), |member| {
+            if written.is_ok() {
+                written = table.row(member);
+            }
+        });
     let merged = match merged {
         Ok(Some(merged)) => merged,
         Ok(None) => return ExitCode::SUCCESS,
-        Err(lost @ MpiError::RankLost { .. }) => {
-            eprintln!("error: {lost}");
-            world.abort(2);
+        Err(cause) => {
+            if world.rank() == 0 || matches!(cause, MpiError::Ensemble(_)) {
+                eprintln!("error: rank {}: {cause}", world.rank());
+            }
+            if matches!(cause, MpiError::RankLost { .. }) {
+                world.abort(2);
+            }
+            return ExitCode::from(2);
         }
-        Err(cause) => return fail(&cause, 2),
     };
-    if let Some(Err(cause)) = table.map(|table| table.and_then(Table::finish)) {
-        return fail(&format!("{}: {cause}", arguments.out.display()), 1);
+    if let Err(cause) = written.and_then(|()| table.finish(&arguments.out)) {
+        eprintln!("error: {}: {cause}", arguments.out.display());
+        return ExitCode::FAILURE;
     }
-    report(&merged, clock.elapsed(), arguments.rates);
-    ExitCode::SUCCESS
-}
-
-fn report(Merged { tally, resumed, traffic, .. }: &Merged, elapsed: Duration, rates: bool) {
+    let tally = merged.tally;
     println!("{} members: {} completed, {} failed", tally.members, tally.completed, tally.failed);
-    println!("{resumed} shards read from the checkpoint");
-    if !rates {
-        return;
+    println!("{} shards read from the checkpoint", merged.resumed);
+    if arguments.rates {
+        println!("total time: {:.3} s", clock.elapsed().as_secs_f64());
+        println!("shards by rank: {:?}", merged.shards);
+        let all: usize = merged.shards.iter().sum();
+        let received = (all - merged.shards[0]).max(1);
+        let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
+        println!("bytes of a shard received: {}", merged.bytes / received);
+        println!(
+            "microseconds of rank 0 to receive a shard and assign the next: {:.1}",
+            micro(merged.messages, received)
+        );
+        println!("microseconds of rank 0 to merge a shard: {:.1}", micro(merged.merging, all));
     }
-    println!("total time: {:.3} s", elapsed.as_secs_f64());
-    println!("shards by rank: {:?}", traffic.shards);
-    let all: usize = traffic.shards.iter().sum();
-    let received: usize = traffic.shards.iter().skip(1).sum();
-    let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
-    println!("bytes of a shard received: {}", traffic.bytes / received.max(1));
-    println!("microseconds of rank 0 to receive a shard and assign the next: {:.1}", micro(traffic.messages, received));
-    println!("microseconds of rank 0 to merge a shard: {:.1}", micro(traffic.merging, all));
+    ExitCode::SUCCESS
 }

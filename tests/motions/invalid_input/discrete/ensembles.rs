@@ -40,10 +40,7 @@ pub const TESTS: &[InputTest] = &[
             "ShardedEnsemble::count",
             "ShardedEnsemble::fingerprint",
             "Merge::add",
-            "Merge::resume",
-            "Merge::has",
-            "Merge::handed_on",
-            "Merge::is_complete",
+            "Merge::missing",
             "Merge::bound",
             "Merge::tally",
         ],
@@ -138,11 +135,11 @@ fn shards(report: &mut Report) {
         return report.check(false, || "shards of a good ensemble".into());
     };
     report.check(sharded.fingerprint() != foreign.fingerprint(), || "one fingerprint of two ensembles".into());
-    let Ok(mut merge) = ensemble.merge(&sharded) else {
-        return report.check(false, || "a merge of a good ensemble".into());
-    };
     let mut indices = Vec::new();
     let mut fold = |member: &Member<1>| indices.push(member.index);
+    let Ok(mut merge) = ensemble.merge(&sharded, &mut fold) else {
+        return report.check(false, || "a merge of a good ensemble".into());
+    };
     let good: Vec<Vec<u64>> = (0..sharded.count()).map(|shard| sharded.compute(shard)).collect();
     let mut bad = vec![Vec::new(), vec![0], vec![u64::MAX; 4], vec![0; 1000]];
     bad.extend([sharded.count(), usize::MAX].map(|shard| sharded.compute(shard)));
@@ -162,16 +159,15 @@ fn shards(report: &mut Report) {
     }
     // The data of one shard with the number of the other are refused because of their length.
     for words in &bad {
-        let refused = matches!(merge.add(words, &mut fold), Err(EnsembleError::ForeignShard));
+        let refused = matches!(merge.add(words), Err(EnsembleError::ForeignShard));
         report.check(refused, || format!("{:?}.. of {} words", words.iter().take(3).collect::<Vec<_>>(), words.len()));
     }
-    report.check(merge.handed_on() == 0 && !merge.is_complete() && merge.tally().members == 0, || "taken in".into());
+    report.check(merge.missing().len() == sharded.count() && merge.tally().members == 0, || "taken in".into());
     report
         .check(merge.bound(0) > 0 && merge.bound(usize::MAX) == usize::MAX, || "the bound of no worker, of all".into());
     for words in good.iter().rev().chain(&good) {
-        report.check(merge.add(words, &mut fold).is_ok() && merge.resume(&mut fold).is_ok(), || "a good shard".into());
+        report.check(merge.add(words).is_ok(), || "a good shard".into());
     }
-    let all = (0..sharded.count()).all(|shard| merge.has(shard)) && !merge.has(usize::MAX);
-    report.check(all && merge.is_complete() && merge.tally().members == 400, || format!("{:?}", merge.tally()));
+    report.check(merge.missing().is_empty() && merge.tally().members == 400, || format!("{:?}", merge.tally()));
     report.check(indices.iter().copied().eq(0..400), || "members in another order".into());
 }

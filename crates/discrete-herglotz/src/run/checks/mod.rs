@@ -80,8 +80,8 @@ pub(crate) struct Checks<'r, 'p, L, const N: usize> {
 }
 
 impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
-    /// The checks of a run with these steps: `constant_rate` says whether `sigma_d` is the same in all of them, and
-    /// `ends_after` after how many of them an observer is expected to end the run.
+    /// The checks of a run with these steps. `constant_rate`: whether every step has the same `sigma_d`. `ends_after`:
+    /// the step at which an observer is expected to end the run.
     pub fn of(steps: &'r Discretization<'p, L, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
         let given = steps.error.is_none();
         let suspects = given && !steps.info.in_transformed_time;

@@ -25,12 +25,11 @@ use std::ops::ControlFlow;
 /// An event is a sign change along the motion. It is counted once, and if a run continues another one, in exactly one
 /// of the two:
 /// - If a run starts on the surface, where the function is 0 up to round-off, the sign at the start is that of the side
-///   to which the motion goes, and this zero is not counted. So a run that starts from the state of a crossing
+///   that the motion enters next, and this zero is not counted. So a run that starts from the state of a crossing
 ///   continues to the next one.
-/// - If a step ends on the surface, the sign at its end is that of the side to which the motion goes. If this is
-///   another side than before, the event is counted there, also at the end of the run.
-/// - Up to round-off means that the distance of the motion from the surface is at most that caused by the round-off of
-///   the time and by the round-off of the coordinates of the state. A function that stays 0 has no sign until it
+/// - At the end of a step on the surface, the side is the one that the motion enters next. If it is a new side, the
+///   event is counted, also at the end of the run.
+/// - "On the surface" means: within the rounding errors of the time and of the coordinates of the state. A function that stays 0 has no sign until it
 ///   becomes nonzero; if it is 0 from the start, its first sign is not a sign change.
 ///
 /// Simultaneous events are recorded in the order of their index.

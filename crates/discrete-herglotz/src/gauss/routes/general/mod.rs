@@ -320,8 +320,8 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
             return IterationOutcome::NonFinite;
         }
         let mut iteration = FixedPointIteration::until(1.0, 0.25);
-        // The extrapolated L_v are not those of the extrapolated velocities. A small first change then proves nothing,
-        // and the convergence test starts again with the next iteration.
+        // The extrapolated L_v are not those of the extrapolated velocities. A small first change is then no sign
+        // of convergence, and the convergence test starts again with the next iteration.
         let mut carried = !cold && !solved;
         // L is evaluated at one place in the code, so that it is inlined into this loop and compiled for its
         // instruction set.
