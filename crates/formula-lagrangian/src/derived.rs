@@ -2,13 +2,13 @@
 //! time, so that it is compiled once, with this crate.
 
 use crate::breaks::Kinks;
+use crate::derived_reset::DerivedReset;
 use crate::drag::ProvedForce;
 use crate::evaluation::At;
 use crate::formula::index;
+use crate::limits::MOST_NODES;
 use crate::node::Inputs;
 use crate::parametric_nodes::ParametricNodes;
-use crate::parser::MOST_NODES;
-use crate::resets::DerivedReset;
 use crate::structure::{Partials, is_split, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};

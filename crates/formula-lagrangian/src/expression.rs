@@ -2,9 +2,10 @@
 
 use crate::evaluation::At;
 use crate::formula::index;
+use crate::limits::MOST_NODES;
 use crate::names::Names;
 use crate::node::Inputs;
-use crate::parser::{MOST_NODES, Parser, ValueName};
+use crate::parser::{Parser, ValueName};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id, MOST_COORDINATES};
 use contact_geom::Scalar;
@@ -34,6 +35,24 @@ pub struct Expression {
     pub(crate) values: Vec<f64>,
     inputs: Inputs,
     log_factor: bool,
+}
+
+impl Formula {
+    /// Another expression over the same names, such as the function of an event.
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
+    pub fn expression(&self, text: &str) -> Result<Expression, FormulaError> {
+        Expression::parse(self, text, ValueName::Function)
+    }
+
+    /// The same, where the value may have a name that is not in use, as in `E = x'^2/2 + x^2/2`.
+    ///
+    /// # Errors
+    /// Those of [`expression`](Self::expression).
+    pub fn named_expression(&self, text: &str) -> Result<Expression, FormulaError> {
+        Expression::parse(self, text, ValueName::Any)
+    }
 }
 
 impl Expression {

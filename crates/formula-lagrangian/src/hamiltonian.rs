@@ -29,6 +29,26 @@ pub struct FormulaHamiltonian<const N: usize> {
     pub(crate) derived: Derived,
 }
 
+impl Formula {
+    /// The contact Hamiltonian for integrators, with its derivatives and its proved structure.
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`],
+    /// [`FormulaError::IsLagrangian`].
+    pub fn hamiltonian<const N: usize>(&self) -> Result<FormulaHamiltonian<N>, FormulaError> {
+        FormulaHamiltonian::new(self)
+    }
+
+    /// The same with at least as many coordinates. `p^2/2` is added for each one beyond those of the formula, which
+    /// stays at rest if it starts at rest.
+    ///
+    /// # Errors
+    /// Those of [`hamiltonian`](Self::hamiltonian); the formula may have less than `N` coordinates.
+    pub fn hamiltonian_within<const N: usize>(&self) -> Result<FormulaHamiltonian<N>, FormulaError> {
+        FormulaHamiltonian::within(self)
+    }
+}
+
 impl<const N: usize> FormulaHamiltonian<N> {
     /// The Hamiltonian of a formula.
     ///

@@ -34,6 +34,35 @@ pub struct FormulaLagrangian<const N: usize> {
     pub(crate) derived: Derived,
 }
 
+impl Formula {
+    /// The Lagrangian for integrators, with its derivatives and its proved structure. Its type is compiled once for
+    /// each dimension, for all formulas.
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`],
+    /// [`FormulaError::IsHamiltonian`].
+    pub fn lagrangian<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
+        FormulaLagrangian::new(self)
+    }
+
+    /// The same with at least as many coordinates. Each coordinate beyond those of the formula is that of an uncoupled
+    /// free particle of mass 1, which stays at rest if it starts at rest. For programs that are not compiled for each
+    /// dimension.
+    ///
+    /// ```
+    /// use formula_lagrangian::Formula;
+    /// let three = Formula::parse("sum(i, 0, n-1, v[i]^2 - q[i]^2)/2", &["x[3]"], &[])?;
+    /// assert!(three.lagrangian::<4>().is_err() && three.lagrangian_within::<4>().is_ok());
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] if the formula has more than `N` coordinates, [`FormulaError::TooLarge`].
+    pub fn lagrangian_within<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
+        FormulaLagrangian::within(self)
+    }
+}
+
 impl<const N: usize> FormulaLagrangian<N> {
     /// The Lagrangian of a formula.
     ///

@@ -1,7 +1,6 @@
 //! The names that a formula may use.
 
 use crate::functions::{FUNCTIONS, OPERATIONS};
-use crate::tables::NamedTable;
 use crate::{FormulaError, MOST_COORDINATES, nearest_name};
 use contact_geom::table::Table;
 
@@ -51,6 +50,14 @@ pub(crate) struct Block {
     pub first: usize,
     /// The number of entries of an array; `None` for a number.
     pub count: Option<usize>,
+}
+
+/// A table with its name in texts.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NamedTable {
+    pub name: String,
+    /// Its index in the graph.
+    pub index: u32,
 }
 
 /// The coordinates, parameters and tables of a formula.

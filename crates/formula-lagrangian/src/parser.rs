@@ -12,16 +12,11 @@ pub(crate) use constraints::not_holonomic;
 pub(crate) use targets::{Kind, Target};
 
 use crate::forces::{Forces, RAYLEIGH};
+use crate::limits::{LONGEST_TEXT, MOST_NODES};
 use crate::names::Names;
 use crate::token::{Token, Word, words};
 use crate::{Formula, Graph, Id, ParseError};
 
-/// The maximum length of a text, in bytes, which bounds the memory for its words.
-pub const LONGEST_TEXT: usize = 1 << 16;
-/// The maximum nesting depth of brackets, signs and powers, so that the recursive parser does not overflow the stack.
-pub const DEEPEST_NESTING: usize = 200;
-/// The maximum number of nodes of a text, which bounds the memory and the time for its derivatives.
-pub const MOST_NODES: usize = 20_000;
 /// The maximum number of words that are read; those of a sum count once for each of its terms. It bounds the time for
 /// sums of many terms that add no nodes.
 const MOST_WORDS: usize = 1_000_000;

@@ -1,9 +1,9 @@
 //! Quantities of a motion by name, for expressions that belong to a Lagrangian: energy, momenta, and the conformal
 //! factor.
 
+use crate::limits::MOST_NODES;
 use crate::names::Names;
 use crate::node::{Function, Id, Node, Operation};
-use crate::parser::MOST_NODES;
 use crate::{Formula, Graph};
 
 /// The maximum number of nodes of an expression with the derivatives of L in it: as many as L with its gradient may

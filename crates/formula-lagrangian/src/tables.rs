@@ -1,15 +1,8 @@
 //! Tables in expressions.
 
+use crate::names::NamedTable;
 use crate::{Formula, FormulaError, FormulaNames, Graph, Id, Node};
 use contact_geom::table::Table;
-
-/// A table with its name in texts.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct NamedTable {
-    pub name: String,
-    /// Its index in the graph.
-    pub index: u32,
-}
 
 impl Graph {
     /// The value of a table at a node. The table becomes one of the graph's [`tables`](Self::tables).

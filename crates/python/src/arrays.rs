@@ -145,3 +145,8 @@ pub fn matrix(py: Python<'_>, numbers: Vec<f64>, columns: usize) -> PyResult<Py<
     let rows = numbers.len() / columns.max(1);
     Ok(PyArray1::from_vec(py, numbers).reshape([rows, columns])?.unbind())
 }
+
+/// The error of a column or an event, with its text.
+pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz_runtime::RuntimeError>) -> PyResult<T> {
+    read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
+}

@@ -138,7 +138,7 @@ fn motion_of(
         .map_err(|_| value_error(format!("`attitude` has {count} numbers; it must be a quaternion (w, x, y, z)")))?;
     let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
     let event = |(function, direction, terminal): EventRequest| {
-        let mut event = crate::motion::named("the event", &function, BodyEvent::parse(&function))?;
+        let mut event = crate::arrays::named("the event", &function, BodyEvent::parse(&function))?;
         event.direction = match direction.as_str() {
             "rising" => Direction::Rising,
             "falling" => Direction::Falling,

@@ -1,7 +1,6 @@
 //! Requests for events, and for the resets that occur at them.
 
-use crate::arrays::{shown, value_error};
-use crate::motion::named;
+use crate::arrays::{named, shown, value_error};
 use crate::system::System;
 use formula_lagrangian::Reset;
 use herglotz_runtime::{Direction, Event, Formula, Impact};

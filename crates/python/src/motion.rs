@@ -1,6 +1,6 @@
 //! Requests for a motion.
 
-use crate::arrays::{number, numbers, value_error, whole, word};
+use crate::arrays::{named, number, numbers, value_error, whole, word};
 use crate::events::GivenEvent;
 use crate::signals::Signals;
 use crate::system::System;
@@ -81,11 +81,6 @@ fn no_times() -> PyErr {
         "`t` must be the final time of a motion that starts at 0, or at least two times, the first of which is the \
          initial time",
     )
-}
-
-/// The error of a column or an event, with its text.
-pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz_runtime::RuntimeError>) -> PyResult<T> {
-    read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
 }
 
 #[pymethods]

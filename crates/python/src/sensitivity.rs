@@ -1,7 +1,7 @@
 //! Derivatives of motions: forward, and by the adjoint.
 
-use crate::arrays::{matrix, value_error, vector};
-use crate::motion::{Motion, named};
+use crate::arrays::{matrix, named, value_error, vector};
+use crate::motion::Motion;
 use crate::signals::Signals;
 use herglotz_runtime::{Expression, LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
 use numpy::{PyArray1, PyArray2};

@@ -21,6 +21,7 @@
 //! ```
 
 mod body;
+mod body_resume_state;
 mod catalogue;
 mod check;
 mod column;
@@ -44,9 +45,8 @@ mod sparse;
 mod symmetry;
 mod system;
 
-pub use body::{
-    Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyResumeState, BodyTorque,
-};
+pub use body::{Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyTorque};
+pub use body_resume_state::BodyResumeState;
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{Check, MAX_CONTACT_DEFECT, MomentumSample, NotContact, Sample, StatementResidual};
 pub use column::{Column, velocity_name};

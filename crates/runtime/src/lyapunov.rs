@@ -1,11 +1,9 @@
 //! Lyapunov exponents of motions.
 
-use crate::sensitivity::check_events;
-use crate::{Motion, RunMonitor, RuntimeError, System};
 use discrete_herglotz::Status;
 
 /// The Lyapunov exponents of a motion of n coordinates: the mean growth rates of its tangent in (q, p, z); see
-/// [`System::lyapunov_exponents`].
+/// [`System::lyapunov_exponents`](crate::System::lyapunov_exponents).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LyapunovExponents {
@@ -30,31 +28,4 @@ pub struct LyapunovExponents {
     /// The distance of the sum of all exponents from `n + 1` times the rate, where the two are equal but for round-off:
     /// without an applied force.
     pub volume_defect: Option<f64>,
-}
-
-impl System {
-    /// Runs a motion, and computes its Lyapunov exponents by its tangent, made orthonormal after each step. They are
-    /// those of the discrete motion.
-    ///
-    /// ```
-    /// use herglotz_runtime::{AnyIntegrator, Motion, Start, StepControl, Steps, System};
-    /// let well = System::parse("x'^2/2 + x^2/2 - x^4/4 + 0.3*x*cos(t) - z/4", &["x"], &[])?;
-    /// let by = AnyIntegrator::Gauss { stages: 6 };
-    /// let motion = Motion::new(Start::new(0.0, [0.5], [0.1], 0.0), 50.0, StepControl::Steps { by, steps: Steps::Size(0.1) });
-    /// let found = well.lyapunov_exponents(&motion, &mut ())?;
-    /// // The sum of a pair is the rate of the conformal factor.
-    /// assert!((found.rate + 0.25).abs() < 1e-12 && found.pairing_defect.is_some_and(|defect| defect < 1e-12));
-    /// # Ok::<(), herglotz_runtime::RuntimeError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Those of [`sensitivity`](Self::sensitivity).
-    pub fn lyapunov_exponents(
-        &self,
-        motion: &Motion,
-        monitor: &mut dyn RunMonitor,
-    ) -> Result<LyapunovExponents, RuntimeError> {
-        check_events(motion)?;
-        self.kernel.lyapunov_exponents(motion, monitor)
-    }
 }

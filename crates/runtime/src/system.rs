@@ -1,6 +1,9 @@
 //! Systems given by a formula.
 
-use crate::kernel::{self, Kernel, kernel_of};
+mod derivatives;
+mod ensemble_derivatives;
+
+use crate::kernel::{self, Kernel, LOSSES_WITH_FORCE, kernel_of};
 use crate::outcome::KeptRows;
 use crate::{
     BoundaryProblem, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, FoundPath, Geometry, HamiltonianGeometry,
@@ -27,16 +30,6 @@ use std::sync::Arc;
 pub struct System {
     pub(crate) kernel: Arc<dyn Kernel>,
 }
-
-/// What motions with a force lose, and why.
-pub(crate) const LOSSES_WITH_FORCE: &[(&str, &str)] = &[
-    (
-        "contact flow",
-        "a force f changes eta = dz - L_v dq at the rate L_z eta - f dq, where f dq is the virtual work of the force",
-    ),
-    ("momenta of symmetries", "they follow the conformal factor only if the force does no work along the symmetry"),
-    ("discrete Lagrangian", "there is none with a force, and the theorems on discrete Herglotz equations do not apply"),
-];
 
 impl System {
     /// The system of a formula.

@@ -1,6 +1,7 @@
 //! Expressions of operators, by precedence.
 
-use super::{DEEPEST_NESTING, Parsed, Parser};
+use super::{Parsed, Parser};
+use crate::limits::DEEPEST_NESTING;
 use crate::token::{Token, Word};
 use crate::{Function, Id, Operation};
 

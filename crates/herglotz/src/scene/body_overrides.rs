@@ -1,7 +1,7 @@
 //! Overrides of single values of a scene with a rigid body.
 
 use super::SceneError;
-use super::body::{BodyFile, InertiaTable};
+use super::body_file::{BodyFile, InertiaTable};
 use super::body_quantity::BodyQuantity;
 use super::location::Location;
 use super::overrides::{self, OF_RUN, SOURCE};

@@ -1,6 +1,7 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
 mod body;
+mod body_file;
 mod body_overrides;
 mod body_quantity;
 mod checked;
@@ -46,7 +47,7 @@ pub fn schema() -> serde_json::Value {
         System(file::File),
         Lattice(lattice::LatticeFile),
         Ends(ends::EndsFile),
-        Body(body::BodyFile),
+        Body(body_file::BodyFile),
     }
     schemars::schema_for!(AnyFile).to_value()
 }

@@ -2,14 +2,15 @@
 
 use super::integrator::{BodyIntegrator, ForcedBody};
 use super::observer::{EventValues, Halt, Observer, Rows};
-use super::resume_state::fingerprint;
 use super::steps::of_integrator;
-use super::{Body, BodyMotion, BodyOutcome, BodyResumeState};
+use super::{Body, BodyMotion, BodyOutcome};
+use crate::body_resume_state::{BodyResumeState, Digest};
 use crate::outcome::KeptRows;
-use crate::{OutputTimes, RunMonitor, RuntimeError};
+use crate::{OutputTimes, RunMonitor, RuntimeError, StepControl};
 use contact_geom::groups::{GroupError, Rotations};
 use discrete_herglotz::groups::{GroupEvent, GroupMotion, GroupRows, GroupRun, GroupStatus};
-use discrete_herglotz::{AnyIntegrator, InputError};
+use discrete_herglotz::{AnyIntegrator, InputError, Steps};
+use std::fmt::Write;
 
 /// A motion with its steps, after the checks of its input.
 pub(super) struct Prepared {
@@ -167,4 +168,17 @@ impl Body {
         let outcome = self.run(motion, &mut kept)?;
         Ok((outcome, kept.0))
     }
+}
+
+/// A digest of the body, the motion and its steps; of events it has their number, directions and ends.
+fn fingerprint(body: &Body, motion: &BodyMotion, by: AnyIntegrator, count: usize) -> u64 {
+    let mut digest = Digest::new();
+    // The steps may be given, or have been found for an accuracy.
+    let steps = StepControl::Steps { by, steps: Steps::Count(count) };
+    let BodyMotion { t, attitude, omega, z, end, step_control: _, rows, events } = motion;
+    // An expression has no text that is the same in all processes.
+    let events: Vec<_> = events.iter().map(|event| (event.direction, event.terminal)).collect();
+    // Writing to a digest does not fail.
+    let _ = write!(digest, "{body:?} {t} {attitude:?} {omega:?} {z} {end} {steps:?} {rows:?} {events:?}");
+    digest.0
 }

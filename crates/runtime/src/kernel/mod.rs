@@ -26,6 +26,7 @@ use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{AnyIntegrator, InputError, Integrator, ResumeState, ensemble::Tally, sensitivity::Variable};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use formula_system::FormulaSystem;
+pub(crate) use run::LOSSES_WITH_FORCE;
 use sized::Sized;
 use std::sync::Arc;
 use work_thread::on_large_stack;

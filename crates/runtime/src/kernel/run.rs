@@ -3,10 +3,19 @@
 use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
-use crate::system::LOSSES_WITH_FORCE;
 use crate::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
 use discrete_herglotz::{Problem, ResumeState, Run, Until};
 use formula_lagrangian::Formula;
+
+/// What motions with a force lose, and why.
+pub(crate) const LOSSES_WITH_FORCE: &[(&str, &str)] = &[
+    (
+        "contact flow",
+        "a force f changes eta = dz - L_v dq at the rate L_z eta - f dq, where f dq is the virtual work of the force",
+    ),
+    ("momenta of symmetries", "they follow the conformal factor only if the force does no work along the symmetry"),
+    ("discrete Lagrangian", "there is none with a force, and the theorems on discrete Herglotz equations do not apply"),
+];
 
 /// The run of a motion, without its observer.
 ///

@@ -1,8 +1,7 @@
 //! States from which motions of rigid bodies are resumed.
 
-use super::{Body, BodyMotion};
-use crate::{RuntimeError, StepControl};
-use discrete_herglotz::{AnyIntegrator, CheckpointError, InputError, Steps};
+use crate::RuntimeError;
+use discrete_herglotz::{CheckpointError, InputError};
 use std::fmt::Write;
 
 /// The first word of the encoding, and the version of its format.
@@ -12,7 +11,7 @@ const VERSION: u64 = 1;
 /// The number of numbers of a saved motion.
 const SAVED: usize = 26;
 
-/// The state of an interrupted motion of a rigid body, for [`Body::resume`]: the rest of the motion is the same to the
+/// The state of an interrupted motion of a rigid body, for [`Body::resume`](crate::Body::resume): the rest of the motion is the same to the
 /// last bit.
 ///
 /// ```
@@ -42,18 +41,18 @@ pub struct BodyResumeState {
     /// A digest of the body, the motion and its steps.
     fingerprint: u64,
     /// The steps taken.
-    pub(super) taken: usize,
+    pub(crate) taken: usize,
     /// The rows passed on, of those at given times.
-    pub(super) rows: usize,
+    pub(crate) rows: usize,
     /// The saved motion.
-    pub(super) numbers: [f64; SAVED],
+    pub(crate) numbers: [f64; SAVED],
 }
 
 /// The FNV-1a hash of what is written to it.
-struct Digest(u64);
+pub(crate) struct Digest(pub u64);
 
 impl Digest {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Digest(0xcbf2_9ce4_8422_2325)
     }
 
@@ -76,26 +75,13 @@ fn digest(words: &[u64]) -> u64 {
     digest.0
 }
 
-/// A digest of the body, the motion and its steps; of events it has their number, directions and ends.
-pub(super) fn fingerprint(body: &Body, motion: &BodyMotion, by: AnyIntegrator, count: usize) -> u64 {
-    let mut digest = Digest::new();
-    // The steps may be given, or have been found for an accuracy.
-    let steps = StepControl::Steps { by, steps: Steps::Count(count) };
-    let BodyMotion { t, attitude, omega, z, end, step_control: _, rows, events } = motion;
-    // An expression has no text that is the same in all processes.
-    let events: Vec<_> = events.iter().map(|event| (event.direction, event.terminal)).collect();
-    // Writing to a digest does not fail.
-    let _ = write!(digest, "{body:?} {t} {attitude:?} {omega:?} {z} {end} {steps:?} {rows:?} {events:?}");
-    digest.0
-}
-
 impl BodyResumeState {
-    pub(super) fn new(fingerprint: u64, taken: usize, rows: usize, numbers: [f64; SAVED]) -> Self {
+    pub(crate) fn new(fingerprint: u64, taken: usize, rows: usize, numbers: [f64; SAVED]) -> Self {
         BodyResumeState { fingerprint, taken, rows, numbers }
     }
 
     /// Refuses the state of another motion.
-    pub(super) fn check(&self, fingerprint: u64) -> Result<(), RuntimeError> {
+    pub(crate) fn check(&self, fingerprint: u64) -> Result<(), RuntimeError> {
         if self.fingerprint == fingerprint {
             return Ok(());
         }

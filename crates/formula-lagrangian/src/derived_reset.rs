@@ -1,0 +1,101 @@
+//! Resets and impacts with their expressions as tapes.
+
+use crate::evaluation::At;
+use crate::impacts::DerivedImpact;
+use crate::resets::{Change, Direction, FormulaReset, Variable};
+use crate::tape::Tape;
+use crate::{Graph, Id};
+use contact_geom::switching::Control;
+use contact_geom::{Lagrangian, VelocityPoint};
+
+/// New values of variables as a tape.
+#[derive(Clone, Debug)]
+struct Assignment {
+    variables: Vec<Variable>,
+    values: Tape,
+}
+
+impl Assignment {
+    /// The tape over `n` coordinates; `None` if it is too large.
+    fn new(graph: &Graph, assigned: &[(Variable, Id)], n: usize) -> Option<Self> {
+        let (variables, values): (Vec<Variable>, Vec<Id>) = assigned.iter().copied().unzip();
+        Some(Assignment { variables, values: Tape::new(graph, &values, n)? })
+    }
+
+    /// A state with the new values.
+    fn after<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> VelocityPoint<N> {
+        let (mut after, mut values) = (*x, vec![0.0; self.variables.len()]);
+        self.values.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [&mut values]);
+        for (variable, value) in self.variables.iter().zip(values) {
+            let place = match variable {
+                Variable::Position(i) => after.q.get_mut(*i as usize),
+                Variable::Velocity(i) => after.v.get_mut(*i as usize),
+                Variable::Action => Some(&mut after.z),
+            };
+            if let Some(place) = place {
+                *place = value;
+            }
+        }
+        after
+    }
+}
+
+#[derive(Clone, Debug)]
+enum DerivedChange {
+    Assignment(Assignment),
+    Impact(DerivedImpact),
+}
+
+/// A reset or an impact with its expressions as tapes.
+#[derive(Clone, Debug)]
+pub(crate) struct DerivedReset {
+    direction: Direction,
+    change: DerivedChange,
+    rest: Option<Assignment>,
+}
+
+impl DerivedReset {
+    /// The tapes over `n` coordinates; `None` if they, or the graph with the normal of an impact, are too large.
+    pub fn new(graph: &mut Graph, reset: &FormulaReset, n: usize, limit: usize) -> Option<Self> {
+        let change = match &reset.change {
+            Change::Assignment(then) => DerivedChange::Assignment(Assignment::new(graph, then, n)?),
+            Change::Impact(law) => DerivedChange::Impact(DerivedImpact::new(graph, (*law, reset.when), n, limit)?),
+        };
+        let rest = match &reset.rest {
+            Some(rest) => Some(Assignment::new(graph, rest, n)?),
+            None => None,
+        };
+        Some(DerivedReset { direction: reset.direction, change, rest })
+    }
+
+    /// Sets the values of all constant nodes.
+    pub fn set_constants(&mut self, constants: &[f64]) {
+        match &mut self.change {
+            DerivedChange::Assignment(then) => then.values.set_constants(constants),
+            DerivedChange::Impact(impact) => impact.normal.set_constants(constants),
+        }
+        if let Some(rest) = &mut self.rest {
+            rest.values.set_constants(constants);
+        }
+    }
+
+    /// What happens where the function crosses 0; nothing in the other direction.
+    pub fn at_switch<const N: usize>(
+        &self,
+        lagrangian: &impl Lagrangian<N>,
+        t: f64,
+        x: &VelocityPoint<N>,
+        rising: bool,
+    ) -> Control<N> {
+        match &self.change {
+            _ if !self.direction.includes(rising) => Control::Continue,
+            DerivedChange::Assignment(then) => Control::Replace(then.after(t, x)),
+            DerivedChange::Impact(impact) => impact.control(lagrangian, t, x),
+        }
+    }
+
+    /// What happens where resets accumulate.
+    pub fn at_accumulation<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> Control<N> {
+        self.rest.as_ref().map_or(Control::Continue, |rest| Control::Replace(rest.after(t, x)))
+    }
+}
