@@ -154,7 +154,11 @@ impl<T: Scalar> Scalar for Pair<T> {
     }
     fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
         let (a, b) = (self.0.piecewise(of), self.1.piecewise(of));
-        std::array::from_fn(|k| Pair(a[k], b[k]))
+        let mut both = [Self::from(0.0); K];
+        for k in 0..K {
+            both[k] = Pair(a[k], b[k]);
+        }
+        both
     }
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {

@@ -14,9 +14,7 @@ use crate::numbers::registers::{Scaled, StageMap, Stages, blocks};
 use crate::resolution::thresholds::{MIN_EXACT_PRODUCT, VALUE_ROUND_OFF};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
-    numbers::{max_abs_or_nan, max_or_nan},
-    vector,
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan, vector,
 };
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
@@ -234,10 +232,24 @@ impl Between {
     }
 }
 
+/// The sum of the sizes of the last two coefficients of values at the stages.
+#[inline(always)]
+fn tail(g: &Coefficients, y: &Stages) -> f64 {
+    let mut sum = 0.0;
+    for row in &g.last {
+        sum += weighted(row, y).abs();
+    }
+    sum
+}
+
 /// The weighted sum of the stages; the weights after the last stage are 0.
 #[inline(always)]
 fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
-    weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
+    let mut sum = 0.0;
+    for i in 0..MAX_STAGES {
+        sum += weights[i] * y.0[i];
+    }
+    sum
 }
 
 /// L, with `L_q + f`, the velocity `H_p` and `L_z`, at states of a Lagrangian that is given by a contact Hamiltonian.
@@ -390,16 +402,19 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compa
         if set > 0 {
             return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
         }
-        let fastest = max_abs_or_nan(v.iter().flat_map(|v| v.0));
+        let mut fastest = 0.0;
+        for v in v {
+            for v in v.0 {
+                fastest = max_or_nan(fastest, v.abs());
+            }
+        }
         let g = Coefficients::of(s);
-        // The sum of the sizes of the last two coefficients.
-        let tail = |y: &Stages| g.last.iter().map(|row| weighted(row, y).abs()).sum::<f64>();
-        let mut expected = tail(&curve.rate) * h;
+        let mut expected = tail(g, &curve.rate) * h;
         for d in 0..N {
-            expected += relative(tail(&curve.force[d]) * h, size) + relative(tail(&curve.v[d]), fastest);
+            expected += relative(tail(g, &curve.force[d]) * h, size) + relative(tail(g, &curve.v[d]), fastest);
         }
         if curve.acts {
-            expected += relative(tail(&curve.l) * h, size_z);
+            expected += relative(tail(g, &curve.l) * h, size_z);
         }
         let mut ends = [0.0; 2];
         for i in 0..2 {
