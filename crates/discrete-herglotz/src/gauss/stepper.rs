@@ -24,6 +24,7 @@ use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::GaussRoute;
 use crate::gauss::work_summary::work_summary;
 use crate::integration::SolvedStages;
+use crate::numbers::compensated::values;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
@@ -226,7 +227,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     #[inline(always)]
     fn values(&self) -> StepStart<N> {
         let RouteState { q, y, z } = with_route!(&*self.route, run => run.state());
-        StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
+        StepStart { q: values(q), y: values(y), z: z.value }
     }
 
     /// The compensation terms of the state's compensated sums.

@@ -8,7 +8,7 @@ use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::work_summary::GaussRoute;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated};
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, values};
 use crate::numbers::double_double::solve_exactly;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::saved;
@@ -193,7 +193,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
     }
 
     fn start(&self) -> StepStart<N> {
-        StepStart { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
+        StepStart { q: values(&self.q), y: values(&self.v), z: self.z.value }
     }
 
     #[inline(always)]
@@ -210,7 +210,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
     fn step(&mut self) {
         let (q, v) = (self.q, self.v);
         if let Some(action) = &self.action {
-            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.equilibrium_position, v.map(|v| v.value));
+            let (q, v) = (SVector::from(values(&q)) - action.equilibrium_position, values(&v));
             let mut change = action.constant;
             for i in 0..N {
                 let (mut of_q, mut of_v) = (action.q[i], action.v[i]);

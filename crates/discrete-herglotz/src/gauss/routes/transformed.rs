@@ -10,7 +10,7 @@ use crate::gauss::stages::parametrization::{Extension, Fictitious, Parametrizati
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
 use crate::integration::check_unforced;
-use crate::numbers::compensated::CompensatedSum;
+use crate::numbers::compensated::{CompensatedSum, values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::numbers::state_words::{Saved, load_option, save_option};
@@ -109,7 +109,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> TransformedStepper<'a, L, N> {
     /// start of the last step is not known.
     pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         let (general, from) = (&*self.general, self.from.as_ref()?);
-        let value = |x: &[CompensatedSum; N]| SVector::from(x.map(|x| x.value));
+        let value = |x: &[CompensatedSum; N]| SVector::from(values(x));
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
         let (&StageTable { s, h, .. }, transformation) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
@@ -256,7 +256,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, 
 
     fn state(&self) -> PhasePoint<N> {
         let Values { q, p, z, .. } = self.general.values();
-        PhasePoint { q: q.map(|q| q.value).into(), p: p.map(|p| p.value).into(), z: z.value }
+        PhasePoint { q: values(&q).into(), p: values(&p).into(), z: z.value }
     }
 
     /// The physical time.

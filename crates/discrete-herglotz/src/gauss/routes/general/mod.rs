@@ -19,7 +19,7 @@ use crate::gauss::stages::parametrization::{Extension, Parametrization, Values};
 use crate::gauss::stages::simplified_newton::{CorrectStages, StageNewton};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite, values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{StageMap, Stages, blocks};
@@ -225,7 +225,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
 
     /// The rate dt/dtau at the state.
     pub fn rate(&self) -> f64 {
-        self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
+        self.extension.transformation.rate(&SVector::from(values(&self.q)))
     }
 
     /// Computes the stage velocities multiplied by the weights, and by g in transformed time.
@@ -378,7 +378,7 @@ impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L,
         Instructions::new().dispatch(CorrectStages {
             newton,
             table: &self.table,
-            start: (self.q.map(|q| q.value), self.p.map(|p| p.value), self.z.value),
+            start: (values(&self.q), values(&self.p), self.z.value),
             l_v: &self.l_v,
             l: &self.l,
             force: &self.force,

@@ -9,6 +9,7 @@ use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::work_summary::GaussRoute;
+use crate::numbers::compensated::values;
 use crate::{StepError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
@@ -16,7 +17,7 @@ use pulp::Simd;
 
 impl<L: Lagrangian<N>, const N: usize> General<'_, L, Physical, N> {
     fn phase_point(&self) -> PhasePoint<N> {
-        PhasePoint { q: self.q.map(|q| q.value).into(), p: self.p.map(|p| p.value).into(), z: self.z.value }
+        PhasePoint { q: values(&self.q).into(), p: values(&self.p).into(), z: self.z.value }
     }
 }
 

@@ -13,7 +13,7 @@ use crate::gauss::resolution::tail::{Tail, of_sigma};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite, values};
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
@@ -122,7 +122,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
 
     /// The state at the start of the next step.
     pub fn phase_point(&self) -> PhasePoint<N> {
-        PhasePoint { q: self.q.map(|q| q.value).into(), p: self.p.map(|p| p.value).into(), z: self.z.value }
+        PhasePoint { q: values(&self.q).into(), p: values(&self.p).into(), z: self.z.value }
     }
 
     /// Takes one step from the time `t`; on failure the state is unchanged.

@@ -8,6 +8,7 @@ use crate::gauss::routes::{RouteState, StageRoute, set_compensation};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::position_newton::{At, PositionNewton};
 use crate::gauss::work_summary::GaussRoute;
+use crate::numbers::compensated::values;
 use crate::numbers::registers::Stages;
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
@@ -51,7 +52,7 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, 
 
     fn linearise_at_state(&mut self, t: f64) -> bool {
         self.forget();
-        self.linearise(t, self.q.map(|q| q.value).into())
+        self.linearise(t, values(&self.q).into())
     }
 
     fn suspend_newton(&mut self) {
@@ -62,7 +63,7 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, 
     /// The initial guess uses the forces of the step before, if they are known; otherwise it is a motion without forces.
     fn solve_stages(&mut self, t: f64) -> Result<(), StepError> {
         let positions = self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
-        let (q, v) = (SVector::from(self.q.map(|q| q.value)), SVector::from(self.v.map(|v| v.value)));
+        let (q, v) = (SVector::from(values(&self.q)), SVector::from(values(&self.v)));
         let inverse_mass = self.inverse_mass.as_deref();
         positions.solve(&At { lagrangian: self.lagrangian, table: &self.table, inverse_mass, t, q, v })?;
         self.rest = [Stages::ZERO; N];
