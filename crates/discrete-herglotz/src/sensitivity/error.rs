@@ -50,19 +50,6 @@ pub enum SensitivityError {
         /// The variable.
         variable: Variable,
     },
-    /// A direction has another number of components than there are variables, or one that is not finite.
-    #[error(
-        "direction {index} has {components} components for {variables} variables; pass a finite component for each \
-         variable"
-    )]
-    Direction {
-        /// The direction, counted from 0.
-        index: usize,
-        /// The number of its components.
-        components: usize,
-        /// The number of variables.
-        variables: usize,
-    },
     /// A variable that the start of the problem does not have.
     #[error(
         "the start of the problem was given by its {given}, not by its {other}; differentiate with respect to the {given}"
