@@ -39,10 +39,11 @@ pub fn of_folder(name: &str, within: &str) -> BTreeSet<String> {
         let handed_on = inner.zip(own.as_deref()).filter(|(m, own)| declares(own, m) && is_reached(m));
         let module = handed_on.map(|(m, _)| m).or(Some(folder).filter(|m| declares(&lib, m)));
         // All of a public module, but of a folder only what its `mod.rs` exports.
-        let exported = match (module, own.as_deref()) {
+        let exported: Option<BTreeSet<&str>> = match (module, own.as_deref()) {
             (Some(m), Some(_)) if m == folder => Some(of_folders.union(&of_the_crate).copied().collect()),
             (Some(_), _) => None,
-            (None, _) => Some(of_the_crate.clone()),
+            // Of a private module what the crate or a public module exports.
+            (None, _) => Some(of_folders.union(&of_the_crate).copied().collect()),
         };
         read(text, module, &|name| exported.as_ref().is_none_or(|names| names.contains(name)), &mut entries);
     }

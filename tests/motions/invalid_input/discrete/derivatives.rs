@@ -2,7 +2,7 @@
 
 use super::runs::seven;
 use crate::invalid_input::InputTest;
-use crate::invalid_input::numbers::{BASE, CLAIMING, EXTREME, Report, places, triples};
+use crate::invalid_input::numbers::{CLAIMING, EXTREME, Report, places, triples};
 use crate::lagrangians::One;
 use contact_geom::{Parametric, VelocityPoint};
 use discrete_herglotz::sensitivity::{SensitivityError, StateDerivative, Variable};
@@ -31,7 +31,5 @@ fn derivatives_in_all_variables(report: &mut Report) {
         let bad = seven(&problem, by).tangent(&Variable::all(&problem), Until::Time(factor));
         let refused = matches!(bad, Err(SensitivityError::Input(InputError::Span { .. })));
         report.check(factor.is_finite() || refused, || format!("a span of {factor}"));
-        let in_span = seven(&problem, by).tangent(&[Variable::Action], Until::Time(BASE[0]));
-        report.entry_point(&factor, in_span.map(|run| numbers(&run.columns)));
     }
 }

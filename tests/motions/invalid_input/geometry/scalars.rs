@@ -7,11 +7,12 @@ use contact_geom::{
     DiscretePoint, Dual, PhasePoint, Scalar, VelocityPoint,
     numbers::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan},
     support::{linear, seed},
+    vector,
 };
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
-        entries: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
+        entries: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan", "vector_of"],
         run: maxima,
     },
     InputTest {
@@ -96,6 +97,10 @@ fn maxima(report: &mut Report) {
         }
     }
     report.check(max_abs_or_nan([]) == 0.0, || "the largest of nothing".into());
+    for a in EXTREME {
+        let x: SVector<f64, 3> = vector!(|i| if i == 1 { a } else { 0.0 });
+        report.check(x[1].to_bits() == a.to_bits() && x[0] == 0.0 && x[2] == 0.0, || format!("vector_of: {x}"));
+    }
 }
 
 /// Matrices that are singular, nearly singular or not finite.
