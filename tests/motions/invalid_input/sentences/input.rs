@@ -147,7 +147,7 @@ fn input_errors() {
     let problem = Problem::new(&pendulum, 0.5, start).unwrap();
     let in_steps = |steps| problem.steps(steps).plan(Until::Time(5.5)).err().unwrap();
     let kepler = Kepler::<2>::default();
-    every!(InputError, "discrete-herglotz/src/error.rs" {
+    every!(InputError, "discrete-herglotz/src/error/mod.rs" {
         InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite nonzero number", "positive if the end of the run gives"];
         InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(f64::INFINITY)).err().unwrap(), ["is inf;", "finite and nonzero", "negative for a run backward"];
         InputError::Accuracy { .. } => {
@@ -303,7 +303,7 @@ fn selection_failures() {
             other => panic!("{other:?}"),
         }
     };
-    every!(SelectionFailure, "discrete-herglotz/src/error.rs" {
+    every!(SelectionFailure, "discrete-herglotz/src/error/mod.rs" {
         SelectionFailure::RoundOff => failure(Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
         SelectionFailure::Chaos { .. } => failure(Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
         SelectionFailure::Order { .. } => failure(Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];

@@ -107,7 +107,7 @@ impl Lagrangian<1> for QuadraticAtFirst {
 fn step_errors() {
     let forward = |ld: &dyn Fn(&mut Solver<1>) -> Option<StepError>| ld(&mut Solver::default()).unwrap();
     let guess = SVector::from([0.5]);
-    every!(StepError, "discrete-herglotz/src/error.rs" {
+    every!(StepError, "discrete-herglotz/src/error/mod.rs" {
         StepError::NotConverged { .. } => {
             let gauss = Gauss::new(one(Pendulum { gamma: 0.0 }), 2, 50.0).unwrap();
             let mut stepper = gauss.stepper(0.0, pendulum_at(0.5), guess).unwrap().without_newton();
