@@ -191,7 +191,7 @@ const LOST: usize = 4;
 /// up to the first step that is [wrong](ORDER_ONE): after that the motion may run away and take long to compute.
 fn worst_step<const N: usize>(
     problem: &Problem<N>,
-    plan: &Plan<'_, RandomSystem<N>, N>,
+    plan: &Plan<'_, N>,
     [size_q, size_p, _]: [f64; 3],
 ) -> Result<(usize, f64), Wrong> {
     let none = (0, 0.0);

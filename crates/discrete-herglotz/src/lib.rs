@@ -46,6 +46,7 @@ pub mod splitting;
 pub mod statements;
 mod status;
 mod switching;
+mod system;
 #[cfg(test)]
 mod test_lagrangians;
 pub mod theory;
@@ -82,6 +83,7 @@ pub use run::{
 };
 pub use status::{Status, UnresolvedStep};
 pub use switching::DividedGauss;
+pub use system::System;
 pub use theory::discrete_lagrangian::{DiscreteLagrangian, DiscreteStep};
 
 pub use contact_geom;

@@ -44,7 +44,7 @@ fn ten_steps<'p, 'o, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The titles of what a plan computes, and of what it skips.
-fn titles<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: bool) -> Vec<&'static str> {
+fn titles<const N: usize>(plan: &Plan<'_, N>, computed: bool) -> Vec<&'static str> {
     plan.entries().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
 }
 

@@ -153,7 +153,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         interrupt: Option<Interrupt<'a>>,
     ) -> Result<(f64, usize), InputError> {
         self.with(integrator, lagrangian, start, interrupt, |run| {
-            let plan: Plan<'_, L, N> = run.plan(self.until)?;
+            let plan: Plan<'_, N> = run.plan(self.until)?;
             Ok((plan.step_size(), plan.count()))
         })
     }

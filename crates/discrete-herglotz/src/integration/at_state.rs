@@ -1,8 +1,8 @@
 //! L and its derivatives at a state (q, p, z).
 
-use crate::{StepError, theory::legendre_inverse};
+use crate::{StepError, System, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{PhasePoint, VelocityPoint};
 
 /// The velocity, and L with its derivatives, at a state.
 pub(crate) struct AtState<const N: usize> {
@@ -20,23 +20,24 @@ pub(crate) struct AtState<const N: usize> {
 ///
 /// # Errors
 /// Those of [`legendre_inverse`].
-pub(crate) fn at_state<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn at_state<const N: usize>(
+    system: &dyn System<N>,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Result<AtState<N>, StepError> {
-    if const { L::HINTS.hamiltonian }
-        && let Some((h, d)) = lagrangian.hamiltonian_with_gradient(t, state)
+    let hints = system.hints();
+    if hints.hamiltonian
+        && let Some((h, d)) = system.hamiltonian_with_gradient(t, state)
     {
         let x = VelocityPoint { q: state.q, v: d.y, z: state.z };
         let mut force = -d.x;
-        if const { L::HINTS.forced } {
-            force += lagrangian.applied_force(t, &x);
+        if hints.forced {
+            force += system.applied_force(t, &x);
         }
         return Ok(AtState { x, l: state.p.dot(&d.y) - h, force, rate: -d.z });
     }
-    let x = legendre_inverse(lagrangian, t, state, guess)?;
-    let (l, g) = lagrangian.with_gradient_and_force(t, &x);
+    let x = legendre_inverse(system, t, state, guess)?;
+    let (l, g) = system.with_gradient_and_force(t, &x);
     Ok(AtState { x, l, force: g.x, rate: g.z })
 }

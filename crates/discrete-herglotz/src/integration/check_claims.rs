@@ -1,44 +1,36 @@
 //! Numerical checks of the claimed structure of a Lagrangian.
 
-use crate::{InputError, theory::legendre_inverse};
+use crate::{InputError, System, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    Defect, ForceStructure, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, numbers::max_abs_or_nan,
+    Defect, ForceStructure, GeometryError, PhasePoint, Structure, VelocityPoint, numbers::max_abs_or_nan,
 };
 
 /// Refuses a Lagrangian with an applied force, for a method that takes none.
 ///
 /// # Errors
 /// [`InputError::Forced`].
-pub fn check_unforced<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    method: &'static str,
-) -> Result<(), InputError> {
-    if lagrangian.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
+pub fn check_unforced<const N: usize>(system: &dyn System<N>, method: &'static str) -> Result<(), InputError> {
+    if system.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
 }
 
 /// Refuses a Lagrangian with a force that is no kick, a function of time and positions alone.
 ///
 /// # Errors
 /// [`InputError::Forced`].
-pub(crate) fn check_kicks<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    method: &'static str,
-) -> Result<(), InputError> {
-    let kicks = const { !L::HINTS.forced } || lagrangian.force_structure().is_of_positions();
+pub(crate) fn check_kicks<const N: usize>(system: &dyn System<N>, method: &'static str) -> Result<(), InputError> {
+    let kicks = !system.hints().forced || system.force_structure().is_of_positions();
     if kicks { Ok(()) } else { Err(InputError::Forced { method }) }
 }
 
 /// Whether L is separable with a force of time and positions alone, if any.
-#[inline(always)]
-pub(crate) fn is_separable<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {
-    structure.separable && (const { !L::HINTS.forced } || lagrangian.force_structure().is_of_positions())
+pub(crate) fn is_separable<const N: usize>(system: &dyn System<N>, structure: &Structure) -> bool {
+    structure.separable && (!system.hints().forced || system.force_structure().is_of_positions())
 }
 
 /// Whether the action may act on the motion by more than a rate that depends on time alone.
-#[inline(always)]
-pub(crate) fn depends_on_action<L: Lagrangian<N>, const N: usize>(lagrangian: &L, structure: &Structure) -> bool {
-    !structure.is_affine_in_z() || const { L::HINTS.forced } && lagrangian.force_structure() == ForceStructure::General
+pub(crate) fn depends_on_action<const N: usize>(system: &dyn System<N>, structure: &Structure) -> bool {
+    !structure.is_affine_in_z() || system.hints().forced && system.force_structure() == ForceStructure::General
 }
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
@@ -51,28 +43,28 @@ pub(crate) const MAX_CLAIM_DEFECT: f64 = 1e-12;
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at
 /// neither point.
-pub fn check_claims<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub fn check_claims<const N: usize>(
+    system: &dyn System<N>,
     t: f64,
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
-    let structure = lagrangian.structure();
+    let structure = system.structure();
     let nearby = near(start);
     for (t, x) in [(t, start), (shifted(t, 2 * N + 1), &nearby)] {
-        if let Some(Defect { claim, size }) = force_defect(lagrangian, t, x) {
+        if let Some(Defect { claim, size }) = force_defect(system, t, x) {
             return Err(InputError::FalseClaim { claim, size });
         }
     }
-    if const { L::HINTS.hamiltonian } {
+    if system.hints().hamiltonian {
         // The claims on the Hamiltonian are verified by the problem, at its state.
         return Ok(structure);
     }
-    if const { L::HINTS.proved } {
-        let value = lagrangian.value(t, &start.q, &start.v, start.z);
+    if system.hints().proved {
+        let value = system.value(t, start);
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
     }
-    let at_both = [(t, start), (shifted(t, 2 * N + 1), &nearby)].map(|(t, x)| structure.defects(lagrangian, t, x));
+    let at_both = [(t, start), (shifted(t, 2 * N + 1), &nearby)].map(|(t, x)| system.claim_defects(t, x));
     if at_both.iter().all(Option::is_none) {
         return Err(GeometryError::Undefined { what: "the Lagrangian" }.into());
     }
@@ -99,13 +91,13 @@ fn near<const N: usize>(x: &VelocityPoint<N>) -> VelocityPoint<N> {
 
 /// The defect of the declared structure of an applied force, if it is false at a point: the force is compared with its
 /// declared form, which does not depend on the action.
-fn force_defect<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
-    if const { !L::HINTS.forced } {
+fn force_defect<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
+    if !system.hints().forced {
         return None;
     }
-    let force = lagrangian.applied_force(t, x);
-    let at_rest = || lagrangian.applied_force(t, &VelocityPoint { v: SVector::zeros(), z: shifted(x.z, 2 * N), ..*x });
-    let (at_rest, linear, quadratic) = match lagrangian.force_structure() {
+    let force = system.applied_force(t, x);
+    let at_rest = || system.applied_force(t, &VelocityPoint { v: SVector::zeros(), z: shifted(x.z, 2 * N), ..*x });
+    let (at_rest, linear, quadratic) = match system.force_structure() {
         ForceStructure::Drag { linear, quadratic } => (at_rest(), linear, quadratic * x.v.norm()),
         ForceStructure::None => (SVector::zeros(), SVector::zeros(), 0.0),
         _ => return None,
@@ -122,27 +114,27 @@ fn force_defect<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &Ve
 
 /// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None`
 /// where L is not defined, or where the inverse Legendre transformation fails.
-pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn violated_claim<const N: usize>(
+    system: &dyn System<N>,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Option<Defect> {
-    if const { L::HINTS.proved && !L::HINTS.forced } {
+    let hints = system.hints();
+    if hints.proved && !hints.forced {
         return None;
     }
-    if const { L::HINTS.hamiltonian } {
-        return lagrangian.hamiltonian_defect(t, state);
+    if system.hints().hamiltonian {
+        return system.hamiltonian_defect(t, state);
     }
-    let structure = lagrangian.structure();
-    let x = legendre_inverse(lagrangian, t, state, guess).ok()?;
-    if let Some(defect) = force_defect(lagrangian, t, &x) {
+    let x = legendre_inverse(system, t, state, guess).ok()?;
+    if let Some(defect) = force_defect(system, t, &x) {
         return Some(defect);
     }
-    if const { L::HINTS.proved } {
+    if system.hints().proved {
         return None;
     }
-    structure.defects(lagrangian, t, &x)?.find(|d| d.size > MAX_CLAIM_DEFECT)
+    system.claim_defects(t, &x)?.find(|d| d.size > MAX_CLAIM_DEFECT)
 }
 
 /// Verifies the claims at an initial point at this number of times in a span. A false claim on the time dependence
@@ -150,21 +142,21 @@ pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
-pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn check_claims_over<const N: usize>(
+    system: &dyn System<N>,
     t0: f64,
     span: f64,
     start: &VelocityPoint<N>,
     times: usize,
 ) -> Result<(), InputError> {
-    if const { L::HINTS.proved || L::HINTS.hamiltonian } {
+    let hints = system.hints();
+    if hints.proved || hints.hamiltonian {
         return Ok(());
     }
-    let structure = lagrangian.structure();
     for i in 1..=times {
         // Multiples of the golden ratio modulo 1, which do not coincide with the zeros of a periodic function.
         let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();
-        let defects = structure.defects(lagrangian, t, start).into_iter().flatten();
+        let defects = system.claim_defects(t, start).into_iter().flatten();
         if let Some(Defect { claim, size }) = { defects }.find(|d| d.size > MAX_CLAIM_DEFECT) {
             return Err(InputError::FalseClaim { claim, size });
         }

@@ -78,7 +78,7 @@ pub struct StepperOptions {
 /// this crate, the exact flow, and those of a user.
 ///
 /// For a [`DiscreteLagrangian`](crate::DiscreteLagrangian), [`CustomMethod`](crate::CustomMethod) is an implementation.
-pub trait Integrator<'a, L, const N: usize> {
+pub trait Integrator<'a, L: ?Sized, const N: usize> {
     /// The properties of the method.
     fn info(&self) -> MethodInfo;
 

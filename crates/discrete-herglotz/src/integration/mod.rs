@@ -2,6 +2,7 @@
 //! interruption and the entries of a plan.
 
 mod at_state;
+mod bound;
 pub(crate) mod check_claims;
 pub(crate) mod dense_step;
 pub(crate) mod integrator;
@@ -21,6 +22,7 @@ mod solved_step;
 pub(crate) mod stepper;
 
 pub(crate) use at_state::{AtState, at_state};
+pub(crate) use bound::{Bound, SharedIntegrator};
 pub use check_claims::{check_claims, check_unforced};
 pub(crate) use check_claims::{check_kicks, depends_on_action, is_separable};
 pub use dense_step::DenseStep;
@@ -29,6 +31,7 @@ pub use interrupt::{INTERRUPTION, Interrupt};
 pub(crate) use motion::Motion;
 pub use node::Node;
 pub use plan_entry::PlanEntry;
+pub(crate) use problem::SystemProblem;
 pub use problem::{Problem, Start};
 pub(crate) use quantity_derivatives::QuantityDerivatives;
 pub use reset::{Piece, Reset};

@@ -3,13 +3,13 @@
 use crate::integration::check_claims::check_claims;
 use crate::integration::{AtState, at_state};
 use crate::{
-    DiscreteLagrangian, InputError, Interrupt, StepError,
+    DiscreteLagrangian, InputError, Interrupt, StepError, System,
     theory::{discrete_regularity, legendre_inverse, legendre_minus},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactHamiltonian, Defect, Derivatives, DiscretePoint, GeometryError, Lagrangian, OfHamiltonian, PhasePoint,
-    Regularity, Structure, VelocityPoint, legendre, numbers::max_abs_or_nan,
+    ContactHamiltonian, Defect, DiscretePoint, GeometryError, Lagrangian, OfHamiltonian, PhasePoint, Regularity,
+    Structure, VelocityPoint, numbers::max_abs_or_nan,
 };
 
 /// The initial state of a motion.
@@ -50,7 +50,7 @@ impl<const N: usize> From<PhasePoint<N>> for Start<N> {
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 #[derive(Debug)]
-pub struct Problem<'a, L, const N: usize> {
+pub struct Problem<'a, L: ?Sized, const N: usize> {
     pub(crate) lagrangian: &'a L,
     pub(crate) t0: f64,
     /// The initial state with its velocity, and (`state`) with its momentum.
@@ -65,92 +65,22 @@ pub struct Problem<'a, L, const N: usize> {
     pub(crate) interrupt: Option<Interrupt<'a>>,
 }
 
-impl<L, const N: usize> Clone for Problem<'_, L, N> {
+/// A problem as runs, checks and searches see it, whatever its Lagrangian.
+pub(crate) type SystemProblem<'a, const N: usize> = Problem<'a, dyn System<N> + 'a, N>;
+
+impl<L: ?Sized, const N: usize> Clone for Problem<'_, L, N> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<L, const N: usize> Copy for Problem<'_, L, N> {}
+impl<L: ?Sized, const N: usize> Copy for Problem<'_, L, N> {}
 
-impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
-    /// The problem of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
-    ///
-    /// # Errors
-    /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not
-    /// defined, a singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
-    pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
-        check_time(t0)?;
-        if N == 0 {
-            return Err(InputError::Dimension);
-        }
-        if const { L::HINTS.hamiltonian } {
-            return Self::given_by_hamiltonian(lagrangian, t0, start.into());
-        }
-        let (start, state) = match start.into() {
-            Start::Velocity(x) => {
-                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-                (x, None)
-            }
-            Start::Momentum(x, guess) => {
-                x.check()?;
-                (legendre_inverse(lagrangian, t0, &x, &guess).map_err(InputError::FirstStep)?, Some(x))
-            }
-        };
-        check_regular(lagrangian, t0, &start)?;
-        let structure = check_claims(lagrangian, t0, &start)?;
-        let from_momentum = state.is_some();
-        let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
-        Ok(Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt: None })
-    }
-
-    /// The problem of a Lagrangian that is given by a contact Hamiltonian.
-    fn given_by_hamiltonian(lagrangian: &'a L, t0: f64, start: Start<N>) -> Result<Self, InputError> {
-        if const { L::HINTS.switching_functions } {
-            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
-            return Err(InputError::Hypothesis { hypothesis });
-        }
-        let (state, from_momentum) = match start {
-            Start::Velocity(x) => {
-                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-                let state = legendre(lagrangian, t0, &x);
-                if !state.p.iter().all(|p| p.is_finite()) {
-                    return Err(InputError::NoMomentum);
-                }
-                (state, false)
-            }
-            Start::Momentum(x, _) => {
-                x.check()?;
-                (x, true)
-            }
-        };
-        let AtState { x: start, l, force, rate } =
-            at_state(lagrangian, t0, &state, &SVector::zeros()).map_err(|_| InputError::Undefined)?;
-        if !(l.is_finite() && rate.is_finite() && force.iter().all(|f| f.is_finite())) {
-            return Err(InputError::Undefined);
-        }
-        let structure = check_claims(lagrangian, t0, &start)?;
-        if let Some(Defect { claim, size }) = lagrangian.hamiltonian_defect(t0, &state) {
-            return Err(InputError::FalseClaim { claim, size });
-        }
-        Ok(Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt: None })
-    }
-
-    /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.
-    ///
-    /// # Errors
-    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the
-    /// discrete Lagrangian is not regular at the point, [`InputError::EqualPoints`] where it is not regular because
-    /// `q0 = q1`.
-    pub fn from_points(
-        lagrangian: &'a L,
-        ld: &impl DiscreteLagrangian<N>,
-        t0: f64,
-        x: DiscretePoint<N>,
-    ) -> Result<Self, InputError> {
-        check_time(t0)?;
-        let state = start_of(ld, t0, &x)?;
-        Self::new(lagrangian, t0, Start::Momentum(state, (x.q1 - x.q0) / ld.step_size()))
+impl<'a, L: ?Sized, const N: usize> Problem<'a, L, N> {
+    /// The same with another view of the Lagrangian.
+    pub(crate) fn with_lagrangian<M: ?Sized>(self, lagrangian: &'a M) -> Problem<'a, M, N> {
+        let Problem { t0, start, state, from_momentum, structure, interrupt, .. } = self;
+        Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt }
     }
 
     /// The same with an interrupt for its trial runs and error estimates. A run itself is ended by an
@@ -182,6 +112,99 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The initial state `(q, p, z)`.
     pub fn state(&self) -> &PhasePoint<N> {
         &self.state
+    }
+}
+
+impl<'a, const N: usize> SystemProblem<'a, N> {
+    /// The problem of a system after all checks of its start.
+    fn checked(system: &'a (dyn System<N> + 'a), t0: f64, start: Start<N>) -> Result<Self, InputError> {
+        check_time(t0)?;
+        if N == 0 {
+            return Err(InputError::Dimension);
+        }
+        if system.hints().hamiltonian {
+            return Self::given_by_hamiltonian(system, t0, start);
+        }
+        let (start, state) = match start {
+            Start::Velocity(x) => {
+                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
+                (x, None)
+            }
+            Start::Momentum(x, guess) => {
+                x.check()?;
+                (legendre_inverse(system, t0, &x, &guess).map_err(InputError::FirstStep)?, Some(x))
+            }
+        };
+        check_regular(system, t0, &start)?;
+        let structure = check_claims(system, t0, &start)?;
+        let from_momentum = state.is_some();
+        let state = state.unwrap_or_else(|| PhasePoint { q: start.q, p: system.gradient(t0, &start).y, z: start.z });
+        Ok(Problem { lagrangian: system, t0, start, state, from_momentum, structure, interrupt: None })
+    }
+
+    /// The problem of a Lagrangian that is given by a contact Hamiltonian.
+    fn given_by_hamiltonian(system: &'a (dyn System<N> + 'a), t0: f64, start: Start<N>) -> Result<Self, InputError> {
+        if system.hints().switching_functions {
+            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
+            return Err(InputError::Hypothesis { hypothesis });
+        }
+        let (state, from_momentum) = match start {
+            Start::Velocity(x) => {
+                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
+                let state = PhasePoint { q: x.q, p: system.gradient(t0, &x).y, z: x.z };
+                if !state.p.iter().all(|p| p.is_finite()) {
+                    return Err(InputError::NoMomentum);
+                }
+                (state, false)
+            }
+            Start::Momentum(x, _) => {
+                x.check()?;
+                (x, true)
+            }
+        };
+        let AtState { x: start, l, force, rate } =
+            at_state(system, t0, &state, &SVector::zeros()).map_err(|_| InputError::Undefined)?;
+        if !(l.is_finite() && rate.is_finite() && force.iter().all(|f| f.is_finite())) {
+            return Err(InputError::Undefined);
+        }
+        let structure = check_claims(system, t0, &start)?;
+        if let Some(Defect { claim, size }) = system.hamiltonian_defect(t0, &state) {
+            return Err(InputError::FalseClaim { claim, size });
+        }
+        Ok(Problem { lagrangian: system, t0, start, state, from_momentum, structure, interrupt: None })
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
+    /// The problem of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
+    ///
+    /// # Errors
+    /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not
+    /// defined, a singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
+    pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
+        Ok(SystemProblem::checked(lagrangian, t0, start.into())?.with_lagrangian(lagrangian))
+    }
+
+    /// The same problem without the type of its Lagrangian.
+    pub(crate) fn of_system(&self) -> SystemProblem<'a, N> {
+        self.with_lagrangian(self.lagrangian as &(dyn System<N> + 'a))
+    }
+
+    /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the
+    /// discrete Lagrangian is not regular at the point, [`InputError::EqualPoints`] where it is not regular because
+    /// `q0 = q1`.
+    pub fn from_points(
+        lagrangian: &'a L,
+        ld: &impl DiscreteLagrangian<N>,
+        t0: f64,
+        x: DiscretePoint<N>,
+    ) -> Result<Self, InputError> {
+        check_time(t0)?;
+        let state = start_of(ld, t0, &x)?;
+        Self::new(lagrangian, t0, Start::Momentum(state, (x.q1 - x.q0) / ld.step_size()))
     }
 }
 
@@ -246,13 +269,9 @@ pub(crate) fn check_time(t0: f64) -> Result<(), GeometryError> {
 }
 
 /// Returns an error for an initial state at which L is not defined or not regular.
-fn check_regular<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t0: f64,
-    start: &VelocityPoint<N>,
-) -> Result<(), InputError> {
-    let (g, w) = (lagrangian.gradient(t0, start), lagrangian.hessian(t0, start).vv);
-    let value = lagrangian.value(t0, &start.q, &start.v, start.z);
+fn check_regular<const N: usize>(system: &dyn System<N>, t0: f64, start: &VelocityPoint<N>) -> Result<(), InputError> {
+    let (g, w) = (system.gradient(t0, start), system.hessian(t0, start).vv);
+    let value = system.value(t0, start);
     if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
         return Err(InputError::Undefined);
     }

@@ -1,16 +1,17 @@
 //! The builder of a run: integrator, steps, observers and requests.
 
+use crate::gauss::Collocation;
+use crate::integration::{Bound, SharedIntegrator};
 use crate::run::accuracy;
 use crate::run::integrate::integrate;
 use crate::run::observers::observer::{Borrowed, Observer};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::planning::NO_STEP;
-use crate::run::request::{Request, Shared, StepControl, Steps, Until};
+use crate::run::request::{Request, StepControl, Steps, Until};
 use crate::run::{Outcome, Plan, ResumeState};
 use crate::{GaussCollocation, InputError, Integrator, Problem};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
-use std::sync::Arc;
 
 /// The builder of a run: a [`Problem`] with an integrator, steps and observers.
 ///
@@ -32,9 +33,9 @@ use std::sync::Arc;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 pub struct Run<'p, 'o, L, const N: usize> {
-    problem: &'p Problem<'p, L, N>,
-    integrator: Option<Shared<'p, L, N>>,
-    length: Option<StepControl<'p, L, N>>,
+    pub(crate) problem: &'p Problem<'p, L, N>,
+    integrator: Option<SharedIntegrator<'p, N>>,
+    length: Option<StepControl<'p, N>>,
     needs: OutputRequest,
     scales: Option<SVector<f64, N>>,
     estimated: bool,
@@ -58,7 +59,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 
     /// Sets the integrator.
     pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
-        Run { integrator: Some(Arc::new(integrator)), ..self }
+        Run { integrator: Some(Bound::shared(integrator, self.problem.lagrangian)), ..self }
     }
 
     /// Sets the size or the number of the steps.
@@ -78,7 +79,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// stage equations are iterated in the accelerations only; and in the transformed time of the Lagrangian if this
     /// takes far fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
-        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps)), ..self }
+        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps, self.problem.lagrangian)), ..self }
     }
 
     /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are then those of the
@@ -125,7 +126,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// [`InputError`]: a span that is not finite, a step that is 0 or not finite, missing steps or a missing
     /// integrator, a false or a missing claim of structure, an integrator whose hypotheses the Lagrangian does not
     /// satisfy, an accuracy that cannot be reached.
-    pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
+    pub fn plan(&self, until: Until) -> Result<Plan<'p, N>, InputError> {
         let needs = self.needs.and(self.observers.needs());
         let problem = self.problem;
         let (t0, Some(length)) = (problem.t0, self.length) else { return Err(InputError::NoSteps) };
@@ -151,7 +152,11 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         {
             return Err(InputError::Scale { index, scale: scales[index] });
         }
-        let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs, scales: self.scales };
+        // Written so that collocation is not compiled for a Lagrangian whose steps have no parts.
+        let parts =
+            if const { L::HINTS.switching_functions } { Some(problem.lagrangian as Collocation<'p, N>) } else { None };
+        let (integrator, scales) = (self.integrator.clone(), self.scales);
+        let request = Request { problem: problem.of_system(), t_end, span, integrator, needs, scales, parts };
         let terminal = if let StepControl::Accuracy(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;
@@ -185,7 +190,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, L, N> {
     /// Performs the run of a plan with one more observer, called after the others.
     pub(crate) fn observed(
         mut self,
-        plan: &Plan<'p, L, N>,
+        plan: &Plan<'p, N>,
         observer: &mut impl Observer<N>,
     ) -> Result<Outcome<N>, InputError> {
         let mut observers = std::mem::take(&mut self.observers);

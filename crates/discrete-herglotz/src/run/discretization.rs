@@ -1,19 +1,22 @@
 //! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
+use crate::gauss::Collocation;
+use crate::integration::SharedIntegrator;
 use crate::integration::StepEnds;
+use crate::integration::SystemProblem;
 use crate::integration::WholeStep;
 use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::integration::{AtState, at_state};
 use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::observers::output_request::OutputRequest;
-use crate::run::request::{Request, Shared, StepSelection};
+use crate::run::request::{Request, StepSelection};
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
+use contact_geom::{PhasePoint, Structure, VelocityPoint};
 
 /// The largest number of unknowns of a step for which the matrix of a linear motion is always computed. A collocation
 /// step is then multiplication by this matrix, which is computed in double-double precision.
@@ -24,27 +27,29 @@ const MAX_UNKNOWNS_OF_SMALL_MATRIX: usize = 32;
 const CUBED_UNKNOWNS_PER_STEP: usize = 1024;
 
 /// A problem with the integrator and the steps that are selected for it.
-pub(crate) struct Discretization<'p, L, const N: usize> {
-    pub problem: &'p Problem<'p, L, N>,
+pub(crate) struct Discretization<'p, const N: usize> {
+    pub problem: SystemProblem<'p, N>,
     pub t_end: f64,
     /// The step size; negative if the run goes backward in time.
     pub h: f64,
     pub count: usize,
     /// The error found by the trial runs, if an accuracy was requested.
     pub error: Option<f64>,
-    pub integrator: Shared<'p, L, N>,
+    pub integrator: SharedIntegrator<'p, N>,
     pub info: MethodInfo,
     pub needs: OutputRequest,
     /// The scales of the coordinates for errors, if they are given.
     pub scales: Option<SVector<f64, N>>,
     /// Whether the Lagrangian states switching functions.
     pub switches: bool,
+    /// The collocation steppers of a Lagrangian with switching functions, for parts of steps.
+    parts: Option<Collocation<'p, N>>,
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
+impl<'p, const N: usize> Discretization<'p, N> {
     /// The problem of a request with the selected steps.
-    pub fn new(request: &Request<'p, L, N>, selection: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
-        let Request { problem, t_end, needs, scales, .. } = *request;
+    pub fn new(request: &Request<'p, N>, selection: &StepSelection<'p, N>) -> Result<Self, InputError> {
+        let Request { problem, t_end, needs, scales, parts, .. } = *request;
         let StepSelection { integrator, count, h, error, .. } = selection.clone();
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
         let info = integrator.info();
@@ -56,17 +61,17 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
             let hypothesis = "a Lagrangian without kinks and jumps, since steps under constraints do not end on them";
             return Err(InputError::Hypothesis { hypothesis });
         }
-        Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches })
+        Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches, parts })
     }
 
     /// The problem with the structure that the steps use: for few steps a linear motion is solved like a nonlinear one,
     /// since the matrix of a step would cost more than the iterations.
-    pub fn problem_for_steps(&self) -> Problem<'p, L, N> {
+    pub fn problem_for_steps(&self) -> SystemProblem<'p, N> {
         let unknowns = self.info.collocation.unwrap_or(0) * N;
         let by_matrix =
             unknowns <= MAX_UNKNOWNS_OF_SMALL_MATRIX || unknowns.pow(3) / CUBED_UNKNOWNS_PER_STEP <= self.count;
         let structure = self.problem.structure;
-        Problem { structure: Structure { quadratic: structure.quadratic && by_matrix, ..structure }, ..*self.problem }
+        Problem { structure: Structure { quadratic: structure.quadratic && by_matrix, ..structure }, ..self.problem }
     }
 
     /// A stepper at the start of the run.
@@ -78,13 +83,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
     /// its kinks and jumps.
     pub fn stepper_of(
         &self,
-        problem: &Problem<'p, L, N>,
+        problem: &SystemProblem<'p, N>,
         h: f64,
         check_resolution: bool,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let options = StepperOptions { action: self.needs.action, check_resolution };
-        if const { L::HINTS.switching_functions } && self.switches && !self.info.divides {
-            return of_integrator(self.integrator.clone(), problem, h, options);
+        if let Some(collocation) = self.parts.filter(|_| self.switches && !self.info.divides) {
+            return of_integrator(self.integrator.clone(), collocation, problem, h, options);
         }
         self.integrator.stepper(problem, h, options)
     }
@@ -109,7 +114,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
             // steps.
             let separable = separable && (quadratic || self.info.collocation.is_none());
             let structure = Structure { quadratic, separable, ..self.problem.structure };
-            let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
+            let problem = Problem { t0: t, start, state: *from, structure, ..self.problem };
             let h = if self.info.in_transformed_time { self.h } else { h };
             let mut stepper = self.stepper_of(&problem, h, false).map_err(step_error)?;
             guess(&mut *stepper);
@@ -181,7 +186,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
+impl<const N: usize> Motion<N> for Discretization<'_, N> {
     fn velocity(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<SVector<f64, N>, StepError> {
         legendre_inverse(self.problem.lagrangian, t, state, &self.guess(near)).map(|x| x.v)
     }
@@ -202,11 +207,11 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
 
     /// A digest of the start, of L there, of the steps, and of the requests.
     fn fingerprint(&self) -> u64 {
-        let Problem { lagrangian, t0, start, state, .. } = self.problem;
+        let Problem { lagrangian, t0, start, state, .. } = &self.problem;
         let none = ([f64::NAN; 2], SVector::zeros());
         let ([value, rate], force) =
             at_state(*lagrangian, *t0, state, &start.v).map_or(none, |at| ([at.l, at.rate], at.force));
-        let of_constraints = self.integrator.constraint_force(lagrangian, *t0, start).unwrap_or(none.1);
+        let of_constraints = self.integrator.constraint_force(*lagrangian, *t0, start).unwrap_or(none.1);
         let force = force + of_constraints;
         let numbers = [*t0, self.t_end, self.h, start.z, value, rate];
         let vectors = [&start.q, &start.v, &state.p, &force];

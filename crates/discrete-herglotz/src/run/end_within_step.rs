@@ -6,7 +6,7 @@ use crate::run::findings::Findings;
 use crate::run::observers::observer::Observer;
 use crate::run::observers::output_request::RunInfo;
 use crate::run::observers::step_view::{StepView, Stop};
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::PhasePoint;
 use std::ops::ControlFlow;
 
 /// The number of bisections of a failed step: the part of it that can be taken is then known to the round-off of the
@@ -15,8 +15,8 @@ const MAX_BISECTIONS: usize = 48;
 
 /// The end of the run within the failed step, and the logarithm of the conformal factor there. All observers see the
 /// part of the step that contains the end. `None` if no observer ends the run there.
-pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
-    plan: &Plan<'_, L, N>,
+pub(crate) fn end_within_step<const N: usize>(
+    plan: &Plan<'_, N>,
     observers: &mut Vec<Box<dyn Observer<N> + '_>>,
     stepper: &dyn Stepper<N>,
     info: RunInfo,
@@ -54,8 +54,8 @@ pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
 }
 
 /// The view of a part of a step for the observers.
-fn view_of_part<'r, L: Lagrangian<N>, const N: usize>(
-    plan: &'r Plan<'_, L, N>,
+fn view_of_part<'r, const N: usize>(
+    plan: &'r Plan<'_, N>,
     part: &'r dyn Stepper<N>,
     from: (f64, PhasePoint<N>),
     (findings, taken): (Findings, usize),

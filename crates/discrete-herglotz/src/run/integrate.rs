@@ -10,15 +10,15 @@ use crate::run::observers::output_request::{OutputRequest, RunInfo};
 use crate::run::observers::step_view::{StepView, Stop};
 use crate::run::{Outcome, Plan, ResumeState};
 use crate::{InputError, Status, StepError, Stepper};
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::PhasePoint;
 
 /// The observers of a run, in the order in which they were added.
 pub(crate) type Observers<'o, const N: usize> = Vec<Box<dyn Observer<N> + 'o>>;
 
 /// Takes the steps of a plan, from its start or from a resumed state. Steps after which no check and no observer is due
 /// are taken together; the checks, and then the observers, see the end of the last of them.
-pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
-    plan: &Plan<'_, L, N>,
+pub(crate) fn integrate<const N: usize>(
+    plan: &Plan<'_, N>,
     observers: &mut Observers<'_, N>,
     from: Option<&ResumeState>,
 ) -> Result<Outcome<N>, InputError> {
@@ -47,7 +47,7 @@ pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
     Ok(run.outcome())
 }
 
-impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+impl<const N: usize> Plan<'_, N> {
     /// Performs the run without observers.
     ///
     /// # Errors
@@ -58,12 +58,12 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
 }
 
 /// The state of a run in progress.
-struct Integration<'r, 'p, 'o, L, const N: usize> {
-    plan: &'r Plan<'p, L, N>,
+struct Integration<'r, 'p, 'o, const N: usize> {
+    plan: &'r Plan<'p, N>,
     observers: &'r mut Observers<'o, N>,
     info: RunInfo,
     stepper: Box<dyn Stepper<N> + 'p>,
-    checks: Checks<'r, 'p, L, N>,
+    checks: Checks<'r, 'p, N>,
     taken: usize,
     /// Whether the last step has been taken.
     over: bool,
@@ -73,9 +73,9 @@ struct Integration<'r, 'p, 'o, L, const N: usize> {
     end: Option<(f64, PhasePoint<N>)>,
 }
 
-impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N> {
+impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
     fn new(
-        plan: &'r Plan<'p, L, N>,
+        plan: &'r Plan<'p, N>,
         observers: &'r mut Observers<'o, N>,
         from: Option<&ResumeState>,
     ) -> Result<Self, InputError> {
@@ -160,7 +160,7 @@ impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N>
             return self.plan.rests_until.is_some();
         }
         let steps = &self.plan.steps;
-        is_full_check && is_at_rest(steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
+        is_full_check && is_at_rest(&steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
     }
 
     /// Calls the observers at the end of the last step, if they are due.

@@ -7,7 +7,7 @@ use crate::run::findings::Findings;
 use crate::run::observers::step_view::StepView;
 use crate::run::request::{Request, StepSelection};
 use crate::{InputError, MethodInfo, PlanEntry, Stepper};
-use contact_geom::{Defect, Lagrangian, PhasePoint, Structure};
+use contact_geom::{Defect, PhasePoint, Structure};
 use std::cell::Cell;
 use std::fmt::{Display, Formatter};
 
@@ -24,8 +24,8 @@ const NONHOLONOMIC: &str = "not contact, as the motion: sigma_d multiplies the e
 
 /// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
 /// `Display` output lists what will be computed and what is skipped.
-pub struct Plan<'p, L, const N: usize> {
-    pub(crate) steps: Discretization<'p, L, N>,
+pub struct Plan<'p, const N: usize> {
+    pub(crate) steps: Discretization<'p, N>,
     /// The number of steps after which an observer is expected to end the run.
     pub(crate) ends_after: Option<usize>,
     work_summary: Vec<PlanEntry>,
@@ -39,9 +39,9 @@ pub struct Plan<'p, L, const N: usize> {
     start: Cell<Option<Box<dyn Stepper<N> + 'p>>>,
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+impl<'p, const N: usize> Plan<'p, N> {
     /// The plan of a request with its selected steps.
-    pub(crate) fn new(request: &Request<'p, L, N>, selection: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
+    pub(crate) fn new(request: &Request<'p, N>, selection: &StepSelection<'p, N>) -> Result<Self, InputError> {
         let steps = Discretization::new(request, selection)?;
         let stepper = steps.stepper(steps.error.is_none())?;
         Ok(Plan {
@@ -110,7 +110,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// # Errors
     /// [`InputError::FalseClaim`] with the first claim that is violated.
     pub(crate) fn check_first_steps(&self) -> Result<(), InputError> {
-        if const { L::HINTS.proved } {
+        if self.steps.problem.lagrangian.hints().proved {
             return Ok(());
         }
         let Discretization { problem, count, t_end, .. } = self.steps;
@@ -153,7 +153,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             (false, false) => PlanEntry::skipped(what, "not requested; each step checks that its sigma_d is positive"),
         });
         let what = "checks of the structure";
-        entries.push(if const { L::HINTS.proved } {
+        entries.push(if self.steps.problem.lagrangian.hints().proved {
             PlanEntry::skipped(what, "the structure is proved from the formula of L")
         } else if structure == Structure::default() {
             PlanEntry::skipped(what, "L claims no property")
@@ -177,7 +177,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Display for Plan<'_, L, N> {
+impl<const N: usize> Display for Plan<'_, N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Discretization { problem, count, h, info, t_end, .. } = &self.steps;
         let (t0, entries) = (problem.t0, self.entries());

@@ -1,13 +1,13 @@
 //! Planning: the checks of a request, its steps and its route.
 
+use crate::InputError;
 use crate::integration::check_claims::check_claims_over;
 use crate::run::Plan;
+use crate::run::accuracy::limits::DEFAULT_STAGES;
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
-use crate::run::request::{MAX_STEPS, Request, Shared, StepControl, StepSelection, Steps};
-use crate::{GaussCollocation, InputError};
-use contact_geom::{Lagrangian, numbers::max_or_nan};
-use std::sync::Arc;
+use crate::run::request::{MAX_STEPS, Request, StepControl, StepSelection, Steps};
+use contact_geom::numbers::max_or_nan;
 
 /// The number of times in the span at which the claims of structure are checked before a run with given steps.
 const CHECKED_TIMES: usize = 16;
@@ -15,13 +15,13 @@ const CHECKED_TIMES: usize = 16;
 /// The same before trial runs, which check the equations of motion along the whole span.
 const CHECKED_TIMES_BEFORE_TRIAL_RUNS: usize = 4;
 
-impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
+impl<'p, const N: usize> Request<'p, N> {
     /// The plan of the request, after all checks of its input.
     pub(crate) fn plan(
         &self,
-        length: StepControl<'p, L, N>,
+        length: StepControl<'p, N>,
         terminal: Option<Terminal<'_, N>>,
-    ) -> Result<Plan<'p, L, N>, InputError> {
+    ) -> Result<Plan<'p, N>, InputError> {
         let Request { problem, span, .. } = *self;
         if !span.is_finite() {
             return Err(InputError::Span { span });
@@ -30,8 +30,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             return self.plan_of_the_start(length);
         }
         // After the motion has come to rest, errors relative to it are undefined.
-        if let StepControl::Accuracy(..) = length
-            && let Some(t_end) = self.time_of_rest()
+        if let StepControl::Accuracy(_, _, collocation) = length
+            && let Some(t_end) = self.time_of_rest(collocation)
         {
             let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
             let mut plan = request.plan(length, terminal)?;
@@ -53,7 +53,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
         check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
         let selection = match length {
-            StepControl::Accuracy(wanted, select_steps) => select_steps(self, wanted, terminal)?,
+            StepControl::Accuracy(wanted, select_steps, collocation) => {
+                select_steps(self, wanted, collocation, terminal)?
+            }
             StepControl::Given(steps) => self.given(steps)?,
             StepControl::Exactly(count, h) => StepSelection { h, ..self.given(Steps::Count(count))? },
         };
@@ -67,14 +69,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 
     /// The plan of a run that ends at its start time: no step is taken.
-    fn plan_of_the_start(&self, length: StepControl<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+    fn plan_of_the_start(&self, length: StepControl<'p, N>) -> Result<Plan<'p, N>, InputError> {
         let (integrator, error) = match (length, &self.integrator) {
-            (StepControl::Accuracy(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
+            (StepControl::Accuracy(wanted, ..), _) if !(wanted > 0.0 && wanted.is_finite()) => {
                 return Err(InputError::Tolerance { wanted });
             }
-            (StepControl::Accuracy(..), None) => {
-                (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0))
-            }
+            (StepControl::Accuracy(_, _, collocation), None) => (collocation.gauss(DEFAULT_STAGES), Some(0.0)),
             (StepControl::Accuracy(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
             (StepControl::Given(steps), _) => (self.given(steps)?.integrator, None),
             (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
@@ -86,7 +86,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 
     /// The given steps of the given integrator.
-    fn given(&self, steps: Steps) -> Result<StepSelection<'p, L, N>, InputError> {
+    fn given(&self, steps: Steps) -> Result<StepSelection<'p, N>, InputError> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
         let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
         let span = self.span;

@@ -1,10 +1,11 @@
 //! The request of a run: its span, its steps, its integrator and its outputs.
 
+use crate::InputError;
+use crate::gauss::Collocation;
+use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
-use crate::{InputError, Integrator, Problem};
 use contact_geom::nalgebra::SVector;
-use std::sync::Arc;
 
 /// The time steps of a run. If the run goes backward in time, so do its steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,45 +28,48 @@ pub enum Until {
     Steps(usize),
 }
 
-/// A shared integrator, for the lifetime of the Lagrangian.
-pub(crate) type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
-
 /// The step-size selection for an accuracy, as a function pointer: it is not compiled into programs that request no
 /// accuracy.
-pub(crate) type SelectSteps<'p, L, const N: usize> =
-    for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<StepSelection<'p, L, N>, InputError>;
+pub(crate) type SelectSteps<'p, const N: usize> = for<'e> fn(
+    &Request<'p, N>,
+    f64,
+    Collocation<'p, N>,
+    Option<Terminal<'e, N>>,
+) -> Result<StepSelection<'p, N>, InputError>;
 
 /// How the steps of a run are determined.
-pub(crate) enum StepControl<'p, L, const N: usize> {
+pub(crate) enum StepControl<'p, const N: usize> {
     Given(Steps),
     /// This number of steps of exactly this size.
     Exactly(usize, f64),
     /// The steps that trial runs select for this error.
-    Accuracy(f64, SelectSteps<'p, L, N>),
+    Accuracy(f64, SelectSteps<'p, N>, Collocation<'p, N>),
 }
 
-impl<L, const N: usize> Clone for StepControl<'_, L, N> {
+impl<const N: usize> Clone for StepControl<'_, N> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<L, const N: usize> Copy for StepControl<'_, L, N> {}
+impl<const N: usize> Copy for StepControl<'_, N> {}
 
 /// The request of a run, without its observers.
-pub(crate) struct Request<'p, L, const N: usize> {
-    pub problem: &'p Problem<'p, L, N>,
+pub(crate) struct Request<'p, const N: usize> {
+    pub problem: SystemProblem<'p, N>,
     pub t_end: f64,
     pub span: f64,
-    pub integrator: Option<Shared<'p, L, N>>,
+    pub integrator: Option<SharedIntegrator<'p, N>>,
     pub needs: OutputRequest,
     /// The scales of the coordinates for errors, if they are given.
     pub scales: Option<SVector<f64, N>>,
+    /// The collocation steppers of a Lagrangian with switching functions, for parts of steps.
+    pub parts: Option<Collocation<'p, N>>,
 }
 
 /// The integrator and the steps that are selected for a run.
-pub(crate) struct StepSelection<'p, L, const N: usize> {
-    pub integrator: Shared<'p, L, N>,
+pub(crate) struct StepSelection<'p, const N: usize> {
+    pub integrator: SharedIntegrator<'p, N>,
     pub count: usize,
     /// The step size; in transformed time, the step of tau.
     pub h: f64,
@@ -75,7 +79,7 @@ pub(crate) struct StepSelection<'p, L, const N: usize> {
     pub ended: Option<usize>,
 }
 
-impl<L, const N: usize> Clone for StepSelection<'_, L, N> {
+impl<const N: usize> Clone for StepSelection<'_, N> {
     fn clone(&self) -> Self {
         StepSelection { integrator: self.integrator.clone(), ..*self }
     }

@@ -1,5 +1,6 @@
 //! Columns that are carried along the steps of a run.
 
+use crate::Problem;
 use crate::integration::WholeStep;
 use crate::run::discretization::Discretization;
 use crate::sensitivity::columns::Column;
@@ -11,7 +12,8 @@ use contact_geom::Parametric;
 
 /// Columns, with the rows and the zeros of switching functions on their way.
 pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
-    pub steps: &'r Discretization<'p, L, N>,
+    pub problem: &'r Problem<'p, L, N>,
+    pub steps: &'r Discretization<'p, N>,
     pub engine: StepTangent<'p, N>,
     /// For shortened steps and parts of steps.
     pub row_engine: RowTangent<'p, N>,
@@ -23,13 +25,14 @@ pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
 
 impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
     pub fn new(
-        steps: &'r Discretization<'p, L, N>,
+        problem: &'r Problem<'p, L, N>,
+        steps: &'r Discretization<'p, N>,
         engine: StepTangent<'p, N>,
         columns: Vec<Column<N>>,
         times: RowTimes,
     ) -> Self {
         let (rows, switches) = (Vec::new(), Vec::new());
-        CarriedColumns { steps, engine, row_engine: RowTangent::new(), columns, times, rows, switches }
+        CarriedColumns { problem, steps, engine, row_engine: RowTangent::new(), columns, times, rows, switches }
     }
 
     /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.
@@ -54,7 +57,7 @@ impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
         k: usize,
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
-        let (steps, problem) = (self.steps, self.steps.problem);
+        let (steps, problem) = (self.steps, self.problem);
         while let Some(t) = self.times.next_within((step.start().0, end)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
             let start = |i: usize, column: &Column<N>| match starts {

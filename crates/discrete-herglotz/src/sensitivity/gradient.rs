@@ -59,7 +59,8 @@ pub struct LossGradient<const N: usize> {
 /// The memory does not grow with the number of steps: states are kept at intervals, and the steps between them are taken
 /// again, so that the stages are bitwise those of the run.
 pub struct RecordedRun<'p, L, const N: usize> {
-    plan: Plan<'p, L, N>,
+    problem: &'p Problem<'p, L, N>,
+    plan: Plan<'p, N>,
     outcome: Outcome<N>,
     kept: KeptStates,
 }
@@ -71,12 +72,13 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
     /// Those of [`run`](Self::run), and [`SensitivityError::NoTangent`].
     pub fn record(self, until: Until) -> Result<RecordedRun<'p, L, N>, SensitivityError> {
         let run = self.differentiable()?;
+        let problem = run.problem;
         let plan = run.plan(until)?;
         // An integrator without a tangent is refused before the run.
-        StepTangent::new(&plan.steps, Direction::Backward)?;
+        StepTangent::new(problem, &plan.steps, Direction::Backward)?;
         let mut kept = KeptStates::new();
         let outcome = run.observed(&plan, &mut kept)?;
-        Ok(RecordedRun { plan, outcome, kept })
+        Ok(RecordedRun { problem, plan, outcome, kept })
     }
 
     /// Performs the run, and computes the value and the gradient of a loss of its end by the adjoint. The gradient is
@@ -143,13 +145,14 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         until: Until,
     ) -> Result<LossGradient<N>, SensitivityError> {
         let run = self.differentiable()?;
+        let problem = run.problem;
         let plan = run.plan(until)?;
         // An integrator without a tangent is refused before the run.
-        StepTangent::new(&plan.steps, Direction::Backward)?;
+        StepTangent::new(problem, &plan.steps, Direction::Backward)?;
         let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;
         let (kept, rows) = both;
-        let recorded = RecordedRun { plan, outcome, kept };
+        let recorded = RecordedRun { problem, plan, outcome, kept };
         if outcome.status != Status::Completed {
             return Ok(LossGradient { outcome, loss: None });
         }
@@ -228,7 +231,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
         of_rows: &[EndCovector<N>],
     ) -> Result<Vec<Gradient<N>>, SensitivityError> {
         let steps = &self.plan.steps;
-        let problem = steps.problem;
+        let problem = self.problem;
         let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
         let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
         let x = VelocityPoint { q: end.q, v: end.v, z: end.z };
@@ -242,10 +245,10 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
             explicit_times.push(time);
             all.push(Covector::new(&of_state, parameters));
         }
-        let mut engine = StepTangent::new(steps, Direction::Backward)?;
-        let mut rows = RowCovectors { steps, times, of_rows, tangent: RowTangent::new() };
+        let mut engine = StepTangent::new(problem, steps, Direction::Backward)?;
+        let mut rows = RowCovectors { problem, steps, times, of_rows, tangent: RowTangent::new() };
         let mut stepper = self.plan.stepper()?;
-        let mut of_parts = PartCovectors { steps, tangent: RowTangent::new() };
+        let mut of_parts = PartCovectors { problem, steps, tangent: RowTangent::new() };
         let mut block: Vec<TakenStep<N>> = Vec::with_capacity(BLOCK);
         let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
             block.clear();
@@ -278,7 +281,8 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
 
 /// The covectors of rows that are not yet added, from the last to the first.
 pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
-    steps: &'r Discretization<'p, L, N>,
+    problem: &'r Problem<'p, L, N>,
+    steps: &'r Discretization<'p, N>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
     tangent: RowTangent<'p, N>,
@@ -308,7 +312,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
         step: &WholeStep<N>,
         to: &mut Covector<N>,
     ) -> Result<f64, StepError> {
-        let problem = self.steps.problem;
+        let problem = self.problem;
         let (start, _) = step.start();
         let mut of_start = 0.0;
         while let Some(t) = self.times.last().copied() {
@@ -352,7 +356,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
         };
         (self.times, self.of_rows) = (times, of_rows);
         let (of_state, parameters, _) =
-            VelocityDependence::at(self.steps.problem, at.t, &at.point(), &at.state.p)?.pull(covector);
+            VelocityDependence::at(self.problem, at.t, &at.point(), &at.state.p)?.pull(covector);
         Ok(Some(Covector::new(&of_state, parameters)))
     }
 }

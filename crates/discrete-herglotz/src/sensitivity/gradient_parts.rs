@@ -5,7 +5,6 @@
 //! the derivative in the time of the end, which is passed on: to the times of the run, or at the zero of a switching
 //! function to the function, as a multiple of its own derivatives carried back over the same part.
 
-use crate::StepError;
 use crate::integration::{PartEnd, SolvedPart};
 use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
@@ -13,13 +12,15 @@ use crate::sensitivity::columns::Covector;
 use crate::sensitivity::gradient::RowCovectors;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent};
 use crate::sensitivity::switch::Switch;
+use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{ChartVector, Parametric};
 
 /// Carries covectors over the parts of steps.
 pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
-    pub steps: &'r Discretization<'p, L, N>,
+    pub problem: &'r Problem<'p, L, N>,
+    pub steps: &'r Discretization<'p, N>,
     pub tangent: RowTangent<'p, N>,
 }
 
@@ -77,7 +78,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
-        let (problem, t, h) = (self.steps.problem, part.to.t, self.steps.h);
+        let (problem, t, h) = (self.problem, part.to.t, self.steps.h);
         let mut gradient = None;
         if let PartEnd::Switch { index, rising, passage } = part.end {
             let switch = Switch { problem, index, rising, at: &part.to, step: k, h };
@@ -137,7 +138,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
             Some(step) => {
                 // The rates of the step after it are those of another length.
                 all.iter_mut().for_each(|covector| covector.set_state(&covector.state()));
-                self.tangent.pull(engine, self.steps.problem, step, all)
+                self.tangent.pull(engine, self.problem, step, all)
             }
             None => {
                 let rates = part.from.rates(self.steps)?;

@@ -53,7 +53,7 @@ impl<const N: usize> LyapunovExponents<N> {
 
 /// A frame of tangents that is carried along a run, and made orthonormal after each step.
 struct Frame<'r, 'p, L, const N: usize> {
-    plan: &'r Plan<'p, L, N>,
+    plan: &'r Plan<'p, N>,
     carried: CarriedColumns<'r, 'p, L, N>,
     /// The logarithms of the factors by which the frame was stretched.
     logarithms: Vec<f64>,
@@ -183,19 +183,20 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
             _ => {}
         }
         let run = self.differentiable()?.with_conformal_factor();
+        let problem = run.problem;
         let plan = run.plan(until)?;
         if plan.steps.info.constrained {
             // Of the 2n + 1 directions of the frame only those that are tangent to the constraints are of the motion.
             let method = plan.steps.info.name.clone();
             return Err(SensitivityError::UnderConstraints { method, what: "Lyapunov exponents" });
         }
-        let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
+        let engine = StepTangent::new(problem, &plan.steps, Direction::Forward)?;
         let columns = initial_frame(coordinates);
-        let (t0, state) = (plan.steps.problem.t0, plan.steps.problem.state);
+        let (t0, state) = (problem.t0, problem.state);
         let mut frame = Frame {
             plan: &plan,
             logarithms: vec![0.0; columns.len()],
-            carried: CarriedColumns::new(&plan.steps, engine, columns, RowTimes::new(&[])),
+            carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(&[])),
             middle: None,
             before: (t0, state),
             taken: 0,

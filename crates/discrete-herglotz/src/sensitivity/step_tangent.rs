@@ -33,7 +33,8 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     /// # Errors
     /// [`SensitivityError::NoTangent`] and [`SensitivityError::UnderConstraints`] for an integrator without tangent; those of the steps of a splitting.
     pub fn new<L: Parametric<N>>(
-        steps: &Discretization<'a, L, N>,
+        problem: &Problem<'a, L, N>,
+        steps: &Discretization<'a, N>,
         direction: Direction,
     ) -> Result<Self, SensitivityError> {
         let info = &steps.info;
@@ -43,7 +44,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
         }
         // The steps of a Lagrangian that is given by a contact Hamiltonian have a formula.
         if const { !L::HINTS.hamiltonian } && info.collocation.is_some() && steps.integrator.step_formula().is_none() {
-            let engine = Engine::new(steps.problem, steps.stages(), steps.h, direction);
+            let engine = Engine::new(problem, steps.stages(), steps.h, direction);
             return Ok(StepTangent::Collocation(Box::new(engine)));
         }
         // Its steps near a surface would be those of another method.
@@ -51,9 +52,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
-            Some(formula) => {
-                Ok(StepTangent::Flow(Box::new(FlowEngine::new(steps.problem, formula, &steps.integrator)?)))
-            }
+            Some(formula) => Ok(StepTangent::Flow(Box::new(FlowEngine::new(problem, formula, &steps.integrator)?))),
             None if info.constrained => {
                 Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })
             }

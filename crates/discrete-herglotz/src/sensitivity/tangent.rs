@@ -69,7 +69,7 @@ pub struct StateDerivative<const N: usize> {
 
 /// Carries columns along a run.
 struct Columns<'r, 'p, L, const N: usize> {
-    plan: &'r Plan<'p, L, N>,
+    plan: &'r Plan<'p, N>,
     carried: CarriedColumns<'r, 'p, L, N>,
     /// The time and the state at the start of the next step.
     before: (f64, PhasePoint<N>),
@@ -106,7 +106,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         let v = at.velocity().map_err(failed)?;
         let PhasePoint { q, p, z } = at.state;
         let state = EndState { t: at.t, q, v, p, z };
-        let problem = self.plan.steps.problem;
+        let problem = self.carried.problem;
         self.carried.rows.push(
             if at.last && at.k > 0 {
                 row(problem, state, &self.carried.columns, |column| column.time_after(at.k))
@@ -214,9 +214,9 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         until: Until,
     ) -> Result<Tangent<N>, SensitivityError> {
         let run = self.differentiable()?;
+        let problem = run.problem;
         let plan = run.plan(until)?;
-        let engine = StepTangent::new(&plan.steps, Direction::Forward)?;
-        let problem = plan.steps.problem;
+        let engine = StepTangent::new(problem, &plan.steps, Direction::Forward)?;
         let columns = variables.iter().map(|v| v.column(problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
         if engine.only_in_start()
             && let Some(variable) = variables.iter().find(|variable| !variable.is_of_start())
@@ -229,7 +229,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         }
         let mut observer = Columns {
             plan: &plan,
-            carried: CarriedColumns::new(&plan.steps, engine, columns, RowTimes::new(times)),
+            carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(times)),
             before: (problem.t0, problem.state),
             largest: 0.0,
             taken: 0,
@@ -268,9 +268,6 @@ fn tangent<L: Parametric<N>, const N: usize>(
 }
 
 /// The error of a run whose integrator has no tangent.
-pub(crate) fn no_tangent<L: Parametric<N>, const N: usize>(
-    plan: &Plan<'_, L, N>,
-    case: &'static str,
-) -> SensitivityError {
+pub(crate) fn no_tangent<const N: usize>(plan: &Plan<'_, N>, case: &'static str) -> SensitivityError {
     SensitivityError::NoTangent { method: plan.steps.info.name.clone(), case }
 }

@@ -41,7 +41,7 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
-        let (steps, problem) = (self.steps, self.steps.problem);
+        let (steps, problem) = (self.steps, self.problem);
         if let Some(step) = &part.step {
             self.rows_within(step, part.to.t, Some(times), k)?;
         }

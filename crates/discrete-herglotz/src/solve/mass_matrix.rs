@@ -1,8 +1,9 @@
 //! The mass matrix `W = L_vv` and its inverse.
 
+use crate::System;
+use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::support::linear::{self, SingularMatrix};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
 /// The largest number of directional derivatives that are computed at once. More are computed in blocks, so that the
 /// dual numbers stay small enough for the stack and for registers.
@@ -10,12 +11,8 @@ pub(crate) const BLOCK: usize = 8;
 
 /// The mass matrix W. For many coordinates it is computed alone; for few it is taken from the full Hessian, which is
 /// compiled in any case.
-pub(crate) fn mass_matrix<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t: f64,
-    x: &VelocityPoint<N>,
-) -> SMatrix<f64, N, N> {
-    if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
+pub(crate) fn mass_matrix<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> SMatrix<f64, N, N> {
+    if const { N > BLOCK } { system.mass_matrix(t, x) } else { system.hessian(t, x).vv }
 }
 
 /// Whether a matrix is the identity; compared entry by entry, to save stack space.
@@ -26,11 +23,11 @@ pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
 /// The mass matrix W on the heap, to be kept.
 #[inline(never)]
 pub(crate) fn kept_mass_matrix<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+    system: &dyn System<N>,
     t: f64,
     x: &VelocityPoint<N>,
 ) -> Box<SMatrix<f64, N, N>> {
-    Box::new(mass_matrix(lagrangian, t, x))
+    Box::new(mass_matrix(system, t, x))
 }
 
 /// The inverse of a matrix, computed column by column, on the heap.

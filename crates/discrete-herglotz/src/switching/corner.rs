@@ -1,10 +1,10 @@
 //! The corner conditions at a jump of the Lagrangian.
 
 use super::surfaces::{Surfaces, TimedState};
-use crate::StepError;
+use crate::{StepError, System};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Derivatives, Lagrangian, VelocityPoint,
+    VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
     support::linear,
 };
@@ -48,8 +48,8 @@ pub(super) enum Corner<const N: usize> {
 
 /// The one-sided limit of L at a surface, extrapolated from three points on that side with an error of third order in
 /// their distance.
-struct OneSided<'a, L, const N: usize> {
-    lagrangian: &'a L,
+struct OneSided<'a, const N: usize> {
+    lagrangian: &'a dyn System<N>,
     t: f64,
     z: f64,
     points: [SVector<f64, N>; 3],
@@ -58,8 +58,8 @@ struct OneSided<'a, L, const N: usize> {
 /// The weights of the extrapolation from the distances 1, 2, 3 to 0.
 const WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
 
-impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
-    fn new(lagrangian: &'a L, at: &TimedState<N>, toward: &SVector<f64, N>) -> Self {
+impl<'a, const N: usize> OneSided<'a, N> {
+    fn new(lagrangian: &'a dyn System<N>, at: &TimedState<N>, toward: &SVector<f64, N>) -> Self {
         let points = [1.0, 2.0, 3.0].map(|k| at.state.q + toward * k);
         OneSided { lagrangian, t: at.t, z: at.state.z, points }
     }
@@ -69,7 +69,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
     }
 
     fn value(&self, v: &SVector<f64, N>) -> f64 {
-        self.points(v).map(|(weight, x)| weight * self.lagrangian.value(self.t, &x.q, &x.v, x.z)).sum()
+        self.points(v).map(|(weight, x)| weight * self.lagrangian.value(self.t, &x)).sum()
     }
 
     fn momentum(&self, v: &SVector<f64, N>) -> SVector<f64, N> {
@@ -108,7 +108,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
 /// The derivative of a switching function along a direction in time, position and velocity, by central differences of
 /// order six.
 fn slope<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+    lagrangian: &dyn System<N>,
     surfaces: &mut Surfaces,
     index: usize,
     along: impl Fn(f64) -> (f64, VelocityPoint<N>),
@@ -128,8 +128,8 @@ fn slope<const N: usize>(
 /// # Errors
 /// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion
 /// can neither cross the surface nor be reflected; those of the inverse Legendre transformation on either side.
-pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(super) fn corner<const N: usize>(
+    lagrangian: &dyn System<N>,
     surfaces: &mut Surfaces,
     index: usize,
     at: &TimedState<N>,
@@ -203,8 +203,8 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
 ///
 /// The energy is convex in lambda, and its slope is the rate of the switching function. Newton's method from outside
 /// therefore either finds the root or passes the minimum of the energy, where the rate changes its sign.
-fn conditions<L: Lagrangian<N>, const N: usize>(
-    side: &OneSided<'_, L, N>,
+fn conditions<const N: usize>(
+    side: &OneSided<'_, N>,
     at: &TimedState<N>,
     (normal, rate_t): (&SVector<f64, N>, f64),
     energy: f64,
@@ -234,8 +234,8 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
 }
 
 /// Whether L or its momenta jump across a surface that does not depend on the position but on the velocity or z.
-fn jumps_along<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+fn jumps_along<const N: usize>(
+    lagrangian: &dyn System<N>,
     at: &TimedState<N>,
     index: usize,
     surfaces: &mut Surfaces,
@@ -244,7 +244,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
     let speed = max_abs_or_nan(x.v.iter().copied());
     let length = |of: f64| SURFACE_DISTANCE * of * if speed > 0.0 { speed } else { 1.0 };
     let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
-    let here = |by: f64| lagrangian.value(at.t, &x.q, &moved(by).v, moved(by).z);
+    let here = |by: f64| lagrangian.value(at.t, &moved(by));
     let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(lagrangian, index, (at.t, &moved(by)));
     // A jump is looked for only if the function changes its sign along the diagonal of the velocities and z.
     if crossed(surfaces, length(1.0)) * crossed(surfaces, -length(1.0)) >= 0.0 {

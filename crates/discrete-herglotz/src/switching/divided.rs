@@ -1,8 +1,10 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
-use crate::gauss::{GaussStepper, info};
+use crate::gauss::{Collocation, info};
+use crate::integration::SystemProblem;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::stepper::part_stepper::PartStepper;
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
@@ -41,15 +43,18 @@ impl DividedGauss {
     }
 
     /// The stepper, whose parts also end on kinks and jumps.
-    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
+    pub(crate) fn run<'a, const N: usize>(
         self,
-        problem: &Problem<'a, L, N>,
+        collocation: Collocation<'a, N>,
+        problem: &SystemProblem<'a, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
-        let make =
-            move |problem: &Problem<'a, L, N>, h: f64, _: bool| GaussStepper::new(problem, self.stages, h, options);
-        Ok(SwitchingStepper::new(problem, h, EvaluationRange::Within, make)?.dividing(self.max_defect))
+    ) -> Result<SwitchingStepper<'a, N>, InputError> {
+        let make = move |problem: &SystemProblem<'a, N>, h: f64, _: bool| {
+            collocation.stepper(problem, self.stages, h, options).map(PartStepper::Collocation)
+        };
+        let stepper = SwitchingStepper::new(problem, h, EvaluationRange::Within, Box::new(make))?;
+        Ok(stepper.dividing(self.max_defect))
     }
 }
 
@@ -74,6 +79,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(self.run(problem, h, options)?))
+        Ok(Box::new(self.run(problem.lagrangian, &problem.of_system(), h, options)?))
     }
 }

@@ -5,9 +5,9 @@ use crate::solve::chebyshev::{Samples, node};
 use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
-use crate::{DenseStep, InputError};
+use crate::{DenseStep, InputError, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, herglotz_field};
+use contact_geom::{PhasePoint, VelocityPoint};
 use std::convert::Infallible;
 
 /// The number of equal parts in which a curve without dense output is searched for jumps.
@@ -46,8 +46,8 @@ const FAR: f64 = 64.0;
 ///
 /// # Errors
 /// [`InputError::SwitchingUnstated`] where it has some that its `HINTS` do not state.
-pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn has_switching_functions<const N: usize>(
+    lagrangian: &dyn System<N>,
     t: f64,
     x: &VelocityPoint<N>,
 ) -> Result<bool, InputError> {
@@ -55,7 +55,7 @@ pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
     lagrangian.switching_functions(t, x, &mut values);
     match values.is_empty() && lagrangian.breaks().is_empty() {
         true => Ok(false),
-        false if const { L::HINTS.switching_functions } => Ok(true),
+        false if lagrangian.hints().switching_functions => Ok(true),
         false => Err(InputError::SwitchingUnstated),
     }
 }
@@ -153,7 +153,7 @@ pub(super) struct Surfaces {
 impl Surfaces {
     /// The sides of a point from which a motion starts with a time step h. A function that is zero up to round-off has
     /// the sign that it takes next along the motion.
-    pub fn at<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) -> Self {
+    pub fn at<const N: usize>(lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>, h: f64) -> Self {
         let mut values = Vec::new();
         lagrangian.switching_functions(t, x, &mut values);
         let sides = values.iter().map(|g| sign(*g)).collect();
@@ -166,7 +166,7 @@ impl Surfaces {
     /// motion stays on its side of every other surface on which the reset leaves it.
     pub fn reset<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         (index, departure): (usize, Option<Departure>),
         t: f64,
         [from, to]: [&VelocityPoint<N>; 2],
@@ -187,7 +187,7 @@ impl Surfaces {
     /// point, and the time along the motion, change by their round-off.
     pub fn rounding<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         index: usize,
         (t, x): (f64, &VelocityPoint<N>),
         h: f64,
@@ -197,7 +197,7 @@ impl Surfaces {
             let there = self.value(lagrangian, index, (t, &x));
             if there.is_finite() { (there - here).abs() } else { 0.0 }
         };
-        let acceleration = herglotz_field(lagrangian, t, x).map_or(SVector::zeros(), |field| field.y);
+        let acceleration = lagrangian.rates(t, x).map_or(SVector::zeros(), |(field, _)| field.y);
         let dt = POINT_ROUND_OFF * t.abs().max(h.abs());
         let v = POINT_ROUND_OFF * x.v.amax().max((acceleration * h).amax());
         let q = POINT_ROUND_OFF * x.q.amax().max((x.v * h).amax());
@@ -216,7 +216,7 @@ impl Surfaces {
 
     /// Gives each function that is zero up to round-off the sign that it takes next along the motion. Two evaluations of
     /// all functions show which of them are far from zero; the others are examined one by one.
-    fn leave<const N: usize>(&mut self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
+    fn leave<const N: usize>(&mut self, lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
         if self.sides.is_empty() {
             return;
         }
@@ -251,7 +251,7 @@ impl Surfaces {
     /// Whether a point is on a surface up to round-off.
     pub fn is_on<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         index: usize,
         (t, x): (f64, &VelocityPoint<N>),
         h: f64,
@@ -264,7 +264,7 @@ impl Surfaces {
     /// are crossed together: crossing one alone may lead to a region that no motion enters.
     pub fn simultaneous<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         curve: &StepCurve<N>,
         change: &SignChange,
         at: &TimedState<N>,
@@ -282,7 +282,7 @@ impl Surfaces {
     /// not on the surface, or stays on it to second order. `h` is the length of a step.
     pub fn departure<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         index: usize,
         (t, x): (f64, &VelocityPoint<N>),
         h: f64,
@@ -292,8 +292,8 @@ impl Surfaces {
         if here.is_nan() || here.abs() > tolerance {
             return None;
         }
-        let (a, l) = match herglotz_field(lagrangian, t, x) {
-            Ok(field) => (field.y, field.z),
+        let (a, l) = match lagrangian.rates(t, x) {
+            Ok((field, _)) => (field.y, field.z),
             Err(_) => (SVector::zeros(), 0.0),
         };
         let mut after = |dt: f64| {
@@ -314,7 +314,7 @@ impl Surfaces {
     /// The value of a function; NaN for an index without a function.
     pub fn value<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         index: usize,
         (t, x): (f64, &VelocityPoint<N>),
     ) -> f64 {
@@ -338,7 +338,7 @@ impl Surfaces {
     /// curve is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         curve: &StepCurve<N>,
         extension: f64,
     ) -> bool {
@@ -356,7 +356,7 @@ impl Surfaces {
     /// value.
     pub fn first_change<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         curve: &StepCurve<N>,
     ) -> Option<SignChange> {
         let (count, degree) = (self.sides.len(), curve.sampling_degree());
@@ -407,7 +407,7 @@ impl Surfaces {
     /// first changes.
     fn change_of_side<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         curve: &StepCurve<N>,
         index: usize,
         samples: &Samples,
@@ -442,7 +442,7 @@ impl Surfaces {
     /// The zero of a function between two fractions of a step, where the second one is on the other side.
     pub(super) fn change<const N: usize>(
         &mut self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &dyn System<N>,
         curve: &StepCurve<N>,
         index: usize,
         [mut from, to]: [f64; 2],

@@ -2,11 +2,11 @@
 
 use crate::solve::mass_matrix::mass_matrix;
 use crate::{
-    StepError,
+    StepError, System,
     solve::{ITERATION_LIMIT, last_correction},
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
 
 /// After this number of corrections that do not decrease, the remaining ones are taken for round-off: an iteration that
 /// still converges has no more than a few.
@@ -33,20 +33,20 @@ const MAX_STALLED_CORRECTIONS: u32 = 8;
 /// ```
 #[inline(never)]
 pub fn legendre_inverse<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+    system: &dyn System<N>,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Result<VelocityPoint<N>, StepError> {
-    if let Some(x) = velocity_of_hamiltonian(lagrangian, t, state) {
+    if let Some(x) = velocity_of_hamiltonian(system, t, state) {
         return if x.v.iter().all(|v| v.is_finite()) { Ok(x) } else { Err(StepError::NonFinite) };
     }
     let mut x = VelocityPoint { q: state.q, v: *guess, z: state.z };
     let (mut before, mut stalled) = (f64::INFINITY, 0);
-    let mut momenta = lagrangian.gradient(t, &x).y;
+    let mut momenta = system.gradient(t, &x).y;
     for _ in 0..ITERATION_LIMIT {
         let mut change = momenta - state.p;
-        let mut w = mass_matrix(lagrangian, t, &x);
+        let mut w = mass_matrix(system, t, &x);
         // The residual is compared with the round-off of its terms: an ill-conditioned W determines the velocity no
         // better.
         let of = |i: usize| (0..N).map(|j| (w[(i, j)] * x.v[j]).abs()).sum::<f64>() + state.p[i].abs();
@@ -72,7 +72,7 @@ pub fn legendre_inverse<const N: usize>(
             return Ok(x);
         }
         before = size;
-        momenta = lagrangian.gradient(t, &x).y;
+        momenta = system.gradient(t, &x).y;
         // A full correction may leave the domain of L, for example beyond the speed of light.
         for _ in 0..f64::MANTISSA_DIGITS {
             if max_abs_or_nan(momenta.iter().copied()).is_finite() {
@@ -80,23 +80,22 @@ pub fn legendre_inverse<const N: usize>(
             }
             change *= 0.5;
             x.v = from - change;
-            momenta = lagrangian.gradient(t, &x).y;
+            momenta = system.gradient(t, &x).y;
         }
     }
     Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
 }
 
 /// The velocity `H_p` at a state, if L is given by a contact Hamiltonian.
-#[inline(always)]
-fn velocity_of_hamiltonian<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+fn velocity_of_hamiltonian<const N: usize>(
+    system: &dyn System<N>,
     t: f64,
     state: &PhasePoint<N>,
 ) -> Option<VelocityPoint<N>> {
-    if const { !L::HINTS.hamiltonian } {
+    if !system.hints().hamiltonian {
         return None;
     }
-    let (_, d) = lagrangian.hamiltonian_with_gradient(t, state)?;
+    let (_, d) = system.hamiltonian_with_gradient(t, state)?;
     Some(VelocityPoint { q: state.q, v: d.y, z: state.z })
 }
 

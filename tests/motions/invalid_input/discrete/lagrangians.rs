@@ -323,7 +323,7 @@ fn residuals(report: &mut Report) {
 fn claims(report: &mut Report) {
     let forced = forced_one(CLAIMING, AnyForce(0.3));
     let refused =
-        check_unforced::<_, 1>(&forced, "a method").is_err() && check_unforced::<_, 1>(&CLAIMING, "a method").is_ok();
+        check_unforced::<1>(&forced, "a method").is_err() && check_unforced::<1>(&CLAIMING, "a method").is_ok();
     report.check(refused, || "a force is taken".into());
     for (t, x) in places() {
         let found = check_claims(&CLAIMING, t, &x.into());

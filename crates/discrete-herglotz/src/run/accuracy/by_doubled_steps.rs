@@ -1,5 +1,6 @@
 //! Step-size selection for an integrator under constraints, by runs with twice as many steps each.
 
+use crate::integration::SharedIntegrator;
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
@@ -9,17 +10,16 @@ use crate::run::accuracy::limits::{
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
-use crate::run::request::{MAX_STEPS, Shared, StepSelection};
+use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
-use contact_geom::Lagrangian;
 
 /// The steps of an integrator for the requested error, without a reference: three runs, each with twice as many steps as
 /// the one before, must agree better and better, at least as with half the order of the method. The distance of two runs
 /// is then the error of the coarser one.
-pub(crate) fn by_doubled_steps<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-    integrator: &Shared<'p, L, N>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
+pub(crate) fn by_doubled_steps<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+    integrator: &SharedIntegrator<'p, N>,
+) -> Result<StepSelection<'p, N>, InputError> {
     let (wanted, order, grid) =
         (trials.wanted, f64::from(integrator.info().order), ComparisonGrid::equal(COMPARED_PARTS));
     // Half the order, so that the start of the asymptotic range is not missed.

@@ -1,5 +1,6 @@
 //! The reference solution: runs with k and 2k steps of contact Gauss collocation that agree.
 
+use crate::integration::SharedIntegrator;
 use crate::resolution::thresholds::MIN_COMPARED_DEFECT;
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::failure::cause_of_disagreement;
@@ -13,9 +14,9 @@ use crate::run::accuracy::limits::{
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::{SwitchReason, TrialEnd};
 use crate::run::accuracy::trial_runs::TrialRuns;
-use crate::run::request::{MAX_STEPS, Shared, StepSelection};
+use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
-use contact_geom::{Lagrangian, numbers::max_or_nan};
+use contact_geom::numbers::max_or_nan;
 
 /// A motion on which runs with k and 2k steps agree.
 pub(crate) struct Converged<const N: usize> {
@@ -73,13 +74,13 @@ pub(crate) enum Compared {
 
 /// The selection of a number of steps that fill the span; in transformed time their number is computed from the span of
 /// tau.
-pub(crate) fn selected<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &TrialRuns<'_, 'p, L, N>,
-    integrator: &Shared<'p, L, N>,
+pub(crate) fn selected<'p, const N: usize>(
+    trials: &TrialRuns<'_, 'p, N>,
+    integrator: &SharedIntegrator<'p, N>,
     count: usize,
     error: f64,
     found: &Converged<N>,
-) -> StepSelection<'p, L, N> {
+) -> StepSelection<'p, N> {
     let (h, integrator, error) = (trials.step(count, &found.grid), integrator.clone(), Some(error));
     if let ComparisonGrid::Times = found.grid {
         // The last step is about half as long as the others, so that round-off does not add a step.
@@ -96,8 +97,8 @@ pub(crate) fn selected<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// Refines the steps until two runs agree.
-pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, '_, L, N>,
+pub(crate) fn converge<const N: usize>(
+    trials: &mut TrialRuns<'_, '_, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
@@ -252,8 +253,8 @@ pub(crate) fn converge<L: Lagrangian<N>, const N: usize>(
 /// The distance between the end of a run with k + 1 steps and that of two runs that agree, if it is too large. The
 /// nodes of both of these lie on the ends of the k steps, and so on any kink or pulse that begins at one of them.
 /// `None` if the third run agrees too, or if no feature can be hidden: kinks of a formula that is proved end steps.
-pub(crate) fn disagreement_of_other_nodes<L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, '_, L, N>,
+pub(crate) fn disagreement_of_other_nodes<const N: usize>(
+    trials: &mut TrialRuns<'_, '_, N>,
     stages: usize,
     k: usize,
     compared: Compared,
@@ -261,7 +262,10 @@ pub(crate) fn disagreement_of_other_nodes<L: Lagrangian<N>, const N: usize>(
     fine: &Track<N>,
 ) -> Result<Option<f64>, InputError> {
     let structure = &trials.request.problem.structure;
-    if const { L::HINTS.proved } || matches!(compared, Compared::Times) || structure.quadratic && structure.autonomous {
+    if trials.request.problem.lagrangian.hints().proved
+        || matches!(compared, Compared::Times)
+        || structure.quadratic && structure.autonomous
+    {
         return Ok(None);
     }
     Ok(match trials.gauss(stages, k + 1, &ComparisonGrid::of(k + 1), false, false)? {

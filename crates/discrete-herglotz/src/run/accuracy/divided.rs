@@ -13,15 +13,14 @@ use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::StepSelection;
 use crate::switching::DividedGauss;
 use crate::{InputError, SelectionFailure};
-use contact_geom::{Lagrangian, numbers::max_or_nan};
-use std::sync::Arc;
+use contact_geom::numbers::max_or_nan;
 
 /// Selects steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most the
 /// requested error: a division and one with parts of half the size must agree. The error of a part is about the square
 /// of its defect, and halving a part divides its defect by `2^s`.
-pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
+pub(crate) fn divided_steps<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+) -> Result<StepSelection<'p, N>, InputError> {
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let finer = f64::powi(0.5, DIVIDED_STAGES as i32);
     let count = first_guess(trials.request, DIVIDED_STAGES, wanted).clamp(DIVIDED_STEPS[0], DIVIDED_STEPS[1]);
@@ -57,7 +56,13 @@ pub(crate) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
         let error = max_or_nan(first.distance(&second), 0.5 * f64::EPSILON);
         if error <= MAX_DISTANCE_OF_DIVISIONS * wanted {
             let (h, error) = (span / count as f64, Some(error));
-            return Ok(StepSelection { integrator: Arc::new(integrator), count, h, error, ended: None });
+            return Ok(StepSelection {
+                integrator: trials.collocation.divided_gauss(integrator),
+                count,
+                h,
+                error,
+                ended: None,
+            });
         }
         let distances = first.distances(&second);
         cause = cause_of_disagreement(&distances, f64::log2(before / error), wanted, t0, span);

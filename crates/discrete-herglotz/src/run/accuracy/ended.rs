@@ -1,14 +1,13 @@
 //! Runs that an observer ends: the time of the end, for trial runs.
 
 use crate::Status;
+use crate::gauss::Collocation;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{EVENT_SEARCH, EVENT_SEARCH_BUDGET, EVENT_SEARCH_ERROR, MIN_EVENT_SEARCH_STEPS};
 use crate::run::integrate::integrate;
 use crate::run::request::{Request, StepSelection};
 use crate::run::{Observer, Plan, StepView, Stop, Terminal};
-use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 /// The cause of the end of a search that exceeds its budget.
 const SPENT: &str = "the budget of the search";
@@ -25,9 +24,9 @@ impl<const N: usize> Observer<N> for Budget {
     }
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
+impl<'p, const N: usize> Request<'p, N> {
     /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
-    pub(crate) fn time_of_end(&self, terminal: Terminal<'_, N>) -> Option<f64> {
+    pub(crate) fn time_of_end(&self, collocation: Collocation<'p, N>, terminal: Terminal<'_, N>) -> Option<f64> {
         if self.is_constrained() {
             return None;
         }
@@ -35,7 +34,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let count = first_guess(self, EVENT_SEARCH.stages, EVENT_SEARCH_ERROR).max(MIN_EVENT_SEARCH_STEPS);
         let h = self.span / count as f64;
         let selection = StepSelection {
-            integrator: Arc::new(EVENT_SEARCH),
+            integrator: collocation.divided_gauss(EVENT_SEARCH),
             count,
             h,
             error: Some(EVENT_SEARCH_ERROR),
@@ -50,7 +49,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> StepSelection<'p, L, N> {
+impl<'p, const N: usize> StepSelection<'p, N> {
     /// The same steps over a multiple of the span; an observer is expected to end the run after the original number of
     /// steps.
     pub(crate) fn extended_by(self, factor: f64) -> Self {

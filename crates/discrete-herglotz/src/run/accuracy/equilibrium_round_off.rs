@@ -1,11 +1,10 @@
 //! The motion that round-off maintains at an equilibrium.
 
+use crate::System;
 use crate::run::request::Request;
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding,
-};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
 
 /// The displacement of a motion at an equilibrium by the round-off of its forces alone. Forces that cancel there have
 /// the round-off of the terms that cancel, as in `1 - exp(-x)` near `x = 0`: a decaying motion does not become smaller
@@ -23,13 +22,13 @@ pub(crate) struct EquilibriumRoundOff {
 
 impl EquilibriumRoundOff {
     /// The round-off at a point.
-    pub fn at<L: Lagrangian<N>, const N: usize>(lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Self {
-        if const { L::HINTS.hamiltonian } {
+    pub fn at<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Self {
+        if system.hints().hamiltonian {
             // The stiffness is that of L, which need not exist.
             return EquilibriumRoundOff { displacement: 0.0, force: 0.0, energy: 0.0 };
         }
-        let (_, of_gradient) = gradient_rounding(lagrangian, t, x);
-        let h = lagrangian.hessian(t, x);
+        let (_, of_gradient) = system.rounding(t, x);
+        let h = system.hessian(t, x);
         let (mut squares, mut energy) = (0.0, 0.0);
         for i in 0..N {
             let (force, stiffness, mass) = (of_gradient.x[i], h.qq[(i, i)].abs(), h.vv[(i, i)].abs());
@@ -54,7 +53,7 @@ pub(crate) fn accumulated_roundings(steps: usize) -> f64 {
     (64.0 + steps as f64).sqrt() * 8.0
 }
 
-impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+impl<const N: usize> Request<'_, N> {
     /// The round-off at a state of the motion.
     #[cold]
     #[inline(never)]

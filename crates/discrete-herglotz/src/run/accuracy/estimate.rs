@@ -6,9 +6,9 @@ use crate::run::accuracy::limits::MAX_UNCHECKED_STEPS;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::PhasePoint;
 
-impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
+impl<const N: usize> Discretization<'_, N> {
     /// The distance of (q, p) and v from those of a run with twice as many steps of half the size, as in
     /// [`Track::distance_at_end`]: for a method of order p this is the error times `1 - 2^-p`. Infinite if the other
     /// run fails or is interrupted.
@@ -18,9 +18,9 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
         t: f64,
         (end, near): (&PhasePoint<N>, NearbyVelocity<N>),
     ) -> f64 {
-        let Ok(mut fine) = self.stepper_of(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
+        let Ok(mut fine) = self.stepper_of(&self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
         let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
-        let mut velocities = Velocities::new(self.problem, self.scales);
+        let mut velocities = Velocities::new(&self.problem, self.scales);
         let mut done = 0;
         while done < steps && (fine.time() - t) * self.h < 0.0 {
             if self.problem.interrupt.is_some_and(Interrupt::is_requested) {

@@ -5,18 +5,14 @@ use crate::run::accuracy::limits::MAX_FIRST_GUESS;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Derivatives, Lagrangian, numbers::max_or_nan};
+use contact_geom::numbers::max_or_nan;
 use std::f64::consts::PI;
 
 /// The number of steps for which the motion linearised at its start has a given error. It is too small if nonlinear
 /// terms lead to higher frequencies.
-pub(crate) fn first_guess<L: Lagrangian<N>, const N: usize>(
-    request: &Request<'_, L, N>,
-    stages: usize,
-    goal: f64,
-) -> usize {
+pub(crate) fn first_guess<const N: usize>(request: &Request<'_, N>, stages: usize, goal: f64) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
-    if const { L::HINTS.hamiltonian } {
+    if lagrangian.hints().hamiltonian {
         let frequency = frequency_of_hamiltonian(request);
         let count = span.abs() * frequency / radians(stages, goal).min(stages as f64 / 3.0).min(1.0);
         return if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 };
@@ -46,8 +42,8 @@ fn radians(stages: usize, goal: f64) -> f64 {
 
 /// The largest frequency of the motion of a contact Hamiltonian, linearised at its start: the rates of `H_pq`, and the
 /// root of the product of `H_pp` and `H_qq`.
-fn frequency_of_hamiltonian<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>) -> f64 {
-    let Problem { lagrangian, state, t0, .. } = request.problem;
+fn frequency_of_hamiltonian<const N: usize>(request: &Request<'_, N>) -> f64 {
+    let Problem { lagrangian, state, t0, .. } = &request.problem;
     let Some(h) = lagrangian.hamiltonian_hessian(*t0, state) else { return 0.0 };
     let rate = lagrangian.hamiltonian_with_gradient(*t0, state).map_or(0.0, |(_, d)| d.z.abs());
     let of_position = spectral_radius(h.vv * h.qq).sqrt();

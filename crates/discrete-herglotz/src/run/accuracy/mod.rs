@@ -11,7 +11,7 @@ mod estimate;
 mod evaluation_cost;
 mod failure;
 mod first_guess;
-mod limits;
+pub(crate) mod limits;
 mod reference;
 mod rest;
 mod select;

@@ -1,5 +1,6 @@
 //! Step-size selection for any integrator, by comparison with a reference solution.
 
+use crate::integration::SharedIntegrator;
 use crate::run::accuracy::converge::{Converged, selected};
 use crate::run::accuracy::limits::{
     FACTOR_AFTER_FAILURE, FEWER_STEPS, MAX_DISTANCE_FROM_REFERENCE, MAX_ITERATIONS, MAX_ROUND_OFF,
@@ -8,16 +9,15 @@ use crate::run::accuracy::limits::{
 };
 use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
-use crate::run::request::{MAX_STEPS, Shared, StepSelection};
+use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
-use contact_geom::Lagrangian;
 
 /// The steps of any integrator for the requested error, from runs that are compared with the reference.
-pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-    integrator: &Shared<'p, L, N>,
+pub(crate) fn by_reference<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+    integrator: &SharedIntegrator<'p, N>,
     found: &Converged<N>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
+) -> Result<StepSelection<'p, N>, InputError> {
     let wanted = trials.wanted;
     let (order, grid) = (f64::from(integrator.info().order), &found.grid);
     let whole = |count: f64| grid.whole(count);

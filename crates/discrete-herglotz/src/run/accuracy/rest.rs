@@ -1,19 +1,19 @@
 //! Motions that have come to rest.
 
+use crate::StepperOptions;
+use crate::gauss::Collocation;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
     DEFAULT_STAGES, MAX_REST_SEARCH_STEPS, MIN_DECAY_TO_REST, REST_SEARCH_ERROR, STEPS_BETWEEN_REST_CHECKS,
 };
 use crate::run::checks::rest::{is_at_rest, rests_at_the_origin, starts_at_rest};
 use crate::run::request::Request;
-use crate::{GaussCollocation, Integrator, StepperOptions};
-use contact_geom::{Derivatives, Lagrangian};
 
-impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+impl<'p, const N: usize> Request<'p, N> {
     /// The time at which the motion comes to rest, if it lies within the span; found with steps of eight stages, if the
     /// span is long enough for the decay.
     #[inline(never)]
-    pub(crate) fn time_of_rest(&self) -> Option<f64> {
+    pub(crate) fn time_of_rest(&self, collocation: Collocation<'p, N>) -> Option<f64> {
         if self.is_constrained() {
             return None;
         }
@@ -21,20 +21,19 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
         let change = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
         // Written so that a NaN counts as no decrease.
         let decays = change < -MIN_DECAY_TO_REST;
-        if !decays || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
+        if !decays || starts_at_rest(&problem) || !rests_at_the_origin(&problem, problem.start.z) {
             return None;
         }
-        let gauss = GaussCollocation { stages: DEFAULT_STAGES };
-        let h = self.span / first_guess(self, gauss.stages, REST_SEARCH_ERROR) as f64;
+        let h = self.span / first_guess(self, DEFAULT_STAGES, REST_SEARCH_ERROR) as f64;
         let options = StepperOptions { action: self.needs.action, check_resolution: false };
-        let mut stepper = Integrator::stepper(&gauss, problem, h, options).ok()?;
+        let mut stepper = collocation.stepper(&problem, DEFAULT_STAGES, h, options).ok()?;
         for _ in 0..MAX_REST_SEARCH_STEPS / STEPS_BETWEEN_REST_CHECKS {
             stepper.advance(STEPS_BETWEEN_REST_CHECKS).ok()?;
             let t = stepper.time();
             if (t - problem.t0).abs() >= self.span.abs() {
                 return None;
             }
-            if is_at_rest(problem, self.needs, t, &stepper.state()) {
+            if is_at_rest(&problem, self.needs, t, &stepper.state()) {
                 return Some(t);
             }
         }

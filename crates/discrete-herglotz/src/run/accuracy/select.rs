@@ -1,6 +1,8 @@
 //! The selection of the integrator and of the number of steps for a requested error.
 
+use crate::gauss::Collocation;
 use crate::gauss::MAX_STAGES;
+use crate::integration::SharedIntegrator;
 use crate::integration::is_separable;
 use crate::run::accuracy::by_doubled_steps::by_doubled_steps;
 use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
@@ -15,14 +17,13 @@ use crate::run::accuracy::reference::by_reference;
 use crate::run::accuracy::trial_end::SwitchReason;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::observers::observer::Terminal;
-use crate::run::request::{Request, Shared, StepSelection};
-use crate::{GaussCollocation, InputError, SelectionFailure, TransformedGauss};
-use contact_geom::{Lagrangian, numbers::max_or_nan};
-use std::sync::Arc;
+use crate::run::request::{Request, StepSelection};
+use crate::{InputError, SelectionFailure};
+use contact_geom::numbers::max_or_nan;
 
 /// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
 /// expensive, for many steps of few stages the number of steps.
-fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, wanted: f64) -> usize {
+fn stages_along<const N: usize>(request: &Request<'_, N>, wanted: f64) -> usize {
     let structure = &request.problem.structure;
     let condensed = is_separable(request.problem.lagrangian, structure) && structure.has_constant_rate();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
@@ -45,19 +46,20 @@ fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, w
 /// cost little. The error of a run of the integrator is then its distance from the reference.
 ///
 /// If `terminal` ends the run, all these runs end there.
-pub(crate) fn select_steps<'p, L: Lagrangian<N>, const N: usize>(
-    request: &Request<'p, L, N>,
+pub(crate) fn select_steps<'p, const N: usize>(
+    request: &Request<'p, N>,
     wanted: f64,
+    collocation: Collocation<'p, N>,
     terminal: Option<Terminal<'_, N>>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
+) -> Result<StepSelection<'p, N>, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    let select = |request: &Request<'p, L, N>| {
-        select_within_budget(&mut TrialRuns::new(request, wanted))
+    let select = |request: &Request<'p, N>| {
+        select_within_budget(&mut TrialRuns::new(request, wanted, collocation))
             .map_err(|refused| request.by_rounding_of_velocity(refused))
     };
-    let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(terminal)) else {
+    let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(collocation, terminal)) else {
         return select(request);
     };
     // The motion after this end is not computed.
@@ -67,9 +69,9 @@ pub(crate) fn select_steps<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The selection with a given budget.
-pub(crate) fn select_within_budget<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
+pub(crate) fn select_within_budget<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+) -> Result<StepSelection<'p, N>, InputError> {
     let wanted = trials.wanted;
     let Some(integrator) = trials.request.integrator.clone() else { return select_integrator(trials) };
     let info = integrator.info();
@@ -88,36 +90,35 @@ pub(crate) fn select_within_budget<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The selection if no integrator is given.
-fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-) -> Result<StepSelection<'p, L, N>, InputError> {
-    let gauss = |stages: usize| -> Shared<'p, L, N> { Arc::new(GaussCollocation { stages }) };
+fn select_integrator<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+) -> Result<StepSelection<'p, N>, InputError> {
+    let collocation = trials.collocation;
+    let hints = trials.request.problem.lagrangian.hints();
+    let divides = hints.proved || hints.switching_functions;
     let mut stages = stages_along(trials.request, trials.wanted);
-    trials.tests_transformation = const { L::HINTS.time_transformation } && trials.request.problem.structure.autonomous;
+    trials.tests_transformation = hints.time_transformation && trials.request.problem.structure.autonomous;
     trials.tests_newton_steps = stages > DEFAULT_STAGES;
     // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
     // known.
-    trials.tests_uneven_steps = const { L::HINTS.proved || L::HINTS.switching_functions };
-    let mut found = by_equal_steps(trials, &gauss(stages), stages);
+    trials.tests_uneven_steps = divides;
+    let mut found = by_equal_steps(trials, &collocation.gauss(stages), stages);
     trials.tests_newton_steps = false;
     if let Err(Ended::Switch { reason: SwitchReason::FewerStages, .. }) = found {
         stages = DEFAULT_STAGES;
-        found = by_equal_steps(trials, &gauss(stages), stages);
+        found = by_equal_steps(trials, &collocation.gauss(stages), stages);
     }
     (trials.tests_transformation, trials.tests_uneven_steps) = (false, false);
-    // Written so that divided steps are not compiled where they are never taken.
-    if const { L::HINTS.proved || L::HINTS.switching_functions }
-        && let Err(Ended::Switch { reason: SwitchReason::Divided, .. }) = found
-    {
+    if divides && let Err(Ended::Switch { reason: SwitchReason::Divided, .. }) = found {
         match divided_steps(trials) {
             Ok(selection) => return Ok(selection),
             Err(interrupted @ InputError::Interrupted) => return Err(interrupted),
-            Err(_) => found = by_equal_steps(trials, &gauss(stages), stages),
+            Err(_) => found = by_equal_steps(trials, &collocation.gauss(stages), stages),
         }
     }
     // If a part of the motion requires much shorter steps than the rest, the steps are divided; if this fails too, the
     // first error is returned.
-    if const { L::HINTS.proved || L::HINTS.switching_functions }
+    if divides
         && let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
         && !matches!(cause, SelectionFailure::RoundOff | SelectionFailure::Chaos { .. })
     {
@@ -127,24 +128,24 @@ fn select_integrator<'p, L: Lagrangian<N>, const N: usize>(
             _ => *refused,
         });
     }
-    if const { !L::HINTS.time_transformation } {
+    if !hints.time_transformation {
         return Ok(found?);
     }
     let Err(Ended::Switch { reason: SwitchReason::TimeTransformation, .. }) = found else { return Ok(found?) };
     // If the search in transformed time fails, equal steps are tried.
-    let transformed: Shared<'p, L, N> = Arc::new(TransformedGauss { stages: TRANSFORMED_STAGES });
+    let transformed = collocation.transformed_gauss(TRANSFORMED_STAGES);
     Ok(in_transformed_time(trials, &transformed, TRANSFORMED_STAGES).or_else(|ended| match ended {
         Ended::Refused(InputError::Interrupted) => Err(ended),
-        _ => by_equal_steps(trials, &gauss(stages), stages),
+        _ => by_equal_steps(trials, &collocation.gauss(stages), stages),
     })?)
 }
 
 /// The selection for Gauss collocation as its own reference, with equal steps.
-fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-    integrator: &Shared<'p, L, N>,
+fn by_equal_steps<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+    integrator: &SharedIntegrator<'p, N>,
     stages: usize,
-) -> Result<StepSelection<'p, L, N>, Ended> {
+) -> Result<StepSelection<'p, N>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Steps)?;
     // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
@@ -156,11 +157,11 @@ fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.
-fn in_transformed_time<'p, L: Lagrangian<N>, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, L, N>,
-    integrator: &Shared<'p, L, N>,
+fn in_transformed_time<'p, const N: usize>(
+    trials: &mut TrialRuns<'_, 'p, N>,
+    integrator: &SharedIntegrator<'p, N>,
     stages: usize,
-) -> Result<StepSelection<'p, L, N>, Ended> {
+) -> Result<StepSelection<'p, N>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Times)?;
     let (count, error) = min_step_count(stages, wanted, &found, false);

@@ -1,28 +1,36 @@
 //! The cost of the step-size selection.
 
 use crate::Problem;
-use crate::gauss::GaussStepper;
+use crate::gauss::{Collocation, GaussStepper};
 use crate::run::accuracy::limits::BUDGET;
 use crate::run::accuracy::select::select_within_budget;
 use crate::run::accuracy::trial_runs::TrialRuns;
-use crate::run::request::{Request, Shared};
+use crate::run::request::Request;
 use crate::run::{OutputRequest, Until};
 use crate::test_lagrangians::{InPlane, OnLine, Unstated};
-use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
+use crate::{AnyIntegrator, Stepper, StepperOptions};
 use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
-use std::sync::Arc;
 
 /// The integrator and the number of steps that are selected for a run, and the cost of the selection.
-fn search<'p, L: Lagrangian<N>, const N: usize>(
-    problem: &'p Problem<'p, L, N>,
+fn search<L: Lagrangian<N>, const N: usize>(
+    problem: &Problem<'_, L, N>,
     span: f64,
-    integrator: Option<Shared<'p, L, N>>,
+    stages: Option<usize>,
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
-    let request = Request { problem, t_end: span, span, integrator, needs: OutputRequest::default(), scales: None };
-    let mut trials = TrialRuns::new(&request, wanted);
+    let collocation: Collocation<'_, N> = problem.lagrangian;
+    let request = Request {
+        problem: problem.of_system(),
+        t_end: span,
+        span,
+        integrator: stages.map(|stages| collocation.gauss(stages)),
+        needs: OutputRequest::default(),
+        scales: None,
+        parts: None,
+    };
+    let mut trials = TrialRuns::new(&request, wanted, collocation);
     let selection = select_within_budget(&mut trials).unwrap();
     (selection.integrator.info().name, selection.count, BUDGET - trials.left)
 }
@@ -97,7 +105,7 @@ fn trial_runs_in_transformed_time_cost_little() {
             let problem = Problem::new(&kepler, 0.0, start).unwrap();
             let (integrator, _, spent) = search(&problem, 40.0, None, 1e-8);
             if e.abs() < 0.5 {
-                let (name, _, of_given) = search(&problem, 40.0, Some(Arc::new(GaussCollocation { stages: 8 })), 1e-8);
+                let (name, _, of_given) = search(&problem, 40.0, Some(8), 1e-8);
                 assert_eq!((integrator, spent), (name, of_given), "{e}");
                 continue;
             }

@@ -1,7 +1,9 @@
 //! Trial runs: a motion that is computed with a given number of steps, recorded at a few common times, and sampled for
 //! defects between its nodes.
 
-use crate::gauss::{DefectSample, SAMPLE_SETS};
+use crate::gauss::{Collocation, CollocationStepper, SAMPLE_SETS};
+use crate::integration::SharedIntegrator;
+use crate::integration::SystemProblem;
 use crate::integration::check_claims::violated_claim;
 use crate::resolution::thresholds::{MAX_DEFECT_RATIO, MIN_COMPARED_DEFECT, MIN_SAMPLE_POINTS, TRIAL_ROUNDINGS};
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
@@ -17,20 +19,18 @@ use crate::run::accuracy::transformation_gain::TransformationGain;
 use crate::run::accuracy::trial_end::{SwitchReason, TrialEnd};
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
-use crate::run::request::{Request, Shared, StepSelection};
+use crate::run::request::{Request, StepSelection};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::{DividedGauss, has_switching_functions};
-use crate::{
-    InputError, StepFailure, Stepper,
-    gauss::{GaussRoute, GaussStepper, TransformedStepper},
-};
-use crate::{Interrupt, Problem, StepperOptions};
-use contact_geom::{Defect, Lagrangian, numbers::max_or_nan};
+use crate::{InputError, Interrupt, Problem, StepFailure, Stepper, StepperOptions};
+use contact_geom::{Defect, numbers::max_or_nan};
 
 /// The trial runs of a request, with the rest of their budget.
-pub(crate) struct TrialRuns<'t, 'p, L, const N: usize> {
-    pub request: &'t Request<'p, L, N>,
+pub(crate) struct TrialRuns<'t, 'p, const N: usize> {
+    pub request: &'t Request<'p, N>,
+    pub collocation: Collocation<'p, N>,
     pub left: u64,
     /// The rest of the reserve for runs that are expected to reach their end.
     pub reserve: u64,
@@ -44,12 +44,13 @@ pub(crate) struct TrialRuns<'t, 'p, L, const N: usize> {
     pub tests_uneven_steps: bool,
 }
 
-impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
+impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
     /// The trial runs of a request, with the whole budget.
-    pub fn new(request: &'t Request<'p, L, N>, wanted: f64) -> Self {
+    pub fn new(request: &'t Request<'p, N>, wanted: f64, collocation: Collocation<'p, N>) -> Self {
         let (tests_transformation, tests_newton_steps, tests_uneven_steps) = (false, false, false);
         TrialRuns {
             request,
+            collocation,
             left: BUDGET,
             reserve: RESERVE,
             wanted,
@@ -73,42 +74,34 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let (problem, h) = (self.request.problem, self.step(count, grid));
         let points = if closely { MIN_SAMPLE_POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
         let settings = TrialSettings { count, grid, points, narrow, costs: EvaluationCost::of::<N>(stages) };
-        if const { L::HINTS.time_transformation } && matches!(grid, ComparisonGrid::Times) {
-            let mut stepper = match TransformedStepper::new(problem, stages, h) {
+        let hints = problem.lagrangian.hints();
+        if hints.time_transformation && matches!(grid, ComparisonGrid::Times) {
+            let mut stepper = match self.collocation.transformed_stepper(&problem, stages, h) {
                 Ok(stepper) => stepper,
                 Err(error) => return TrialEnd::of_failed_start(error),
             };
-            let ending = self.run_with_samples(&mut stepper, &settings, 1, |run, sets| (run.sample_defect(sets), 0))?;
+            let ending = self.run_with_samples(&mut *stepper, &settings, 1)?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let options = StepperOptions::default();
-        if const { L::HINTS.switching_functions }
-            && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?
-        {
-            let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| GaussStepper::new(problem, stages, h, options);
-            let mut stepper = match SwitchingStepper::new(problem, h, EvaluationRange::Within, make) {
+        let (options, collocation) = (StepperOptions::default(), self.collocation);
+        if hints.switching_functions && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)? {
+            let make = move |problem: &SystemProblem<'p, N>, h: f64, _: bool| {
+                collocation.stepper(problem, stages, h, options).map(PartStepper::Collocation)
+            };
+            let mut stepper = match SwitchingStepper::new(&problem, h, EvaluationRange::Within, Box::new(make)) {
                 Ok(stepper) => stepper.keeping_parts(),
                 Err(error) => return TrialEnd::of_failed_start(error),
             };
-            return self.run_with_samples(&mut stepper, &settings, 1, |run, sets| {
-                let parts = run.last_step();
-                let samples = parts.iter().map(|part| part.sample_defect(sets)).reduce(|a, b| Some(a?.joined(b?)));
-                let sample =
-                    samples.flatten().map(|sample| if run.has_switched() { sample.after_a_jump() } else { sample });
-                (sample, parts.iter().map(GaussStepper::newton_steps).sum())
-            });
+            return self.run_with_samples(&mut stepper, &settings, 1);
         }
-        let mut stepper = match GaussStepper::new(problem, stages, h, options) {
+        let mut stepper = match collocation.stepper(&problem, stages, h, options) {
             Ok(stepper) => stepper,
             Err(error) => return TrialEnd::of_failed_start(error),
         };
         // For a linear motion the defect between the nodes contains no more than the order does.
-        let linear = stepper.route() == GaussRoute::Linear;
-        let (stride, points) = if linear { (MAX_UNCHECKED_STEPS, 0) } else { (1, settings.points) };
+        let (stride, points) = if stepper.is_linear() { (MAX_UNCHECKED_STEPS, 0) } else { (1, settings.points) };
         let settings = TrialSettings { points, ..settings };
-        self.run_with_samples(&mut stepper, &settings, stride, |run, sets| {
-            (run.sample_defect(sets), run.newton_steps())
-        })
+        self.run_with_samples(&mut *stepper, &settings, stride)
     }
 
     /// Computes the motion by Gauss collocation with steps that are divided where their defect exceeds the bound of the
@@ -120,7 +113,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         grid: &ComparisonGrid,
     ) -> Result<TrialEnd<N>, InputError> {
         let (problem, h) = (self.request.problem, self.step(count, grid));
-        let mut stepper = match integrator.run(problem, h, StepperOptions::default()) {
+        let mut stepper = match integrator.run(self.collocation, &problem, h, StepperOptions::default()) {
             Ok(stepper) => stepper,
             Err(error) => return TrialEnd::of_failed_start(error),
         };
@@ -137,17 +130,15 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         if let ComparisonGrid::Times = grid { h / lagrangian.dt_dtau(&start.q) } else { h }
     }
 
-    /// Computes the motion with defect samples: `sample` samples the last step at a number of sets of points, and also
-    /// counts the steps that needed Newton's method.
-    fn run_with_samples<R: Stepper<N>>(
+    /// Computes the motion with defect samples of the steps, and counts the steps that needed Newton's method.
+    fn run_with_samples(
         &mut self,
-        run: &mut R,
+        run: &mut (dyn CollocationStepper<N> + '_),
         settings: &TrialSettings<'_>,
         stride: usize,
-        sample: impl Fn(&R, usize) -> (Option<DefectSample>, u64),
     ) -> Result<TrialEnd<N>, InputError> {
         let TrialSettings { count, grid, points, narrow, costs } = settings;
-        let Problem { lagrangian, start, .. } = *self.request.problem;
+        let Problem { lagrangian, start, .. } = self.request.problem;
         let (floor, h) = (
             max_or_nan(NEGLIGIBLE_SAMPLED_DEFECT * self.wanted, MIN_COMPARED_DEFECT),
             (self.request.span / *count as f64).abs(),
@@ -156,13 +147,10 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
         let (mut samples, mut cost) = (0, 0);
         let (mut history, mut gain) = (DefectHistory::default(), TransformationGain::default());
         let ending = self.take_steps(run, *count, grid, stride, |run, part| {
-            let (sample, newton_steps) = sample(run, *points);
+            let (sample, newton_steps) = (run.sample_defect(*points), run.newton_steps());
             cost = run.evaluations() + newton_steps * costs.newton;
             let spent = |samples: u64| cost + samples * costs.sample;
-            if const { L::HINTS.time_transformation }
-                && tests_transformation
-                && gain.with_step(lagrangian.dt_dtau(&run.state().q)) > MIN_TRANSFORMATION_GAIN
-            {
+            if tests_transformation && gain.with_step(lagrangian.dt_dtau(&run.state().q)) > MIN_TRANSFORMATION_GAIN {
                 return (Some(TrialEnd::SwitchReason(SwitchReason::TimeTransformation)), spent(samples));
             }
             if tests_newton_steps && newton_steps as f64 > MAX_NEWTON_STEPS + MAX_NEWTON_FRACTION * part * *count as f64
@@ -198,7 +186,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
     /// Computes the motion with the given integrator.
     pub fn with_integrator(
         &mut self,
-        integrator: &Shared<'p, L, N>,
+        integrator: &SharedIntegrator<'p, N>,
         count: usize,
         grid: &ComparisonGrid,
     ) -> Result<TrialEnd<N>, InputError> {
@@ -236,7 +224,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             (Vec::with_capacity(COMPARED_PARTS), Vec::with_capacity(COMPARED_PARTS), 0, 0);
         let mut largest_size = norm(&[problem.state.q, problem.state.p]);
         let (mut velocities, mut speeds) =
-            (Vec::with_capacity(COMPARED_PARTS), Velocities::new(problem, self.request.scales));
+            (Vec::with_capacity(COMPARED_PARTS), Velocities::new(&problem, self.request.scales));
         let (mut ending, mut chunks) = (None, 0_usize);
         while ending.is_none()
             && let Some((steps, time)) = grid.stop(states.len(), count, t0, span)

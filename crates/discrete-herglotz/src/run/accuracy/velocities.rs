@@ -1,6 +1,7 @@
 //! The velocities of a motion at some times, and its largest speed.
 
 use crate::Problem;
+use crate::integration::SystemProblem;
 use crate::integration::motion::NearbyVelocity;
 use crate::run::accuracy::equilibrium_round_off::accumulated_roundings;
 use crate::run::accuracy::track::{in_units, norm};
@@ -8,11 +9,11 @@ use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use crate::{InputError, SelectionFailure, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, numbers::max_or_nan};
+use contact_geom::{PhasePoint, numbers::max_or_nan};
 
 /// The velocities of one run, and the speed to which their errors are relative.
-pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
-    problem: &'r Problem<'p, L, N>,
+pub(crate) struct Velocities<'r, 'p, const N: usize> {
+    problem: &'r SystemProblem<'p, N>,
     scales: Option<SVector<f64, N>>,
     /// The largest speed so far, and the largest position.
     speed: f64,
@@ -21,9 +22,9 @@ pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
     before: (f64, SVector<f64, N>),
 }
 
-impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
+impl<'r, 'p, const N: usize> Velocities<'r, 'p, N> {
     /// The velocities of a run at its start, with the scales of the coordinates, if they are given.
-    pub fn new(problem: &'r Problem<'p, L, N>, scales: Option<SVector<f64, N>>) -> Self {
+    pub fn new(problem: &'r SystemProblem<'p, N>, scales: Option<SVector<f64, N>>) -> Self {
         let size = |x: &SVector<f64, N>| norm(&[in_units(x, scales.as_ref())]);
         let (speed, largest_position) = (size(&problem.start.v), size(&problem.start.q));
         Velocities { problem, scales, speed, largest_position, before: (problem.t0, problem.start.q) }
@@ -64,13 +65,13 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+impl<const N: usize> Request<'_, N> {
     /// Changes the cause of a refused accuracy to the round-off of the velocity, if that alone exceeds the requested
     /// error: a momentum `p = v + A(q)` determines v up to the round-off of A.
     pub(crate) fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
-        let Problem { lagrangian, start, state, t0, .. } = self.problem;
+        let Problem { lagrangian, start, state, t0, .. } = &self.problem;
         let InputError::Accuracy { wanted, .. } = refused else { return refused };
-        if const { L::HINTS.hamiltonian } {
+        if lagrangian.hints().hamiltonian {
             return refused; // The velocity is a function of the momentum.
         }
         let rounding = inverted(&lagrangian.hessian(*t0, start).vv)

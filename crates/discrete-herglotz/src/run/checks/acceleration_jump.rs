@@ -7,17 +7,13 @@ use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
 use crate::{UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    Lagrangian,
-    numbers::{max_abs_or_nan, max_or_nan},
-    support::herglotz_rates,
-};
+use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 
 /// The number of parts of a suspect interval at whose ends the acceleration is evaluated: second differences of a
 /// smooth acceleration are then a thousandth of what they are over the interval, and those of a jump are not.
 const ACCELERATION_PARTS: usize = 32;
 
-impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
+impl<const N: usize> Discretization<'_, N> {
     /// Decides on a suspect interval: an unresolved step if shorter steps differ or the acceleration jumps, `None`
     /// otherwise.
     pub(crate) fn unresolved_within(&self, suspect: &SuspectInterval<N>) -> Option<UnresolvedStep> {
@@ -34,11 +30,11 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// ends: for a jump it does not depend on the distance of the points, for a smooth acceleration it decreases with
     /// the square of the distance. `None` if no velocity is known.
     fn jump(&self, SuspectInterval { step, steps, t, from, to }: &SuspectInterval<N>) -> Option<f64> {
-        if const { L::HINTS.hamiltonian } {
+        if self.problem.lagrangian.hints().hamiltonian {
             // Where H_pp is singular the acceleration is not a function of position and velocity.
             return None;
         }
-        let Problem { lagrangian, start: first, .. } = *self.problem;
+        let Problem { lagrangian, start: first, .. } = self.problem;
         let span = *steps as f64 * self.h;
         let start = legendre_inverse(lagrangian, *t, from, &first.v).ok()?;
         let end = legendre_inverse(lagrangian, t + span, to, &start.v).ok()?;
@@ -54,7 +50,7 @@ impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
             let x = hermite(&start, &end, span, at);
             speed = max_or_nan(speed, size(&x.v));
             // Outside the domain of L the acceleration is not finite, and the interval counts as unresolved.
-            let (rates, drag) = herglotz_rates(lagrangian, t + at, &x).ok()?;
+            let (rates, drag) = lagrangian.rates(t + at, &x).ok()?;
             *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
         }
         let jump = max_abs_or_nan(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));

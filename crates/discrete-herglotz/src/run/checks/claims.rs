@@ -5,12 +5,11 @@ use crate::resolution::monitor::size;
 use crate::resolution::thresholds::{CLAIM_ROUNDINGS, MAX_CONSTANT_DIFFERENCE, MIN_CLAIM_DISPLACEMENT};
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
-use crate::{Stepper, theory::legendre_inverse};
+use crate::{Stepper, System, theory::legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint,
+    Defect, PhasePoint, Structure, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
-    support::gradient_rounding,
 };
 
 /// The number of parts into which a step is divided for checks within it, if its own displacement exceeds
@@ -48,7 +47,7 @@ struct Constants<const N: usize> {
 }
 
 impl<const N: usize> Constants<N> {
-    fn at<L: Lagrangian<N>>(structure: &Structure, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Self> {
+    fn at(structure: &Structure, lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Option<Self> {
         let constants = if structure.quadratic {
             let h = lagrangian.hessian(t, x);
             Constants { rate: lagrangian.gradient(t, x).z, mass: h.vv, qq: Some(h.qq) }
@@ -63,9 +62,10 @@ impl<const N: usize> Constants<N> {
 
 impl<const N: usize> ClaimMonitor<N> {
     /// The monitor of a run whose Lagrangian claims that something is constant. `None` if the claims are proved.
-    pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>) -> Option<Self> {
+    pub fn of(steps: &Discretization<'_, N>) -> Option<Self> {
+        let hints = steps.problem.lagrangian.hints();
         // A Hamiltonian's own claims are verified at the start of the run.
-        if const { L::HINTS.proved || L::HINTS.hamiltonian } {
+        if hints.proved || hints.hamiltonian {
             return None;
         }
         let problem = steps.problem;
@@ -90,9 +90,9 @@ impl<const N: usize> ClaimMonitor<N> {
     }
 
     /// Checks the claims at the end of a step, and within a long step; returns a violated claim.
-    pub fn violated<L: Lagrangian<N>>(
+    pub fn violated(
         &mut self,
-        steps: &Discretization<'_, L, N>,
+        steps: &Discretization<'_, N>,
         stepper: &dyn Stepper<N>,
         before: Option<&(f64, PhasePoint<N>)>,
     ) -> Option<Defect> {
@@ -155,12 +155,7 @@ impl<const N: usize> ClaimMonitor<N> {
         part
     }
 
-    fn compare<L: Lagrangian<N>>(
-        &self,
-        steps: &Discretization<'_, L, N>,
-        t: f64,
-        x: &VelocityPoint<N>,
-    ) -> Option<Defect> {
+    fn compare(&self, steps: &Discretization<'_, N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
         let (lagrangian, structure) = (steps.problem.lagrangian, self.structure);
         let here = Constants::at(&structure, lagrangian, t, x)?;
         let then;
@@ -172,7 +167,7 @@ impl<const N: usize> ClaimMonitor<N> {
             }
         };
         let rounding = |part: usize| {
-            let (_, r) = gradient_rounding(lagrangian, t, x);
+            let (_, r) = lagrangian.rounding(t, x);
             let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
             CLAIM_ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
         };

@@ -5,11 +5,9 @@ use crate::resolution::thresholds::MIN_SUSPECT_DRIFT;
 use crate::run::accuracy::equilibrium_round_off::EquilibriumRoundOff;
 use crate::run::checks::energy_drift::{EnergyDrift, EnergySample, allowed};
 use crate::run::discretization::Discretization;
-use crate::{Stepper, theory::legendre_inverse};
+use crate::{Stepper, System, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::rounding_at_state,
-};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 
 /// The shortest distance of two energy checks in long runs, in steps: a check costs about three of the least expensive
 /// steps.
@@ -39,7 +37,7 @@ struct Energies {
 
 impl<const N: usize> EnergyMonitor<N> {
     /// The monitor of a run, if its energy and its conformal factor are available.
-    pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>, constant_rate: bool) -> Option<Self> {
+    pub fn of(steps: &Discretization<'_, N>, constant_rate: bool) -> Option<Self> {
         let problem = steps.problem;
         let structure = &problem.structure;
         let known = constant_rate || structure.has_constant_rate() || steps.needs.conformal_factor;
@@ -68,9 +66,9 @@ impl<const N: usize> EnergyMonitor<N> {
 
     /// The drift at a state, relative to the largest drift of steps that resolve their motion, if this ratio exceeds
     /// one.
-    pub fn drift<L: Lagrangian<N>>(
+    pub fn drift(
         &mut self,
-        steps: &Discretization<'_, L, N>,
+        steps: &Discretization<'_, N>,
         stepper: &dyn Stepper<N>,
         (log_factor, taken): (f64, usize),
     ) -> Option<f64> {
@@ -95,18 +93,18 @@ impl<const N: usize> EnergyMonitor<N> {
 
 /// Whether the energy of a run may have drifted, judged from its two ends, for an autonomous system with constant
 /// `L_z`. The decision is left to an [`EnergyMonitor`].
-pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn may_drift<const N: usize>(
+    system: &dyn System<N>,
     order: u32,
     (t0, from): (f64, &PhasePoint<N>),
     (t, to): (f64, &PhasePoint<N>),
 ) -> bool {
     let rest = SVector::zeros();
-    let Ok(x) = legendre_inverse(lagrangian, t0, from, &rest) else { return false };
-    let Ok(y) = legendre_inverse(lagrangian, t, to, &x.v) else { return false };
-    let Ok(AtState { rate, .. }) = at_state(lagrangian, t0, from, &x.v) else { return false };
+    let Ok(x) = legendre_inverse(system, t0, from, &rest) else { return false };
+    let Ok(y) = legendre_inverse(system, t, to, &x.v) else { return false };
+    let Ok(AtState { rate, .. }) = at_state(system, t0, from, &x.v) else { return false };
     let sigma = (rate * (t - t0)).exp();
-    let (Some(a), Some(b)) = (energies(lagrangian, t0, &x, from), energies(lagrangian, t, &y, to)) else {
+    let (Some(a), Some(b)) = (energies(system, t0, &x, from), energies(system, t, &y, to)) else {
         return false;
     };
     let allowed = allowed(f64::from(order.max(1))) * max_or_nan(a.kinetic * sigma, b.kinetic);
@@ -114,19 +112,19 @@ pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
 }
 
 /// The energy at a state, with the kinetic energy `v.Wv/2` as the sum of the magnitudes of its terms.
-fn energies<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+fn energies<const N: usize>(
+    system: &dyn System<N>,
     t: f64,
     x: &VelocityPoint<N>,
     state: &PhasePoint<N>,
 ) -> Option<Energies> {
-    let AtState { l, rate: slope, .. } = at_state(lagrangian, t, state, &x.v).ok()?;
+    let AtState { l, rate: slope, .. } = at_state(system, t, state, &x.v).ok()?;
     let mut kinetic = 0.0;
-    if const { L::HINTS.hamiltonian } {
+    if system.hints().hamiltonian {
         // The mass matrix need not exist.
         kinetic = (0..N).map(|i| 0.5 * (state.p[i] * x.v[i]).abs()).sum();
     } else {
-        let w = lagrangian.mass_matrix(t, x);
+        let w = system.mass_matrix(t, x);
         for i in 0..N {
             for j in 0..N {
                 kinetic += 0.5 * (x.v[i] * w[(i, j)] * x.v[j]).abs();
@@ -141,13 +139,8 @@ fn energies<L: Lagrangian<N>, const N: usize>(
 /// A bound on the round-off of the energy at a state.
 #[cold]
 #[inline(never)]
-fn rounding_of<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    t: f64,
-    x: &VelocityPoint<N>,
-    state: &PhasePoint<N>,
-) -> f64 {
-    let (of_value, of_gradient) = rounding_at_state(lagrangian, t, x, state);
+fn rounding_of<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>, state: &PhasePoint<N>) -> f64 {
+    let (of_value, of_gradient) = system.rounding_at_state(t, x, state);
     let of_momentum = |i: usize| (f64::EPSILON * state.p[i] * x.v[i]).abs() + (of_gradient.y[i] * x.v[i]).abs();
     of_value + (0..N).map(of_momentum).sum::<f64>()
 }

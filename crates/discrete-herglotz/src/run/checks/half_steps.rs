@@ -6,17 +6,17 @@ use crate::run::discretization::Discretization;
 use crate::{Problem, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    Lagrangian, PhasePoint, VelocityPoint,
+    PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
+impl<const N: usize> Discretization<'_, N> {
     /// The defect of some steps, above one if they do not resolve the motion. `None` if no comparison is possible.
     pub(crate) fn half_step_defect(
         &self,
         SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
     ) -> Option<f64> {
-        let Problem { lagrangian, start, .. } = *self.problem;
+        let Problem { lagrangian, start, .. } = self.problem;
         let end = t + *steps as f64 * self.h;
         // If several velocities have the same momentum, the mean velocity selects that of the motion.
         let mean = (to.q - from.q) / (end - t);
@@ -64,7 +64,7 @@ mod tests {
         problem: &'a Problem<'a, InPlane, 2>,
         integrator: impl Integrator<'a, InPlane, 2> + 'a,
         steps: usize,
-    ) -> Plan<'a, InPlane, 2> {
+    ) -> Plan<'a, 2> {
         problem.by(integrator).steps(Steps::Size(H)).plan(Until::Time(H * steps as f64)).unwrap()
     }
 

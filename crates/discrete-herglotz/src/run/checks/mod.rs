@@ -15,7 +15,7 @@ use crate::run::findings::Findings;
 use crate::status::first;
 use crate::{Status, Stepper, UnresolvedStep, integration::SuspectInterval};
 use claims::ClaimMonitor;
-use contact_geom::{Defect, Lagrangian, PhasePoint};
+use contact_geom::{Defect, PhasePoint};
 use energy::EnergyMonitor;
 
 /// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the
@@ -60,8 +60,8 @@ impl<const N: usize> TakenSteps<'_, N> {
 }
 
 /// The checks of a run.
-pub(crate) struct Checks<'r, 'p, L, const N: usize> {
-    steps: &'r Discretization<'p, L, N>,
+pub(crate) struct Checks<'r, 'p, const N: usize> {
+    steps: &'r Discretization<'p, N>,
     pub findings: Findings,
     /// Whether the conformal factor is a product along the run, and whether it is a power of one `sigma_d`.
     product: bool,
@@ -79,13 +79,13 @@ pub(crate) struct Checks<'r, 'p, L, const N: usize> {
     ends_after: Option<usize>,
 }
 
-impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
+impl<'r, 'p, const N: usize> Checks<'r, 'p, N> {
     /// The checks of a run with these steps. `constant_rate`: whether every step has the same `sigma_d`. `ends_after`:
     /// the step at which an observer is expected to end the run.
-    pub fn of(steps: &'r Discretization<'p, L, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
+    pub fn of(steps: &'r Discretization<'p, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
         let given = steps.error.is_none();
         let suspects = given && !steps.info.in_transformed_time;
-        let linear = const { L::HINTS.proved } && steps.problem.structure.quadratic;
+        let linear = steps.problem.lagrangian.hints().proved && steps.problem.structure.quadratic;
         let energy = EnergyMonitor::of(steps, constant_rate);
         Checks {
             steps,

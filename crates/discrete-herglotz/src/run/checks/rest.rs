@@ -1,13 +1,11 @@
 //! Motions that have come to rest.
 
-use crate::Problem;
+use crate::integration::SystemProblem;
 use crate::resolution::monitor::size;
 use crate::resolution::thresholds::{MAX_SIZE_AT_REST, REST_ROUNDINGS};
 use crate::run::observers::output_request::OutputRequest;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
-};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 
 /// The cause in the [`Status`](crate::Status) of a run that ends because the motion has come to rest.
 pub(crate) const REST: &str = "rest";
@@ -15,8 +13,8 @@ pub(crate) const REST: &str = "rest";
 /// Whether `q = v = 0` is a stable equilibrium, for the action z, at which a decaying motion stays: L does not depend
 /// on time, its gradient in q and v vanishes there, the mass matrix is positive definite, the potential has a minimum,
 /// and the drag is dissipative. From a maximum of the potential, round-off would drive the motion away.
-pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Problem<'_, L, N>, z: f64) -> bool {
-    if const { L::HINTS.hamiltonian } || !problem.structure.autonomous {
+pub(crate) fn rests_at_the_origin<const N: usize>(problem: &SystemProblem<'_, N>, z: f64) -> bool {
+    if problem.lagrangian.hints().hamiltonian || !problem.structure.autonomous {
         return false;
     }
     let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z };
@@ -30,8 +28,8 @@ pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Pr
 
 /// Whether a motion of the problem is at rest in a state: its position and momentum are below [`MAX_SIZE_AT_REST`], and
 /// its action, if it is requested, is constant.
-pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
-    problem: &Problem<'_, L, N>,
+pub(crate) fn is_at_rest<const N: usize>(
+    problem: &SystemProblem<'_, N>,
     needs: OutputRequest,
     t: f64,
     state: &PhasePoint<N>,
@@ -42,13 +40,13 @@ pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
     let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: state.z };
     let steady = || {
         let lagrangian = problem.lagrangian;
-        let rate = lagrangian.value(t, &origin.q, &origin.v, origin.z).abs();
-        rate <= REST_ROUNDINGS * gradient_rounding(lagrangian, t, &origin).0
+        let rate = lagrangian.value(t, &origin).abs();
+        rate <= REST_ROUNDINGS * lagrangian.rounding(t, &origin).0
     };
     rests_at_the_origin(problem, state.z) && (!needs.action || steady())
 }
 
 /// Whether the start itself is below [`MAX_SIZE_AT_REST`].
-pub(crate) fn starts_at_rest<L, const N: usize>(problem: &Problem<'_, L, N>) -> bool {
+pub(crate) fn starts_at_rest<const N: usize>(problem: &SystemProblem<'_, N>) -> bool {
     max_or_nan(size(&problem.state.q), size(&problem.state.p)) < MAX_SIZE_AT_REST
 }

@@ -4,19 +4,19 @@ use super::SubFlows;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::integration::QuantityDerivatives;
+use crate::integration::SharedIntegrator;
 use crate::integration::StepEnds;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use crate::{Integrator, Problem, StepError};
+use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
-use std::sync::Arc;
 
 /// Steps whose derivative in the state is computed by the integrator: for a custom discrete Lagrangian that of the discrete
 /// Hamiltonian flow, by the implicit function theorem and the second jet. How it depends on parameters and on the step
 /// size is known where the integrator computes derivatives along variations of the Lagrangian.
 pub(super) struct DiscreteSteps<'a, L, const N: usize> {
     pub problem: Problem<'a, L, N>,
-    pub integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
+    pub integrator: SharedIntegrator<'a, N>,
     /// Whether it computes these.
     pub varies: bool,
 }
@@ -26,8 +26,9 @@ impl<L: Parametric<N>, const N: usize> DiscreteSteps<'_, L, N> {
     fn sources(&self, step: &StepEnds<N>, of: &mut ParameterDerivatives<N>) -> Result<Vec<ChartVector<N>>, StepError> {
         let StepEnds { t, h, start, end } = step;
         let lagrangian = self.problem.lagrangian;
+        let problem = self.problem.of_system();
         let along = |variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)| {
-            let source = self.integrator.step_variation(&self.problem, *h, (*t, start, end), variation)?;
+            let source = self.integrator.step_variation(&problem, *h, (*t, start, end), variation)?;
             source.ok_or(StepError::NonFinite)
         };
         // The value with the gradient, which contains the force.
@@ -63,7 +64,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for DiscreteSteps<'_, L, N> {
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let StepEnds { t, h, start, end } = *step;
-        let jacobian = self.integrator.step_jacobian(&self.problem, h, (t, &start, &end))?;
+        let jacobian = self.integrator.step_jacobian(&self.problem.of_system(), h, (t, &start, &end))?;
         let matrix = jacobian.filter(|m| m.shape() == (2 * N + 1, 2 * N + 1)).ok_or(StepError::NonFinite)?;
         let mut state = TangentMatrix::identity();
         // The coordinates are in the order q, p, z.

@@ -19,19 +19,19 @@ mod sub_flow;
 mod tangent_matrix;
 mod velocity_drag;
 
+use crate::integration::SharedIntegrator;
 use crate::integration::StepEnds;
 use crate::integration::StepFormula;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
-use crate::{Integrator, Problem, StepError};
+use crate::{Problem, StepError};
 use collocation::HamiltonianSteps;
 use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
 use discrete::DiscreteSteps;
 use rules::Rules;
 use splittings::{ActionFlows, DragFlows, LinearDragFlows};
-use std::sync::Arc;
 use sub_flow::SubFlow;
 
 /// A method whose steps are compositions of sub-flows.
@@ -73,7 +73,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
     pub fn new<L: Parametric<N>>(
         problem: &Problem<'a, L, N>,
         formula: StepFormula,
-        integrator: &Arc<dyn Integrator<'a, L, N> + 'a>,
+        integrator: &SharedIntegrator<'a, N>,
     ) -> Result<Self, SensitivityError> {
         let lagrangian = problem.lagrangian;
         let mut of_parameters = ParameterDerivatives::new(lagrangian);

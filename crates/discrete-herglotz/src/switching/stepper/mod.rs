@@ -1,9 +1,9 @@
 //! The steps of any integrator, divided at the zeros of switching functions.
 
 pub(crate) mod accumulation;
-pub(crate) mod as_stepper;
 pub(crate) mod evaluation_range;
 pub(crate) mod of_integrator;
+pub(crate) mod part_stepper;
 mod parts;
 mod passage;
 mod run;
@@ -11,30 +11,33 @@ mod solved_parts;
 
 use crate::error::step_error;
 use crate::gauss::StepStart;
-use crate::integration::{Piece, Reset};
+use crate::integration::{Piece, Reset, SystemProblem};
 use crate::status::first;
 use crate::switching::stepper::accumulation::Accumulation;
-use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
+use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::stepper::solved_parts::EndOfPart;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
 use crate::{InputError, Problem, StepError, UnresolvedStep, theory::legendre_inverse};
-use contact_geom::{Lagrangian, VelocityPoint};
+use contact_geom::VelocityPoint;
+
+/// Constructs a stepper for a problem and a step length; the last argument is whether the steps are parts that end on
+/// zeros.
+pub(crate) type MakeStepper<'a, const N: usize> =
+    Box<dyn Fn(&SystemProblem<'a, N>, f64, bool) -> Result<PartStepper<'a, N>, InputError> + 'a>;
 
 /// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of
 /// parts that end on the zeros.
-///
-/// `make` constructs a stepper for a problem and a step length; its last argument is whether the steps are such parts.
-pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
-    problem: Problem<'a, L, N>,
-    make: M,
+pub(crate) struct SwitchingStepper<'a, const N: usize> {
+    problem: SystemProblem<'a, N>,
+    make: MakeStepper<'a, N>,
     range: EvaluationRange,
     h: f64,
     /// The number of steps taken.
     k: usize,
     /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it
     /// (`before`).
-    base: S,
+    base: PartStepper<'a, N>,
     origin: TimedState<N>,
     before: usize,
     here: TimedState<N>,
@@ -46,7 +49,7 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     spent: u64,
     unresolved: Option<UnresolvedStep>,
     /// The steppers of the parts of the last step that had parts, if they are kept.
-    parts: Option<Vec<S>>,
+    parts: Option<Vec<PartStepper<'a, N>>>,
     /// The ends of these parts.
     ends: Vec<EndOfPart<N>>,
     switched: bool,
@@ -57,13 +60,13 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     changed_energy: bool,
 }
 
-impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
-where
-    L: Lagrangian<N>,
-    S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
-{
-    pub fn new(problem: &Problem<'a, L, N>, h: f64, range: EvaluationRange, make: M) -> Result<Self, InputError> {
+impl<'a, const N: usize> SwitchingStepper<'a, N> {
+    pub fn new(
+        problem: &SystemProblem<'a, N>,
+        h: f64,
+        range: EvaluationRange,
+        make: MakeStepper<'a, N>,
+    ) -> Result<Self, InputError> {
         let base = make(problem, h, false)?;
         let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v, rests: StepStart::ZERO };
         Ok(SwitchingStepper {
@@ -102,7 +105,7 @@ where
     }
 
     /// Whether a step is to be divided.
-    fn is_too_long(&self, step: &S) -> bool {
+    fn is_too_long(&self, step: &PartStepper<'a, N>) -> bool {
         if self.max_defect == f64::INFINITY {
             return false;
         }
@@ -111,20 +114,15 @@ where
     }
 
     /// The steppers of the last step: those of its parts if it had some, otherwise the common stepper of all steps.
-    pub fn last_step(&self) -> &[S] {
+    fn last_step(&self) -> &[PartStepper<'a, N>] {
         match &self.parts {
             Some(parts) if self.switched => parts,
             _ => std::slice::from_ref(&self.base),
         }
     }
 
-    /// Whether the last step had parts.
-    pub fn has_switched(&self) -> bool {
-        self.switched
-    }
-
     /// The integrator's stepper at a state.
-    fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<S, StepError> {
+    fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<PartStepper<'a, N>, StepError> {
         let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
         let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
         let mut stepper = (self.make)(&problem, h, is_part).map_err(step_error)?;
@@ -133,7 +131,7 @@ where
     }
 
     /// The state of a stepper, with its velocity.
-    fn reached(&self, stepper: &S, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
+    fn reached(&self, stepper: &PartStepper<'a, N>, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
         let (state, rests) = (stepper.stepper().state(), stepper.compensation());
         let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
         Ok(TimedState { t, state, v, rests })

@@ -1,11 +1,11 @@
 //! The steps of a given integrator, with parts that end on kinks and jumps.
 
-use crate::gauss::Gauss;
+use crate::gauss::{Collocation, MAX_STAGES};
+use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
-use crate::{GaussCollocation, InputError, Integrator, Problem, Stepper, StepperOptions};
-use contact_geom::Lagrangian;
-use std::sync::Arc;
+use crate::switching::stepper::part_stepper::PartStepper;
+use crate::{InputError, Stepper, StepperOptions};
 
 /// A fraction of a step that exceeds the round-off of its ends.
 const END_EXTENSION: f64 = 1e-9;
@@ -14,16 +14,17 @@ const END_EXTENSION: f64 = 1e-9;
 const SUBSTEP_EXTENSION: f64 = 0.5;
 
 /// The highest order of the parts, which are steps of Gauss collocation.
-const MAX_PART_ORDER: u32 = 2 * Gauss::<()>::STAGES as u32;
+const MAX_PART_ORDER: u32 = 2 * MAX_STAGES as u32;
 
 /// The stepper of an integrator with steps that end on kinks and jumps.
 ///
 /// An integrator that evaluates L at the ends of its steps, or beyond, would mix both sides of a surface there. The
 /// parts of its steps, and its steps near a surface, are therefore taken by contact Gauss collocation of the same
 /// order.
-pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
-    integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
-    problem: &Problem<'a, L, N>,
+pub(crate) fn of_integrator<'a, const N: usize>(
+    integrator: SharedIntegrator<'a, N>,
+    collocation: Collocation<'a, N>,
+    problem: &SystemProblem<'a, N>,
     h: f64,
     options: StepperOptions,
 ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
@@ -34,9 +35,10 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
         (false, true) => EvaluationRange::Extended(SUBSTEP_EXTENSION),
         (false, false) => EvaluationRange::Extended(END_EXTENSION),
     };
-    let parts = GaussCollocation { stages: (info.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
-    let make = move |problem: &Problem<'a, L, N>, h: f64, is_part: bool| {
-        if is_part && !within { parts.stepper(problem, h, options) } else { integrator.stepper(problem, h, options) }
+    let parts = collocation.gauss((info.order.div_ceil(2) as usize).clamp(1, MAX_STAGES));
+    let make = move |problem: &SystemProblem<'a, N>, h: f64, is_part: bool| {
+        let by = if is_part && !within { &parts } else { &integrator };
+        by.stepper(problem, h, options).map(PartStepper::Any)
     };
-    Ok(Box::new(SwitchingStepper::new(problem, h, range, make)?))
+    Ok(Box::new(SwitchingStepper::new(problem, h, range, Box::new(make))?))
 }

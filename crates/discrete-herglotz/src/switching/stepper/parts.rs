@@ -4,12 +4,12 @@ use crate::integration::PartEnd;
 use crate::integration::Piece;
 use crate::solve::roots::bracketed_root;
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::stepper::as_stepper::AsStepper;
+use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::stepper::passage::Passed;
 use crate::switching::stepper::solved_parts::EndOfPart;
 use crate::switching::surfaces::{SignChange, StepCurve, TimedState};
-use crate::{DenseStep, InputError, Problem, StepError};
-use contact_geom::{Lagrangian, numbers::max_or_nan};
+use crate::{DenseStep, StepError};
+use contact_geom::numbers::max_or_nan;
 
 /// The largest number of parts of a step; a step with more fails with [`StepError::Switching`] or
 /// [`StepError::Undivided`]. Each costs as much as a step, so that a failure takes a second at most.
@@ -36,26 +36,21 @@ struct OpenPiece<const N: usize> {
 }
 
 impl<const N: usize> OpenPiece<N> {
-    fn add(&mut self, part: &impl AsStepper<N>) {
+    fn add(&mut self, part: &PartStepper<'_, N>) {
         self.parts += 1;
         self.dense = part.stepper().dense();
     }
 }
 
 /// A part of a step.
-struct Part<S, const N: usize> {
-    stepper: Option<S>,
+struct Part<'a, const N: usize> {
+    stepper: Option<PartStepper<'a, N>>,
     to: TimedState<N>,
 }
 
-impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
-where
-    L: Lagrangian<N>,
-    S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
-{
+impl<'a, const N: usize> SwitchingStepper<'a, N> {
     /// One part of a step, from a state to the time t.
-    fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(S, TimedState<N>), StepError> {
+    fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(PartStepper<'a, N>, TimedState<N>), StepError> {
         let mut stepper = self.stepper_at(at, t - at.t, true)?;
         let taken = stepper.stepper_mut().advance(1).map_err(|failure| failure.cause);
         self.spent += stepper.stepper().evaluations();
@@ -162,7 +157,7 @@ where
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
     }
 
-    fn keep(&mut self, stepper: S) {
+    fn keep(&mut self, stepper: PartStepper<'a, N>) {
         if let Some(parts) = &mut self.parts {
             parts.push(stepper);
         }
@@ -178,7 +173,7 @@ where
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.
     /// `None` where the motion does not cross the surface.
-    fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<S, N>> {
+    fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<'a, N>> {
         let SignChange { index, ends, estimate, slope } = *change;
         let (lagrangian, from, span) = (self.problem.lagrangian, curve.from, curve.span());
         let at_start = Part { stepper: None, to: from };

@@ -6,11 +6,10 @@ use crate::integration::Reset;
 use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::accumulation::{Accumulation, Resolution};
-use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::surfaces::{Departure, TimedState};
-use crate::{InputError, Problem, StepError, theory::legendre_inverse};
+use crate::{StepError, theory::legendre_inverse};
 use contact_geom::{
-    Derivatives, Lagrangian, PhasePoint, VelocityPoint,
+    PhasePoint, VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
     switching::Control,
 };
@@ -22,12 +21,7 @@ pub(super) struct Passed<const N: usize> {
     pub passage: Passage,
 }
 
-impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
-where
-    L: Lagrangian<N>,
-    S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
-{
+impl<const N: usize> SwitchingStepper<'_, N> {
     /// The passage of a zero.
     pub(super) fn through(
         &mut self,

@@ -1,24 +1,20 @@
 //! The stepper as seen by a run: its steps, its state, and its words for a resumed run.
 
+use crate::gauss::{CollocationStepper, DefectSample};
 use crate::integration::{SolvedPart, SolvedStages};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::status::first;
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::stepper::as_stepper::AsStepper;
+use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::surfaces::TimedState;
 use crate::{
-    DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, UnresolvedStep,
+    DenseStep, PlanEntry, StepFailure, Stepper, UnresolvedStep,
     integration::{Piece, Reset, SuspectInterval},
 };
+use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint};
 
-impl<'a, L, S, M, const N: usize> Stepper<N> for SwitchingStepper<'a, L, S, M, N>
-where
-    L: Lagrangian<N>,
-    S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
-{
+impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.resets.clear();
         for taken in 0..steps {
@@ -109,14 +105,22 @@ where
     }
 }
 
+impl<const N: usize> CollocationStepper<N> for SwitchingStepper<'_, N> {
+    /// That of all its parts, if the last step had some.
+    fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
+        let samples = self.last_step().iter().map(|part| part.sample_defect(sets));
+        let sample = samples.reduce(|a, b| Some(a?.joined(b?))).flatten()?;
+        Some(if self.switched { sample.after_a_jump() } else { sample })
+    }
+
+    fn newton_steps(&self) -> u64 {
+        self.last_step().iter().map(PartStepper::newton_steps).sum()
+    }
+}
+
 saved!([const N: usize] TimedState<N> { t, state, v, rests });
 
-impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
-where
-    L: Lagrangian<N>,
-    S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
-{
+impl<const N: usize> SwitchingStepper<'_, N> {
     /// Loads everything except the words of `base`, which is constructed again at its origin.
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         let mut counts = [self.k, self.before];

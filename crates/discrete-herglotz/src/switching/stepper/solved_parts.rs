@@ -3,7 +3,6 @@
 use crate::integration::WholeStep;
 use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::stepper::as_stepper::AsStepper;
 use crate::switching::surfaces::TimedState;
 
 /// The end of a part of a step.
@@ -19,7 +18,7 @@ pub(crate) struct EndOfPart<const N: usize> {
     pub end: PartEnd,
 }
 
-impl<'a, L, S: AsStepper<N>, M, const N: usize> SwitchingStepper<'a, L, S, M, N> {
+impl<const N: usize> SwitchingStepper<'_, N> {
     /// The parts of the last step, if it had parts and their steppers are kept.
     pub(super) fn parts_with_stages(&self) -> Vec<SolvedPart<N>> {
         let (true, Some(steppers)) = (self.switched, &self.parts) else { return Vec::new() };
