@@ -98,7 +98,12 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
     }
 
     /// Divides stage values by the weights, and pads them with 0.
+    #[inline(always)]
     fn unweighted(&self, x: &Stages) -> [f64; MAX_STAGES] {
-        from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
+        let mut values = [0.0; MAX_STAGES];
+        for i in 0..self.table.s.min(MAX_STAGES) {
+            values[i] = x.0[i] / self.table.weights.0[i];
+        }
+        values
     }
 }
