@@ -52,6 +52,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::applicable", "takes no number"),
     ("Method::visit_rules", "takes no number"),
     ("RuleVisitor::*", "the implementor's"),
+    ("System::*", "those of the Lagrangian, which are the implementor's"),
+    ("sorted", "orders by `total_cmp`, in which NaN has a place"),
     ("SplittingScheme::*", "tables: take no number"),
     ("AnyIntegrator::all", "takes no number"),
     ("AnyIntegrator::order", "takes no number; the test of check calls it for any number of stages"),
