@@ -1,7 +1,7 @@
 //! Contact Gauss collocation.
 
 mod checks;
-pub(crate) mod collocation;
+mod collocation_stepper;
 mod dense;
 mod initial_mass;
 pub(crate) mod integrator;
@@ -14,7 +14,7 @@ pub(crate) mod tables;
 mod virtual_work;
 mod work_summary;
 
-pub(crate) use collocation::{Collocation, CollocationStepper};
+pub(crate) use collocation_stepper::CollocationStepper;
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};

@@ -1,6 +1,5 @@
 //! The builder of a run: integrator, steps, observers and requests.
 
-use crate::gauss::Collocation;
 use crate::integration::{Bound, SharedIntegrator};
 use crate::run::accuracy;
 use crate::run::integrate::integrate;
@@ -9,6 +8,7 @@ use crate::run::observers::output_request::OutputRequest;
 use crate::run::planning::NO_STEP;
 use crate::run::request::{Request, StepControl, Steps, Until};
 use crate::run::{Outcome, Plan, ResumeState};
+use crate::switching::Collocation;
 use crate::{GaussCollocation, InputError, Integrator, Problem};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;

@@ -1,17 +1,14 @@
 //! A problem with the integrator and the steps of a run.
 
 use crate::error::step_error;
-use crate::gauss::Collocation;
-use crate::integration::SharedIntegrator;
-use crate::integration::StepEnds;
-use crate::integration::SystemProblem;
-use crate::integration::WholeStep;
 use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::integration::{AtState, at_state};
+use crate::integration::{SharedIntegrator, StepEnds, SystemProblem, WholeStep};
 use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, StepSelection};
+use crate::switching::Collocation;
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
 use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};

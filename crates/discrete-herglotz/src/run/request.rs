@@ -1,10 +1,10 @@
 //! The request of a run: its span, its steps, its integrator and its outputs.
 
 use crate::InputError;
-use crate::gauss::Collocation;
 use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
+use crate::switching::Collocation;
 use contact_geom::nalgebra::SVector;
 
 /// The time steps of a run. If the run goes backward in time, so do its steps.

@@ -4,8 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
-use crate::integration::QuantityDerivatives;
-use crate::integration::SolvedStages;
+use crate::integration::{QuantityDerivatives, SolvedStages};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::columns::{Column, Covector};

@@ -1,8 +1,6 @@
 //! Gradients of functions of the end of a run, by the adjoint.
 
-use crate::integration::Motion;
-use crate::integration::PartPoint;
-use crate::integration::WholeStep;
+use crate::integration::{Motion, PartPoint, WholeStep};
 use crate::run::discretization::Discretization;
 use crate::run::{Outcome, Plan, Row, Rows, Run, Until};
 use crate::sensitivity::SensitivityError;

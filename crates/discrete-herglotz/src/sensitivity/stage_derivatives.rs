@@ -6,8 +6,7 @@
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::tables::coefficients::MAX_STAGES;
-use crate::integration::SolvedStages;
-use crate::integration::depends_on_action;
+use crate::integration::{SolvedStages, depends_on_action};
 use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use crate::sensitivity::step_maps::StepMaps;

@@ -1,8 +1,7 @@
 //! The derivatives of a system that the tangent of a collocation step needs.
 
 use crate::StepError;
-use crate::integration::QuantityDerivatives;
-use crate::integration::SolvedStages;
+use crate::integration::{QuantityDerivatives, SolvedStages};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::linear_stages::StageTangent;

@@ -1,7 +1,8 @@
 //! Contact Gauss collocation with steps that are subdivided where the motion is fast.
 
-use crate::gauss::{Collocation, info};
+use crate::gauss::info;
 use crate::integration::SystemProblem;
+use crate::switching::Collocation;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;

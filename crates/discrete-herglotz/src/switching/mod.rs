@@ -6,12 +6,14 @@
 //! across a surface `g(t, q) = 0`, the corner conditions of Weierstrass and Erdmann hold, for Herglotz' principle as
 //! for Hamilton's: `p+ - p- = lambda g_q`, `E+ - E- = -lambda g_t`.
 
+mod collocation;
 mod corner;
 mod divided;
 mod jumps;
 pub(crate) mod stepper;
 mod surfaces;
 
+pub(crate) use collocation::Collocation;
 pub use divided::DividedGauss;
 pub use jumps::jumps_between;
 pub(crate) use surfaces::has_switching_functions;

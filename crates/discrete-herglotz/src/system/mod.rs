@@ -58,10 +58,12 @@ pub trait System<const N: usize> {
     /// The Herglotz vector field `(v, a, L)` with the rate `L_z` of the conformal factor.
     ///
     /// # Errors
-    /// [`GeometryError::Singular`] where W is singular.
+    /// [`GeometryError::Singular`] where W is singular; [`GeometryError::Undefined`] for a Lagrangian that is given by a
+    /// contact Hamiltonian, whose rates are those of `(q, p, z)`.
     fn rates(&self, t: f64, x: &VelocityPoint<N>) -> Result<(ChartVector<N>, f64), GeometryError>;
 
-    /// First-order bounds of the rounding errors of the value and of the gradient.
+    /// First-order bounds of the rounding errors of the value and of the gradient; NaN for a Lagrangian that is given by a
+    /// contact Hamiltonian, for which they are known [at a state](Self::rounding_at_state) alone.
     fn rounding(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>);
 
     /// The same at a state with its velocity, for a Lagrangian that is given by a contact Hamiltonian from the
@@ -129,9 +131,17 @@ impl<L: Lagrangian<N>, const N: usize> System<N> for L {
         Derivatives::mass_matrix(self, t, x)
     }
     fn rates(&self, t: f64, x: &VelocityPoint<N>) -> Result<(ChartVector<N>, f64), GeometryError> {
+        // The derivatives of an inverse Legendre transformation are not compiled where nothing needs them.
+        if const { L::HINTS.hamiltonian } {
+            return Err(GeometryError::Undefined { what: "the acceleration as a function of position and velocity" });
+        }
         herglotz_rates(self, t, x)
     }
     fn rounding(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>) {
+        if const { L::HINTS.hamiltonian } {
+            let none = SVector::from_element(f64::NAN);
+            return (f64::NAN, ChartVector { x: none, y: none, z: f64::NAN });
+        }
         gradient_rounding(self, t, x)
     }
     fn rounding_at_state(&self, t: f64, x: &VelocityPoint<N>, state: &PhasePoint<N>) -> (f64, ChartVector<N>) {

@@ -1,12 +1,12 @@
 //! Runs that an observer ends: the time of the end, for trial runs.
 
 use crate::Status;
-use crate::gauss::Collocation;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{EVENT_SEARCH, EVENT_SEARCH_BUDGET, EVENT_SEARCH_ERROR, MIN_EVENT_SEARCH_STEPS};
 use crate::run::integrate::integrate;
 use crate::run::request::{Request, StepSelection};
 use crate::run::{Observer, Plan, StepView, Stop, Terminal};
+use crate::switching::Collocation;
 use std::ops::ControlFlow;
 
 /// The cause of the end of a search that exceeds its budget.

@@ -1,13 +1,13 @@
 //! Motions that have come to rest.
 
 use crate::StepperOptions;
-use crate::gauss::Collocation;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
     DEFAULT_STAGES, MAX_REST_SEARCH_STEPS, MIN_DECAY_TO_REST, REST_SEARCH_ERROR, STEPS_BETWEEN_REST_CHECKS,
 };
 use crate::run::checks::rest::{is_at_rest, rests_at_the_origin, starts_at_rest};
 use crate::run::request::Request;
+use crate::switching::Collocation;
 
 impl<'p, const N: usize> Request<'p, N> {
     /// The time at which the motion comes to rest, if it lies within the span; found with steps of eight stages, if the

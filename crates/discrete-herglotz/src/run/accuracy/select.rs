@@ -1,9 +1,7 @@
 //! The selection of the integrator and of the number of steps for a requested error.
 
-use crate::gauss::Collocation;
 use crate::gauss::MAX_STAGES;
-use crate::integration::SharedIntegrator;
-use crate::integration::is_separable;
+use crate::integration::{SharedIntegrator, is_separable};
 use crate::run::accuracy::by_doubled_steps::by_doubled_steps;
 use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
 use crate::run::accuracy::divided::divided_steps;
@@ -18,6 +16,7 @@ use crate::run::accuracy::trial_end::SwitchReason;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::observers::observer::Terminal;
 use crate::run::request::{Request, StepSelection};
+use crate::switching::Collocation;
 use crate::{InputError, SelectionFailure};
 use contact_geom::numbers::max_or_nan;
 

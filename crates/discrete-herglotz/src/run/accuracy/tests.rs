@@ -1,12 +1,13 @@
 //! The cost of the step-size selection.
 
 use crate::Problem;
-use crate::gauss::{Collocation, GaussStepper};
+use crate::gauss::GaussStepper;
 use crate::run::accuracy::limits::BUDGET;
 use crate::run::accuracy::select::select_within_budget;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::Request;
 use crate::run::{OutputRequest, Until};
+use crate::switching::Collocation;
 use crate::test_lagrangians::{InPlane, OnLine, Unstated};
 use crate::{AnyIntegrator, Stepper, StepperOptions};
 use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};

@@ -1,10 +1,9 @@
 //! Trial runs: a motion that is computed with a given number of steps, recorded at a few common times, and sampled for
 //! defects between its nodes.
 
-use crate::gauss::{Collocation, CollocationStepper, SAMPLE_SETS};
-use crate::integration::SharedIntegrator;
-use crate::integration::SystemProblem;
+use crate::gauss::{CollocationStepper, SAMPLE_SETS};
 use crate::integration::check_claims::violated_claim;
+use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::resolution::thresholds::{MAX_DEFECT_RATIO, MIN_COMPARED_DEFECT, MIN_SAMPLE_POINTS, TRIAL_ROUNDINGS};
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::defect_history::DefectHistory;
@@ -20,6 +19,7 @@ use crate::run::accuracy::trial_end::{SwitchReason, TrialEnd};
 use crate::run::accuracy::velocities::Velocities;
 use crate::run::discretization::Discretization;
 use crate::run::request::{Request, StepSelection};
+use crate::switching::Collocation;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;

@@ -3,9 +3,7 @@
 use super::SubFlows;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
-use crate::integration::QuantityDerivatives;
-use crate::integration::SharedIntegrator;
-use crate::integration::StepEnds;
+use crate::integration::{QuantityDerivatives, SharedIntegrator, StepEnds};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::SVector;

@@ -19,9 +19,7 @@ mod sub_flow;
 mod tangent_matrix;
 mod velocity_drag;
 
-use crate::integration::SharedIntegrator;
-use crate::integration::StepEnds;
-use crate::integration::StepFormula;
+use crate::integration::{SharedIntegrator, StepEnds, StepFormula};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;

@@ -1,7 +1,8 @@
 //! The steps of a given integrator, with parts that end on kinks and jumps.
 
-use crate::gauss::{Collocation, MAX_STAGES};
+use crate::gauss::MAX_STAGES;
 use crate::integration::{SharedIntegrator, SystemProblem};
+use crate::switching::Collocation;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;

@@ -1,7 +1,6 @@
 //! The parts of a step that end on the zeros of switching functions, or whose defect is within a bound.
 
-use crate::integration::PartEnd;
-use crate::integration::Piece;
+use crate::integration::{PartEnd, Piece};
 use crate::solve::roots::bracketed_root;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;

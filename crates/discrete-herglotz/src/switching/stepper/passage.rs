@@ -1,8 +1,7 @@
 //! What happens to a motion at the zero of a switching function.
 
 use crate::gauss::StepStart;
-use crate::integration::Passage;
-use crate::integration::Reset;
+use crate::integration::{Passage, Reset};
 use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::accumulation::{Accumulation, Resolution};
