@@ -233,7 +233,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Linear<'a, L, N> {
         }
     }
 
-    /// The accelerations of the stages of the step that starts at a position and a velocity.
+    /// The accelerations of the stages of the step that starts at a position and a velocity: a function of its own, called by
+    /// samples twice a run.
+    #[inline(never)]
     fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
         let side = |k: usize| {
             if k < N {
