@@ -59,9 +59,11 @@ pub mod checks {
     pub use crate::switching::jumps_between;
 }
 
-/// Tools for the other crates of this project: the flow of the kinetic part with a linear drag, compensated summation.
+/// Tools for the other crates of this project: the flow of the kinetic part with a linear drag, compensated
+/// summation, items in order.
 pub mod support {
     pub use crate::numbers::compensated::exact_sum;
+    pub use crate::numbers::order::sorted;
     pub use crate::splitting::drag::Drift;
 }
 

@@ -8,7 +8,6 @@ use crate::ensemble::member::{Member, Tally};
 use crate::ensemble::shards::MAX_SHARDS_PER_THREAD;
 use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard, Task};
 use contact_geom::Lagrangian;
-use std::collections::BTreeMap;
 
 /// An [`Ensemble`] after its checks, in shards of a few hundred members that are computed, sent and saved together.
 ///
@@ -59,7 +58,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     ) -> Result<Merge<'s, 'e, 'a, L, N>, EnsembleError> {
         let open = |path| Shards::open(path, sharded.fingerprint(), sharded.count());
         let file = self.checkpoint.as_deref().map(open).transpose()?;
-        let (waiting, tally) = (BTreeMap::new(), Tally::default());
+        let (waiting, tally) = (Vec::new(), Tally::default());
         let mut merge = Merge { ensemble: self, sharded, fold, file, waiting, merged: 0, tally };
         merge.merge_waiting()?;
         Ok(merge)
@@ -92,7 +91,7 @@ pub struct Merge<'s, 'e, 'a, L, const N: usize> {
     fold: &'s mut (dyn FnMut(&Member<N>) + 's),
     file: Option<Shards>,
     /// The shards that arrived before their turn; only if there is no file from which they can be read.
-    waiting: BTreeMap<usize, Shard<N>>,
+    waiting: Vec<(usize, Shard<N>)>,
     /// The number of shards whose members have been passed to the fold: all shards before this one.
     merged: usize,
     tally: Tally,
@@ -106,7 +105,9 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
 
     fn has(&self, shard: usize) -> bool {
         let is_saved = |file: &Shards| file.has(shard);
-        shard < self.merged || self.waiting.contains_key(&shard) || self.file.as_ref().is_some_and(is_saved)
+        shard < self.merged
+            || self.waiting.iter().any(|(index, _)| *index == shard)
+            || self.file.as_ref().is_some_and(is_saved)
     }
 
     /// The tally of the members that have been passed to the fold.
@@ -149,7 +150,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
             return self.merge_waiting();
         }
         if self.file.is_none() {
-            self.waiting.insert(index, shard);
+            self.waiting.push((index, shard));
         }
         Ok(())
     }
@@ -159,7 +160,10 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         loop {
             let next = match &mut self.file {
                 Some(file) => file.read(self.merged, self.sharded.task.members_of(self.merged).len())?,
-                None => self.waiting.remove(&self.merged),
+                None => {
+                    let place = self.waiting.iter().position(|(index, _)| *index == self.merged);
+                    place.map(|place| self.waiting.swap_remove(place).1)
+                }
             };
             let Some(shard) = next else { return Ok(()) };
             self.merge_next(shard);

@@ -1,6 +1,5 @@
 //! Work in shards on several threads, with results in order.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
@@ -19,8 +18,8 @@ struct Window<R> {
     next: usize,
     /// The number of shards that have been handed on.
     handed_on: usize,
-    /// The results that are completed and have not been handed on.
-    done: BTreeMap<usize, R>,
+    /// The results that are completed and have not been handed on, with their shards: a few, in any order.
+    done: Vec<(usize, R)>,
     /// Whether no more results are requested, or a thread has panicked.
     over: bool,
 }
@@ -82,7 +81,7 @@ pub(crate) fn in_order<R: Send>(
     work: impl Fn(usize) -> R + Sync,
     mut hand_on: impl FnMut(R) -> ControlFlow<()>,
 ) {
-    let window = Window { next: 0, handed_on: 0, done: BTreeMap::new(), over: false };
+    let window = Window { next: 0, handed_on: 0, done: Vec::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
     let threads = threads.min(count);
     let most = MAX_SHARDS_PER_THREAD * threads;
@@ -99,18 +98,20 @@ pub(crate) fn in_order<R: Send>(
                     let shard = window.take();
                     drop(window);
                     let result = work(shard);
-                    shared.change(|window| _ = window.done.insert(shard, result));
+                    shared.change(|window| window.done.push((shard, result)));
                 }
             });
         }
         let _guard = AtTheEnd(&shared, true);
         let mut shard = 0;
         while shard < count {
-            let mut window = shared.wait_while(|w| !w.over && !w.done.contains_key(&shard) && !w.has_work(count, most));
+            let mut window = shared
+                .wait_while(|w| !w.over && !w.done.iter().any(|(done, _)| *done == shard) && !w.has_work(count, most));
             if window.over {
                 return;
             }
-            if let Some(result) = window.done.remove(&shard) {
+            if let Some(place) = window.done.iter().position(|(done, _)| *done == shard) {
+                let (_, result) = window.done.swap_remove(place);
                 drop(window);
                 if hand_on(result).is_break() {
                     return;
@@ -121,7 +122,7 @@ pub(crate) fn in_order<R: Send>(
                 let own = window.take();
                 drop(window);
                 let result = work(own);
-                shared.lock().done.insert(own, result);
+                shared.lock().done.push((own, result));
             }
         }
     });

@@ -1,6 +1,7 @@
 //! Steps that are compositions of contact maps: the state by compensated sums, the number of steps, the last factor.
 
 use super::ContactIncrement;
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::state_words::{Saved, saved};
 use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper};
@@ -19,7 +20,7 @@ pub(super) struct StateSums<const N: usize> {
 
 impl<const N: usize> StateSums<N> {
     fn new(x: &PhasePoint<N>) -> Self {
-        let sums = |v: &SVector<f64, N>| std::array::from_fn(|i| CompensatedSum::from(v[i]));
+        let sums = |v: &SVector<f64, N>| from_fn(|i| CompensatedSum::from(v[i]));
         StateSums { q: sums(&x.q), p: sums(&x.p), z: x.z.into(), sigma: 1.0 }
     }
 

@@ -1,11 +1,11 @@
 //! Values at the stages of a collocation step, and linear maps between them, in SIMD registers.
 
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::Unevaluated;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::state_words::Saved;
 use pulp::Simd;
 use qd::Quad;
-use std::array::from_fn;
 
 /// The largest number of stages.
 pub(crate) const MAX_STAGES: usize = 16;

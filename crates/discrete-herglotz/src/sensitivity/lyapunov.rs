@@ -1,5 +1,6 @@
 //! Lyapunov exponents of a run.
 
+use crate::numbers::order::sorted;
 use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Until};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::carried_columns::CarriedColumns;
@@ -208,7 +209,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
             return Err(failure);
         }
         let (t_middle, until_middle) = middle.unwrap_or((t0, vec![0.0; logarithms.len()]));
-        let mut all: Vec<[f64; 2]> = logarithms
+        let all: Vec<[f64; 2]> = logarithms
             .iter()
             .zip(&until_middle)
             .map(|(whole, first)| [whole / (t - t0), (whole - first) / (t - t_middle)])
@@ -216,7 +217,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
         // The frame has the pair of a direction of q in the reverse order, after that of z.
         let paired = all.iter().skip(1).zip(all.iter().rev()).take(coordinates);
         let pairs = paired.map(|(of_q, of_p)| [of_q[0], of_p[0]]).collect();
-        all.sort_by(|a, b| b[0].total_cmp(&a[0]));
+        let all = sorted(&all, |pair| pair[0], true);
         let rate = outcome.log_factor.map_or(f64::NAN, |factor| factor / (t - t0));
         let [exponents, of_second_half] = [0, 1].map(|i| all.iter().map(|pair| pair[i]).collect());
         Ok(LyapunovExponents { outcome, exponents, of_second_half, pairs, rate })

@@ -3,6 +3,7 @@
 use super::separable::SeparableForm;
 use crate::InputError;
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::numbers::array::from_fn;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
@@ -52,7 +53,7 @@ impl<const N: usize> Drag<N> {
             return Drift { length: 0.0, damping: 0.0, lift: 0.0 };
         }
         let g = Coefficients::of(QUADRATURE_NODES);
-        let rates: [f64; QUADRATURE_NODES] = std::array::from_fn(|j| self.rate(lagrangian, t + g.c[j].0 * s));
+        let rates: [f64; QUADRATURE_NODES] = from_fn(|j| self.rate(lagrangian, t + g.c[j].0 * s));
         let (mut growth, mut length) = (0.0, 0.0);
         for i in 0..QUADRATURE_NODES {
             growth += s * g.b[i].0 * rates[i];

@@ -156,12 +156,12 @@ impl SubstepTable {
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let Splitting { form, drag, table, progress, action, compensated, check_resolution } = self;
-        let maps = StepMaps { form, drag, table };
+        let maps = StepMaps { form, drag, table, checked: *check_resolution };
         match (*action, *compensated) {
-            (false, false) => maps.advance::<false, false>(progress, steps, *check_resolution),
-            (false, true) => maps.advance::<false, true>(progress, steps, *check_resolution),
-            (true, false) => maps.advance::<true, false>(progress, steps, *check_resolution),
-            (true, true) => maps.advance::<true, true>(progress, steps, *check_resolution),
+            (false, false) => maps.advance::<false, false>(progress, steps),
+            (false, true) => maps.advance::<false, true>(progress, steps),
+            (true, false) => maps.advance::<true, false>(progress, steps),
+            (true, true) => maps.advance::<true, true>(progress, steps),
         }
     }
 
@@ -176,7 +176,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn sigma(&self) -> f64 {
         let SplittingRun { taken, t0, h, .. } = self.progress;
         let Some(before) = taken.checked_sub(1) else { return 1.0 };
-        StepMaps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
+        StepMaps { form: &self.form, drag: &self.drag, table: &self.table, checked: false }
+            .sigma(t0 + before as f64 * h, h)
     }
 
     fn evaluations(&self) -> u64 {
@@ -215,6 +216,8 @@ struct StepMaps<'s, 'a, L, const N: usize> {
     form: &'s SeparableForm<&'a L, N>,
     drag: &'s Drag<N>,
     table: &'s SubstepTable,
+    /// Whether each drift is checked.
+    checked: bool,
 }
 
 impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
@@ -222,25 +225,18 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         &self,
         progress: &mut SplittingRun<N>,
         steps: usize,
-        check_resolution: bool,
     ) -> Result<(), StepFailure> {
-        match (self.drag, check_resolution) {
-            (Drag::Constant(_), false) => {
-                progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, false, false>(at, n))
+        match self.drag {
+            Drag::Constant(_) if self.checked => {
+                progress.advance(steps, &|at, n| self.run::<ACTION, COMPENSATED, false, true>(at, n))
             }
-            (Drag::Constant(_), true) => {
-                progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, false, true>(at, n))
-            }
-            (Drag::Timed { .. }, false) => {
-                progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, true, false>(at, n))
-            }
-            (Drag::Timed { .. }, true) => {
-                progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, true, true>(at, n))
-            }
+            Drag::Constant(_) => progress.advance(steps, &|at, n| self.run::<ACTION, COMPENSATED, false, false>(at, n)),
+            Drag::Timed { .. } => progress.advance(steps, &|at, n| self.run::<ACTION, COMPENSATED, true, true>(at, n)),
         }
     }
 
-    /// The motion after this number of further steps, and its completed state.
+    /// The motion after this number of further steps, and its completed state. `CHECKED` is whether drifts may be checked; it
+    /// is a constant, since the check of a drift costs as much as the drift, but for a drag in time, whose drifts cost more.
     #[inline(never)]
     fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const CHECKED: bool>(
         &self,
@@ -261,7 +257,7 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
                     } else {
                         m.force = form.force(t + stage.time, &m.q.value, 0.0);
                     }
-                    if CHECKED {
+                    if CHECKED && self.checked {
                         m.check_drift::<true>(&momentum, &force, stage.span, &mut checks);
                     }
                 }

@@ -168,7 +168,7 @@ impl<const N: usize> SplittingRun<N> {
     pub(super) fn advance(
         &mut self,
         steps: usize,
-        after: impl Fn(&Self, usize) -> Reached<N>,
+        after: &dyn Fn(&Self, usize) -> Reached<N>,
     ) -> Result<(), StepFailure> {
         let (mut taken, mut longest) = (0, MAX_UNCHECKED_STEPS);
         while taken < steps {

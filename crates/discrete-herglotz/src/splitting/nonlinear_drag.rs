@@ -124,10 +124,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let ActionSplitting { form, table, progress, compensated, with_suspects } = self;
         match (*compensated, *with_suspects) {
-            (false, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, false>(form, table, at, n)),
-            (false, true) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, true>(form, table, at, n)),
-            (true, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, true, false>(form, table, at, n)),
-            (true, true) => progress.advance(steps, |at, n| run::<L, F::Map, N, true, true>(form, table, at, n)),
+            (false, false) => progress.advance(steps, &|at, n| run::<L, F::Map, N, false, false>(form, table, at, n)),
+            (false, true) => progress.advance(steps, &|at, n| run::<L, F::Map, N, false, true>(form, table, at, n)),
+            (true, false) => progress.advance(steps, &|at, n| run::<L, F::Map, N, true, false>(form, table, at, n)),
+            (true, true) => progress.advance(steps, &|at, n| run::<L, F::Map, N, true, true>(form, table, at, n)),
         }
     }
 

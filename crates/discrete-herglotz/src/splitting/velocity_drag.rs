@@ -125,10 +125,10 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for DragSplitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let DragSplitting { form, table, progress, action, check_resolution, .. } = self;
         match (*action, *check_resolution) {
-            (false, false) => progress.advance(steps, |at, n| run::<L, N, false, false>(form, table, at, n)),
-            (false, true) => progress.advance(steps, |at, n| run::<L, N, false, true>(form, table, at, n)),
-            (true, false) => progress.advance(steps, |at, n| run::<L, N, true, false>(form, table, at, n)),
-            (true, true) => progress.advance(steps, |at, n| run::<L, N, true, true>(form, table, at, n)),
+            (false, false) => progress.advance(steps, &|at, n| run::<L, N, false, false>(form, table, at, n)),
+            (false, true) => progress.advance(steps, &|at, n| run::<L, N, false, true>(form, table, at, n)),
+            (true, false) => progress.advance(steps, &|at, n| run::<L, N, true, false>(form, table, at, n)),
+            (true, true) => progress.advance(steps, &|at, n| run::<L, N, true, true>(form, table, at, n)),
         }
     }
 

@@ -4,9 +4,9 @@ use super::drag::QUADRATURE_NODES;
 use super::separable::SeparableForm;
 use crate::InputError;
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::numbers::array::from_fn;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, ForceStructure, Lagrangian, VelocityPoint};
-use std::array::from_fn;
 
 /// The kinetic part of a Lagrangian with its drag: `p_i' = (gamma - c_i/m_i) p_i - k/m^2 |p| p_i`, `q_i' = p_i/m_i`,
 /// `z' = gamma z + sum_i p_i^2/(2 m_i)`. Where k is not 0, the masses are equal and so are the `c_i`.

@@ -7,6 +7,7 @@ use crate::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, VelocityPoint};
+use discrete_herglotz::support::sorted;
 use discrete_herglotz::{
     Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
 };
@@ -328,8 +329,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
             }
         }
         if found.len() > count {
-            let backward = self.backward;
-            found.sort_by(|a, b| if backward { b.1.total_cmp(&a.1) } else { a.1.total_cmp(&b.1) });
+            found = sorted(&found, |found| found.1, self.backward);
         }
         found
     }

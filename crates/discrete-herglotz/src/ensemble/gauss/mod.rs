@@ -10,6 +10,7 @@ use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated_batch::CompensatedBatch;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
@@ -148,8 +149,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             }))
         };
         Pack {
-            q: std::array::from_fn(|d| of(&|state| state.q[d])),
-            v: std::array::from_fn(|d| of(&|state| self.form.velocity(&state.p)[d])),
+            q: from_fn(|d| of(&|state| state.q[d])),
+            v: from_fn(|d| of(&|state| self.form.velocity(&state.p)[d])),
             z: of(&|state| state.z),
             a: [[zero; N]; MAX_STAGES],
             x: [[zero; N]; MAX_STAGES],

@@ -8,6 +8,7 @@ use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::parametrization::Parametrization;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
 use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::array::from_fn;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{Scaled, StageMap, Stages, blocks};
@@ -17,7 +18,6 @@ use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan, vector,
 };
 use pulp::{Simd, WithSimd};
-use std::array::from_fn;
 use std::sync::OnceLock;
 
 /// The defect of a step at a set of sample points.

@@ -8,6 +8,7 @@ use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::work_summary::GaussRoute;
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, values};
 use crate::numbers::double_double::solve_exactly;
 use crate::numbers::registers::Stages;
@@ -17,7 +18,6 @@ use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, support::lin
 use num_traits::{One, Zero};
 use pulp::Simd;
 use qd::Quad;
-use std::array::from_fn;
 use std::sync::Arc;
 
 /// The change of the action in a step without the term `grow z`: a polynomial of degree two in the velocity and in the

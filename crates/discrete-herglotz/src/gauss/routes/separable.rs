@@ -12,6 +12,7 @@ use crate::gauss::stages::lagrangian_values::StageValues;
 use crate::gauss::stages::position_newton::{PositionNewton, curvature};
 use crate::gauss::stages::simplified_newton::SlopeNewton;
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{Lanes, branched};
@@ -94,8 +95,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             left,
             inverse_mass,
             wants_z,
-            q: std::array::from_fn(|i| start.q[i].into()),
-            v: std::array::from_fn(|i| start.v[i].into()),
+            q: from_fn(|i| start.q[i].into()),
+            v: from_fn(|i| start.v[i].into()),
             z: start.z.into(),
             rest: [Stages::ZERO; N],
             a: [Stages::ZERO; N],

@@ -6,6 +6,7 @@ use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::numbers::array::from_fn;
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::solve::mass_matrix::BLOCK;
@@ -15,7 +16,6 @@ use contact_geom::{
     ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan,
     support::seed,
 };
-use std::array::from_fn;
 
 /// The coefficients of the method multiplied by the step size, which may be negative.
 #[derive(Clone, Debug)]

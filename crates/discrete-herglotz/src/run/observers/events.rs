@@ -1,5 +1,6 @@
 //! Events: sign changes of functions of the state along a run.
 
+use crate::numbers::order::sorted;
 use crate::run::observers::crossings::{LastSign, ScaledMotion, TimeScales};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
@@ -111,13 +112,15 @@ impl<'f, const N: usize> Events<'f, N> {
             // Only the crossings before the time at which a function is not defined or not resolved.
             found.retain(|crossing| !before(t, crossing.t));
         }
-        found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
+        found = sorted(&found, |crossing| crossing.t, backward);
         // Simultaneous crossings are ordered by their index.
         let mut rest = found.as_mut_slice();
         while let Some(first) = rest.first() {
             let (t, rounding) = (first.t, motion.scales.rounding(first.t));
             let (together, later) = rest.split_at_mut(rest.partition_point(|c| (c.t - t).abs() <= rounding));
-            together.sort_by_key(|crossing| crossing.event);
+            if together.len() > 1 {
+                together.copy_from_slice(&sorted(together, |crossing| crossing.event as f64, false));
+            }
             rest = later;
         }
         (found, cause)

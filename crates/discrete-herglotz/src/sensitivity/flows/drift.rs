@@ -5,6 +5,7 @@ use super::exponential_integrals::{length, moment};
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::numbers::array::from_fn;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::splitting::drag::{Drag, QUADRATURE_NODES};
 use crate::splitting::separable::SeparableForm;
@@ -89,29 +90,29 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
         let rest = VelocityPoint { q, v: SVector::zeros(), z };
         let table = Coefficients::of(QUADRATURE_NODES);
         let time = |j: usize| self.t + table.c[j].0 * s;
-        let rates: [f64; QUADRATURE_NODES] = std::array::from_fn(|j| lagrangian.rate(time(j), &rest));
+        let rates: [f64; QUADRATURE_NODES] = from_fn(|j| lagrangian.rate(time(j), &rest));
         // The integral of a function with these values, and those from the start to each node.
         let whole = |x: &[f64; QUADRATURE_NODES]| (0..QUADRATURE_NODES).map(|i| table.b[i].0 * x[i]).sum::<f64>();
         let part =
             |x: &[f64; QUADRATURE_NODES], i: usize| (0..QUADRATURE_NODES).map(|j| table.a[i][j].0 * x[j]).sum::<f64>();
-        let factors: [f64; QUADRATURE_NODES] = std::array::from_fn(|i| (s * part(&rates, i)).exp());
+        let factors: [f64; QUADRATURE_NODES] = from_fn(|i| (s * part(&rates, i)).exp());
         let (g, l) = (s * whole(&rates), s * whole(&factors));
         let mut derivatives = Vec::new();
         if let Some((of, _)) = of {
             let moved = |slopes: &[f64; QUADRATURE_NODES]| {
-                let changes: [f64; QUADRATURE_NODES] = std::array::from_fn(|i| factors[i] * s * part(slopes, i));
+                let changes: [f64; QUADRATURE_NODES] = from_fn(|i| factors[i] * s * part(slopes, i));
                 [s * whole(slopes), s * whole(&changes)]
             };
             for quantity in (0..of.count()).map(Quantity::Parameter) {
-                let slopes = std::array::from_fn(|j| of.at(lagrangian, quantity, time(j), &rest).gradient.z);
+                let slopes = from_fn(|j| of.at(lagrangian, quantity, time(j), &rest).gradient.z);
                 derivatives.push(moved(&slopes));
             }
             let slopes: [f64; QUADRATURE_NODES] =
-                std::array::from_fn(|j| of.at(lagrangian, Quantity::Time, time(j), &rest).gradient.z);
+                from_fn(|j| of.at(lagrangian, Quantity::Time, time(j), &rest).gradient.z);
             derivatives.push(moved(&slopes));
             // The rates at the nodes move with the duration, and the integrals are multiples of it.
-            let [by_rates, by_factors] = moved(&std::array::from_fn(|j| table.c[j].0 * slopes[j]));
-            let stretched: [f64; QUADRATURE_NODES] = std::array::from_fn(|i| factors[i] * part(&rates, i));
+            let [by_rates, by_factors] = moved(&from_fn(|j| table.c[j].0 * slopes[j]));
+            let stretched: [f64; QUADRATURE_NODES] = from_fn(|i| factors[i] * part(&rates, i));
             derivatives.push([by_rates + whole(&rates), by_factors + whole(&factors) + s * whole(&stretched)]);
         }
         Integrals { g, l, derivatives }

@@ -7,6 +7,7 @@ use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::routes::general::General;
 use crate::gauss::stages::parametrization::Parametrization;
 use crate::gauss::tables::coefficients::MAX_STAGES;
+use crate::numbers::array::from_fn;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::monitor::value_rounding;
@@ -15,7 +16,6 @@ use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, numbers::max_or_nan, support::gradient_rounding};
 use pulp::Simd;
-use std::array::from_fn;
 
 impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// Sets the defect of the last step. `first` is the relative error of its predictor; the stages are checked only if

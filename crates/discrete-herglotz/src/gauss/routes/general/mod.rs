@@ -19,6 +19,7 @@ use crate::gauss::stages::parametrization::{Extension, Parametrization, Values};
 use crate::gauss::stages::simplified_newton::{CorrectStages, StageNewton};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite, values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{Lanes, branched};
@@ -26,7 +27,6 @@ use crate::numbers::registers::{StageMap, Stages, blocks};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
-use std::array::from_fn;
 
 /// The state and the workspace of the general step.
 ///

@@ -13,6 +13,7 @@ use crate::gauss::resolution::tail::{Tail, of_sigma};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
+use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite, values};
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
@@ -23,7 +24,6 @@ use contact_geom::{
 };
 use newton::{FullNewton, SimplifiedNewton};
 use pulp::Simd;
-use std::array::from_fn;
 pub(crate) use tangent::{StepDerivatives, step_derivatives, step_jacobian};
 
 /// The number of steps for which `H_pp` is kept: its evaluation by dual numbers costs up to as much as a step.

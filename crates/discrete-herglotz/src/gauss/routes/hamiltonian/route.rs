@@ -9,12 +9,12 @@ use crate::gauss::routes::{RouteState, StageRoute, set_compensation};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::work_summary::GaussRoute;
+use crate::numbers::array::from_fn;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{load_option, save_option, saved};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use pulp::Simd;
-use std::array::from_fn;
 
 impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
     /// Divides stage values by the weights, and pads them with 0.
