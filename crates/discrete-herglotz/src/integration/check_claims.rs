@@ -124,14 +124,14 @@ pub(crate) fn violated_claim<const N: usize>(
     if hints.proved && !hints.forced {
         return None;
     }
-    if system.hints().hamiltonian {
+    if hints.hamiltonian {
         return system.hamiltonian_defect(t, state);
     }
     let x = legendre_inverse(system, t, state, guess).ok()?;
     if let Some(defect) = force_defect(system, t, &x) {
         return Some(defect);
     }
-    if system.hints().proved {
+    if hints.proved {
         return None;
     }
     system.claim_defects(t, &x)?.find(|d| d.size > MAX_CLAIM_DEFECT)

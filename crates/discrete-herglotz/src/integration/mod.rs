@@ -21,7 +21,7 @@ mod solved_stages;
 mod solved_step;
 pub(crate) mod stepper;
 
-pub(crate) use at_state::{AtState, at_state};
+pub(crate) use at_state::{AtState, at_state, state_of};
 pub(crate) use bound::{Bound, SharedIntegrator};
 pub use check_claims::{check_claims, check_unforced};
 pub(crate) use check_claims::{check_kicks, depends_on_action, is_separable};

@@ -1,7 +1,7 @@
 //! Initial value problems: a Lagrangian with an initial state.
 
 use crate::integration::check_claims::check_claims;
-use crate::integration::{AtState, at_state};
+use crate::integration::{AtState, at_state, state_of};
 use crate::{
     DiscreteLagrangian, InputError, Interrupt, StepError, System,
     theory::{discrete_regularity, legendre_inverse, legendre_minus},
@@ -138,7 +138,7 @@ impl<'a, const N: usize> SystemProblem<'a, N> {
         check_regular(system, t0, &start)?;
         let structure = check_claims(system, t0, &start)?;
         let from_momentum = state.is_some();
-        let state = state.unwrap_or_else(|| PhasePoint { q: start.q, p: system.gradient(t0, &start).y, z: start.z });
+        let state = state.unwrap_or_else(|| state_of(system, t0, &start));
         Ok(Problem { lagrangian: system, t0, start, state, from_momentum, structure, interrupt: None })
     }
 
@@ -151,7 +151,7 @@ impl<'a, const N: usize> SystemProblem<'a, N> {
         let (state, from_momentum) = match start {
             Start::Velocity(x) => {
                 PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-                let state = PhasePoint { q: x.q, p: system.gradient(t0, &x).y, z: x.z };
+                let state = state_of(system, t0, &x);
                 if !state.p.iter().all(|p| p.is_finite()) {
                     return Err(InputError::NoMomentum);
                 }

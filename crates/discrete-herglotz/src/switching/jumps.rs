@@ -4,16 +4,19 @@ use super::corner::{Corner, corner};
 use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
 use crate::System;
 use crate::gauss::StepStart;
-use contact_geom::{PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
+use crate::integration::state_of;
+use contact_geom::{VelocityPoint, numbers::max_abs_or_nan};
 
 /// Whether the Lagrangian jumps between two points of a motion, across a zero of one of its [switching
 /// functions](contact_geom::Lagrangian::switching_functions). There the motion has a corner and is not the flow of a vector field.
 ///
 /// The motion between the points is approximated by the cubic Hermite curve through both points with their velocities.
 pub fn jumps_between<const N: usize>(lagrangian: &dyn System<N>, [from, to]: [(f64, VelocityPoint<N>); 2]) -> bool {
-    let of = |(t, x): (f64, VelocityPoint<N>)| {
-        let state = PhasePoint { q: x.q, p: lagrangian.gradient(t, &x).y, z: x.z };
-        TimedState { t, state, v: x.v, rests: StepStart::ZERO }
+    let of = |(t, x): (f64, VelocityPoint<N>)| TimedState {
+        t,
+        state: state_of(lagrangian, t, &x),
+        v: x.v,
+        rests: StepStart::ZERO,
     };
     let curve = StepCurve { from: of(from), to: of(to), dense: None };
     let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1, curve.span());
