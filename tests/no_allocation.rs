@@ -29,7 +29,7 @@ use discrete_herglotz::{
     constraints::{ConstrainedStart, ContactLobatto, DragRattle, Nonholonomic},
     gauss::{Gauss, GaussRoute, GaussStepper},
     groups::{GroupGauss, GroupMotion, GroupState, RigidBodySplitting},
-    rules::{Flow, LeftMidpoint, Method, Midpoint},
+    rules::{Flow, Method, Rule},
     sensitivity::{EndState, Loss},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
@@ -206,7 +206,7 @@ fn exact() {
 /// A search with several corrections allocates as much as one that starts at its solution: its workspace.
 #[test]
 fn corrections_of_paths() {
-    let ld = LeftMidpoint::new(One::from(Pendulum { gamma: -0.1 }), 0.02).unwrap();
+    let ld = Rule::LEFT_MIDPOINT.of(One::from(Pendulum { gamma: -0.1 }), 0.02).unwrap();
     let problem = BoundaryPath::new(&ld, 100, [0.0, 1.0].map(|q| End::Position([q].into()))).unwrap();
     let (mut far, mut near) = (None, None);
     let many = allocations(|| far = Some(problem.search()));
@@ -291,7 +291,7 @@ fn groups_and_constraints() {
     let mut lobatto = ContactLobatto::new(pendulum, pendulum, 3, 0.01, &start).unwrap();
     let edge = KnifeEdge { slope: 0.3, gamma: -0.1 };
     let start = ConstrainedStart::new(VelocityPoint::new([0.0; 3], [0.5, 0.0, 0.7], 0.0));
-    let rule = |h| Midpoint::new(edge, h);
+    let rule = |h| Rule::MIDPOINT.of(edge, h);
     let mut blade = Nonholonomic::new(edge, edge, rule, &SplittingScheme::STRANG, 0.01, &start).unwrap();
     let steppers: [(&str, &mut dyn FnMut() -> bool); 3] = [
         ("RATTLE", &mut || rattle.advance(100).is_ok()),

@@ -5,7 +5,7 @@ use contact_examples::systems::{CoupledInZ, Kepler, OneCoordinate, Pendulum, Sys
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{DiscretePoint, Parametric, Scalar, VelocityDrag, VelocityPoint};
-use discrete_herglotz::rules::{Method, Midpoint};
+use discrete_herglotz::rules::{Method, Rule};
 use discrete_herglotz::sensitivity::{EndCovector, SensitivityError, StateDerivative, Variable};
 use discrete_herglotz::{CustomMethod, DiscreteLagrangian, Problem, StepError, Steps, Until};
 
@@ -36,7 +36,7 @@ fn the_midpoint_rule() {
         let h = 0.05;
         let problem = Problem::new(system, 0.3, x).unwrap();
         let (until, times) = (Until::Time(2.3), [0.3, 0.52, 1.3, 2.3]);
-        let mine = || problem.by(CustomMethod::new("mine", 2, |h| Midpoint::new(system, h))).steps(Steps::Size(h));
+        let mine = || problem.by(CustomMethod::new("mine", 2, |h| Rule::MIDPOINT.of(system, h))).steps(Steps::Size(h));
         let built_in = || problem.by(Method::Midpoint).steps(Steps::Size(h));
         let variables = start(&problem);
         let [a, b] = [mine(), built_in()].map(|run| run.tangent_at(&variables, &times, until).unwrap());
@@ -148,7 +148,7 @@ fn variables_that_a_discrete_lagrangian_does_not_tell() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 0.0, pendulum.initial()).unwrap();
     let mine = || {
-        let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));
+        let mine = CustomMethod::new("mine", 2, |h| Rule::MIDPOINT.of(&pendulum, h));
         problem.by(mine).steps(Steps::Size(0.1))
     };
     for (variable, named) in [

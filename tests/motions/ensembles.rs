@@ -9,7 +9,7 @@ pub mod systems;
 use crate::lagrangians::One;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::ensemble::{BatchKernel, EnsembleError, Member};
-use discrete_herglotz::rules::{MidpointRule, QuadratureMethod};
+use discrete_herglotz::rules::Rule;
 use discrete_herglotz::{
     CheckpointError, Ensemble, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Status,
     Stepper, StepperOptions, Steps, Until,
@@ -45,7 +45,7 @@ fn numbers<const N: usize>(member: &Member<N>) -> Vec<f64> {
 enum By {
     Splitting(SplittingScheme),
     Gauss(GaussCollocation),
-    Rule(QuadratureMethod<MidpointRule>),
+    Rule(Rule),
 }
 
 impl<'a, L: Lagrangian<1> + 'a> Integrator<'a, L, 1> for By {
@@ -89,7 +89,7 @@ fn gauss(stages: usize) -> By {
 }
 
 fn integrators() -> [By; 3] {
-    [splitting(SplittingScheme::BLANES_MOAN_6), gauss(5), By::Rule(QuadratureMethod::default())]
+    [splitting(SplittingScheme::BLANES_MOAN_6), gauss(5), By::Rule(Rule::MIDPOINT)]
 }
 
 #[test]

@@ -14,7 +14,7 @@ use discrete_herglotz::{
 };
 use discrete_herglotz::{
     boundary::{PathStatus, branch},
-    rules::Midpoint,
+    rules::{Quadrature, Rule},
     solve::Solver,
 };
 
@@ -26,9 +26,9 @@ fn at<const N: usize>(q: [f64; N]) -> End<N> {
 
 const STEPS: usize = 400;
 
-fn bratu(lambda: f64) -> Result<BoundaryPath<Midpoint<One>, 1>, InputError> {
+fn bratu(lambda: f64) -> Result<BoundaryPath<Quadrature<One>, 1>, InputError> {
     BoundaryPath::new(
-        Midpoint::new(One::from(Bratu::undamped(lambda)), 1.0 / STEPS as f64)?,
+        Rule::MIDPOINT.of(One::from(Bratu::undamped(lambda)), 1.0 / STEPS as f64)?,
         STEPS,
         [at([0.0]), at([0.0])],
     )
@@ -76,8 +76,8 @@ const P0: f64 = 0.3;
 const Z0: f64 = 0.4;
 
 /// `L = (v^2 - q^2 - 0.7 z^2)/2`, the momentum given at the start, the position at the end; by the span of time.
-fn mixed(span: f64) -> Result<BoundaryPath<Midpoint<One>, 1>, InputError> {
-    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), span / MIXED as f64)?;
+fn mixed(span: f64) -> Result<BoundaryPath<Quadrature<One>, 1>, InputError> {
+    let ld = Rule::MIDPOINT.of(one(QuadraticInZ { c: 0.7 }), span / MIXED as f64)?;
     BoundaryPath::new(ld, MIXED, [End::Momentum([P0].into()), at([1.0])])?.starting_at(0.0, Z0)
 }
 
@@ -85,7 +85,7 @@ fn mixed(span: f64) -> Result<BoundaryPath<Midpoint<One>, 1>, InputError> {
 /// where the motion is not defined up to the end.
 fn missed(span: f64, q0: f64) -> Option<f64> {
     let h = span / MIXED as f64;
-    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), h).ok()?;
+    let ld = Rule::MIDPOINT.of(one(QuadraticInZ { c: 0.7 }), h).ok()?;
     let mut x = PhasePoint { q: [q0].into(), p: [P0].into(), z: Z0 };
     let (mut v, mut solver) = (x.p, Solver::default());
     for k in 0..MIXED {
@@ -158,7 +158,7 @@ fn mixed_ends_have_a_fold() {
 fn corrections_converge_quadratically() {
     fn run<const N: usize>(system: impl Lagrangian<N> + Copy, from: [f64; N], to: [f64; N], z0: f64) {
         let steps = 50;
-        let ld = Midpoint::new(system, 0.8 / steps as f64).unwrap();
+        let ld = Rule::MIDPOINT.of(system, 0.8 / steps as f64).unwrap();
         let momentum = End::Momentum(SVector::from_fn(|i, _| 0.2 + 0.1 * i as f64));
         for ends in [[at(from), at(to)], [momentum, at(to)], [at(from), momentum], [at(from), End::Free]] {
             let problem = || BoundaryPath::new(ld, steps, ends).unwrap().starting_at(0.2, z0).unwrap();
@@ -188,11 +188,11 @@ impl Lagrangian<2> for Crossed {
 #[test]
 fn a_mass_without_a_diagonal() {
     let (h, steps) = (0.02, 100);
-    let ld = Midpoint::new(Two::from(Crossed), h).unwrap();
+    let ld = Rule::MIDPOINT.of(Two::from(Crossed), h).unwrap();
     let found = BoundaryPath::new(ld, steps, [at([0.3, -0.2]), at([1.0, 0.4])]).unwrap().search();
     assert_eq!(found.status, PathStatus::Found, "{}", found.status);
     // Both coordinates are oscillators, with the angle `2 atan(h/2)` of the rule: each agrees with a single oscillator.
-    let one = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
+    let one = Rule::MIDPOINT.of(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
     for i in 0..2 {
         let ends = [at([[0.3, -0.2][i]]), at([[1.0, 0.4][i]])];
         let alone = BoundaryPath::new(one, steps, ends).unwrap().search();
@@ -206,7 +206,7 @@ fn a_mass_without_a_diagonal() {
 /// A path that does not fit in memory is refused before it is computed, and the parameters of branches are checked.
 #[test]
 fn bad_input_is_refused() {
-    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum::default()), 0.1).unwrap();
     let ends = [at([0.0]), at([1.0])];
     for steps in [1_000_000_000_000, usize::MAX / 2, usize::MAX] {
         for refused in [BoundaryPath::new(ld, steps, ends), BoundaryPath::periodic(ld, steps, [0.0].into())] {

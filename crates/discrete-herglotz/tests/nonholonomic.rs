@@ -13,7 +13,10 @@ use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan};
 use contact_geom::{Energy, Lagrangian, PhasePoint, SmoothFunction, VelocityPoint, constraints::Distribution};
 use discrete_herglotz::InputError;
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, Nonholonomic, OffConstraint};
-use discrete_herglotz::{DiscreteLagrangian, SplittingScheme, Stepper, rules::Midpoint};
+use discrete_herglotz::{
+    DiscreteLagrangian, SplittingScheme, Stepper,
+    rules::{Quadrature, Rule},
+};
 
 /// The slope of three errors that fall by halving steps.
 fn slope(errors: &[f64]) -> f64 {
@@ -26,13 +29,13 @@ fn motion<S, const N: usize, const M: usize>(
     scheme: &SplittingScheme,
     h: f64,
     start: VelocityPoint<N>,
-) -> Nonholonomic<S, S, Midpoint<S>, N, M>
+) -> Nonholonomic<S, S, Quadrature<S>, N, M>
 where
     S: Lagrangian<N> + Distribution<N, M> + Copy,
-    Midpoint<S>: DiscreteLagrangian<N>,
+    Quadrature<S>: DiscreteLagrangian<N>,
 {
     let start = ConstrainedStart { off_constraint: OffConstraint::Project, ..ConstrainedStart::new(start) };
-    Nonholonomic::new(system, system, |h| Midpoint::new(system, h), scheme, h, &start).unwrap()
+    Nonholonomic::new(system, system, |h| Rule::MIDPOINT.of(system, h), scheme, h, &start).unwrap()
 }
 
 /// The velocity along the blade and the angular velocity of the sleigh with `k = 1/2`, `a = 1`, and its direction.
@@ -190,7 +193,7 @@ fn energy_is_dissipated_and_contact_is_lost() {
 fn velocities_outside_of_the_distribution_are_refused() {
     let system = KnifeEdge { slope: 1.0, gamma: 0.0 };
     let start = ConstrainedStart::new(VelocityPoint::new([0.0; 3], [1.0, 0.2, 1.0], 0.0));
-    let rule = |h| Midpoint::new(system, h);
+    let rule = |h| Rule::MIDPOINT.of(system, h);
     let off = Nonholonomic::new(system, system, rule, &SplittingScheme::STRANG, 0.1, &start).err();
     assert!(
         matches!(off, Some(InputError::Constraint(ConstraintError::OffVelocity { distance })) if (distance - 0.2).abs() < 1e-12),

@@ -6,7 +6,7 @@ use crate::*;
 use contact_examples::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
+use discrete_herglotz::{DiscreteLagrangian, rules::Rule, solve::Solver};
 use std::fmt::Debug;
 
 /// The debug output of a result, in which a NaN can be found.
@@ -97,7 +97,7 @@ const CALLS: &[Call] = &[
         let one = exact(a[1]).ok()?;
         described(through(&one, &one, a[0], (&[[a[2]].into(), [a[3]].into()], a[4]), &[0.5 * (a[2] + a[3])].into()))
     }),
-    ("error_orders", |a| described(error_orders(&SYSTEM, |h| Midpoint::new(SYSTEM, h), a[0], &start(a), a[1]))),
+    ("error_orders", |a| described(error_orders(&SYSTEM, |h| Rule::MIDPOINT.of(SYSTEM, h), a[0], &start(a), a[1]))),
     ("condition", |a| described(statements::condition(&SYSTEM, a[0], &start(a), a[1]))),
     ("follows_motion", |a| described(statements::follows_motion(&SYSTEM, a[0], &start(a), a[1], 2))),
 ];

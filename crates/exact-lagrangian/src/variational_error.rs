@@ -89,12 +89,12 @@ const MIN_ERROR_OVER_ROUND_OFF: f64 = 200.0;
 /// ```
 /// use contact_examples::systems::QuadraticInZ;
 /// use contact_geom::VelocityPoint;
-/// use discrete_herglotz::rules::Midpoint;
+/// use discrete_herglotz::rules::Rule;
 /// use exact_lagrangian::error_orders;
 ///
 /// let system = QuadraticInZ { c: 1.0 };
 /// let x = VelocityPoint::new([0.8], [-0.6], 0.4);
-/// let orders = error_orders(&system, |h| Midpoint::new(&system, h), 0.0, &x, 0.5)?;
+/// let orders = error_orders(&system, |h| Rule::MIDPOINT.of(&system, h), 0.0, &x, 0.5)?;
 /// assert!(orders.value.order.is(3.0, 0.15) && orders.flow.order.is(3.0, 0.15));
 /// # Ok::<(), exact_lagrangian::ExactError<1>>(())
 /// ```
@@ -210,10 +210,11 @@ mod tests {
     use super::*;
     use contact_examples::systems::CoupledInZ;
     use contact_geom::Scalar;
-    use discrete_herglotz::{StepError, rules::Midpoint};
+    use discrete_herglotz::StepError;
+    use discrete_herglotz::rules::{Quadrature, Rule};
 
     /// The midpoint rule, given by its value alone: its momenta and steps are differences that lose digits like `1/h`.
-    struct WithoutClosedDerivatives<'a>(Midpoint<&'a CoupledInZ>);
+    struct WithoutClosedDerivatives<'a>(Quadrature<&'a CoupledInZ>);
     impl DiscreteLagrangian<1> for WithoutClosedDerivatives<'_> {
         fn step_size(&self) -> f64 {
             DiscreteLagrangian::<1>::step_size(&self.0)
@@ -230,7 +231,7 @@ mod tests {
         let system = CoupledInZ::default();
         let x = VelocityPoint::new([0.8], [-0.6], 0.4);
         let of = |largest| {
-            error_orders(&system, |h| Midpoint::new(&system, h).map(WithoutClosedDerivatives), 0.0, &x, largest)
+            error_orders(&system, |h| Rule::MIDPOINT.of(&system, h).map(WithoutClosedDerivatives), 0.0, &x, largest)
                 .unwrap()
         };
         let orders = of(0.25);

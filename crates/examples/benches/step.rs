@@ -7,7 +7,7 @@ use contact_geom::nalgebra::{Matrix2, Vector2};
 use criterion::{Criterion, criterion_group, criterion_main};
 use discrete_herglotz::{
     DiscreteLagrangian, Stepper,
-    rules::{Flow, LeftMidpoint},
+    rules::{Flow, Rule},
 };
 use std::hint::black_box;
 
@@ -126,12 +126,12 @@ fn pair<const N: usize>(
 
 fn steps(c: &mut Criterion) {
     let pendulum = Pendulum::default();
-    if let Ok(ld) = LeftMidpoint::new(&pendulum, H) {
+    if let Ok(ld) = Rule::LEFT_MIDPOINT.of(&pendulum, H) {
         let start = PhasePoint::new([1.0], [1.0], 0.0);
         pair(c, "pendulum", &ld, |start| pendulum_by_hand(black_box(pendulum.gamma), start), start);
     }
     let double = DoublePendulum::default();
-    if let Ok(ld) = LeftMidpoint::new(&double, H) {
+    if let Ok(ld) = Rule::LEFT_MIDPOINT.of(&double, H) {
         let start = PhasePoint::new([1.0, 0.5], [0.3, -0.2], 0.0);
         pair(c, "double_pendulum", &ld, |start| double_pendulum_by_hand(black_box(&double), start), start);
     }

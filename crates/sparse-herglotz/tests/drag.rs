@@ -6,7 +6,7 @@ use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
     Problem, SplittingScheme, Start, StepError, Stepper, StepperOptions,
     gauss::GaussStepper,
-    rules::{Flow, Midpoint},
+    rules::{Flow, Rule},
     splitting::Splitting,
 };
 use sparse_herglotz::systems::{FputBond, OuterSolarSystem, fput_chain};
@@ -78,7 +78,7 @@ fn small_systems() {
             same(scheme.name(), a.state(), b.state(), tolerance(scheme.stages()));
         }
         let mut a = SparseMidpoint::new(&large, h, from, None).unwrap();
-        let mut b = Flow::new(Midpoint::new(&Whole, h).unwrap(), t, state).unwrap();
+        let mut b = Flow::new(Rule::MIDPOINT.of(&Whole, h).unwrap(), t, state).unwrap();
         assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
         same("midpoint", a.state(), Stepper::state(&b), tolerance(1) / h.abs());
         for stages in [1, 2] {

@@ -6,7 +6,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 use discrete_herglotz::{
     SplittingScheme, Stepper,
-    rules::{Flow, Midpoint},
+    rules::{Flow, Rule},
     splitting::Splitting,
 };
 use sparse_herglotz::systems::{FputBond, SineGordon, Spring, fput_chain, lattice};
@@ -53,7 +53,7 @@ fn compare<const N: usize, L: Lagrangian<N>>(small: &L, large: &SparseSystem, ma
             assert_same(scheme.name(), a.state(), b.state(), masses, tolerance(scheme.stages()));
         }
         let mut a = SparseMidpoint::new(large, h, from, None).unwrap();
-        let mut b = Flow::new(Midpoint::new(small, h).unwrap(), from.t, PhasePoint { q, p, z }).unwrap();
+        let mut b = Flow::new(Rule::MIDPOINT.of(small, h).unwrap(), from.t, PhasePoint { q, p, z }).unwrap();
         assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
         let sigma = (a.sigma() - b.sigma()).abs();
         assert!(sigma <= 4.0 * f64::EPSILON, "midpoint: sigma_d differs by {sigma:e}");

@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::{Lagrangian, PhasePoint, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
-use discrete_herglotz::rules::{Method, Midpoint};
+use discrete_herglotz::rules::{Method, Rule};
 use std::f64::consts::PI;
 
 /// The index of the undamped oscillator between points that are not conjugate is the number of half periods of the rule
@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 #[test]
 fn the_index_counts_conjugate_points() {
     for (h, steps) in [(0.02, 50), (0.02, 150), (0.02, 170), (0.1, 40), (0.1, 70), (0.1, 200), (0.25, 4000)] {
-        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
+        let ld = Rule::MIDPOINT.of(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let problem = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap();
         let found = problem.search();
         assert!(found.is_found());
@@ -32,7 +32,7 @@ fn conjugate_points_inside_do_no_harm() {
     for (m, steps) in [(2usize, 3usize), (2, 5), (2, 101), (3, 5), (3, 7), (3, 100), (10, 17), (100, 250)] {
         let h = 2.0 * (PI / m as f64 / 2.0).tan();
         let h = if m == 2 { 2.0 } else { h };
-        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
+        let ld = Rule::MIDPOINT.of(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let problem = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap();
         let found = problem.search();
         assert!(found.is_found() && found.iterations <= 3, "{m}, {steps}: {} after {}", found.status, found.iterations);
@@ -40,7 +40,7 @@ fn conjugate_points_inside_do_no_harm() {
         assert_eq!(problem.index(&found).unwrap(), Some((steps - 1) / m), "m = {m}, {steps} steps");
     }
     // Two uncoupled oscillators in a plane, with conjugate points at different times.
-    let ld = Midpoint::new(Two::from(Uncoupled { stiffness: [1.0, 3.0] }), 2.0).unwrap();
+    let ld = Rule::MIDPOINT.of(Two::from(Uncoupled { stiffness: [1.0, 3.0] }), 2.0).unwrap();
     let problem = BoundaryPath::new(&ld, 7, [at([0.3, 0.1]), at([1.0, -0.4])]).unwrap();
     let found = problem.search();
     assert!(found.is_found(), "{}", found.status);
@@ -66,13 +66,13 @@ impl Lagrangian<2> for Uncoupled {
 fn conjugate_ends_are_a_status() {
     for (m, steps) in [(2usize, 4usize), (3, 6), (10, 30)] {
         let h = if m == 2 { 2.0 } else { 2.0 * (PI / m as f64 / 2.0).tan() };
-        let ld = Midpoint::new(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
+        let ld = Rule::MIDPOINT.of(one(HarmonicOscillator { gamma: 0.0 }), h).unwrap();
         let found = BoundaryPath::new(&ld, steps, [at([0.3]), at([1.0])]).unwrap().search();
         assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
         assert!(found.points.len() == steps + 1 && found.residual > 0.01 && found.residual.is_finite());
     }
     // The position of a free particle with two free ends is not determined.
-    let ld = Midpoint::new(one(FreeParticle::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(FreeParticle::default()), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [End::Free, End::Free]).unwrap().search();
     assert!(matches!(found.status, PathStatus::Conjugate { .. }), "{}", found.status);
 }
@@ -132,7 +132,7 @@ fn paths_that_jump_a_centre_are_flagged() {
     let (mut jumped, mut steady) = (0, 0);
     for steps in [40, 60, 80, 100, 150] {
         let h = 8.0 / steps as f64;
-        let ld = Midpoint::new(Kepler::<2> { mu: 1.0, gamma: 0.0 }, h).unwrap();
+        let ld = Rule::MIDPOINT.of(Kepler::<2> { mu: 1.0, gamma: 0.0 }, h).unwrap();
         let problem = BoundaryPath::new(&ld, steps, ends).unwrap();
         let mut known: Vec<CriticalPath<2>> = Vec::new();
         for _ in 0..4 {

@@ -9,7 +9,7 @@ use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::switching::{Impact, Impacts};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Scalar};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, PathStatus};
-use discrete_herglotz::rules::{Method, Midpoint};
+use discrete_herglotz::rules::{Method, Rule};
 use discrete_herglotz::theory::{DiscretePath, discrete_flow, legendre_minus, legendre_plus};
 use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
 use std::f64::consts::PI;
@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 #[test]
 fn momenta_and_free_ends() {
     let (h, steps, z0) = (0.01, 60, 0.4);
-    let ld = Midpoint::new(one(QuadraticInZ { c: 0.7 }), h).unwrap();
+    let ld = Rule::MIDPOINT.of(one(QuadraticInZ { c: 0.7 }), h).unwrap();
     let given = |p: f64| End::Momentum([p].into());
     let cases = [
         [given(0.3), at([1.0])],
@@ -57,7 +57,7 @@ fn momenta_and_free_ends() {
 fn periodic_paths_of_forced_systems() {
     let system = Duffing { alpha: 1.0, beta: 0.05, force: 0.3, omega: 1.2, gamma: -0.25 };
     let steps = 128;
-    let ld = Midpoint::new(one(system), 2.0 * PI / 1.2 / steps as f64).unwrap();
+    let ld = Rule::MIDPOINT.of(one(system), 2.0 * PI / 1.2 / steps as f64).unwrap();
     let problem = BoundaryPath::periodic(&ld, steps, [0.0].into()).unwrap();
     let found = problem.search();
     assert_eq!(found.points[0], found.points[steps]);
@@ -72,11 +72,11 @@ fn periodic_paths_of_forced_systems() {
     assert!((x.q0 - found.points[0]).max_abs_or_nan() <= 1e-10, "{} {}", x.q0, found.points[0]);
 
     // Two coordinates, one of them never at rest.
-    let ld = Midpoint::new(Two::from(Driven), 0.05).unwrap();
+    let ld = Rule::MIDPOINT.of(Two::from(Driven), 0.05).unwrap();
     let found = BoundaryPath::periodic(&ld, 60, [0.0, 0.0].into()).unwrap().starting_at(0.0, 0.2).unwrap().search();
     closes(&ld, 0.2, &found, [0.0, 0.0]);
     // Forces that depend on the action, and different positions at the ends.
-    let ld = Midpoint::new(one(QuadraticInZ::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(QuadraticInZ::default()), 0.1).unwrap();
     let found = BoundaryPath::periodic(&ld, 30, [1.0].into()).unwrap().starting_at(0.0, 0.3).unwrap().search();
     closes(&ld, 0.3, &found, [1.0]);
 }
@@ -109,7 +109,7 @@ impl Lagrangian<2> for Driven {
 #[test]
 fn undefined_paths_are_a_status() {
     // A velocity above the speed of light.
-    let ld = Midpoint::new(one(Relativistic::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Relativistic::default()), 0.1).unwrap();
     let found = BoundaryPath::new(&ld, 10, [at([0.0]), at([5.0])]).unwrap().search();
     let StepError::NonFinite = (match found.status {
         PathStatus::Undefined { step: 0, cause } => cause,
@@ -130,14 +130,14 @@ fn paths_pass_through_surfaces() {
     let field = UniformField::<1> { field: [1.0], gamma: -0.1 };
     let ball = SwitchingOne::from(Impacts::new(field, Floor, Impact::Elastic));
     let ends = [at([0.1]), at([0.1])];
-    let found = BoundaryPath::new(Midpoint::new(ball, 0.1).unwrap(), 20, ends).unwrap().search();
-    let free = BoundaryPath::new(&Midpoint::new(One::from(field), 0.1).unwrap(), 20, ends).unwrap().search();
+    let found = BoundaryPath::new(Rule::MIDPOINT.of(ball, 0.1).unwrap(), 20, ends).unwrap().search();
+    let free = BoundaryPath::new(&Rule::MIDPOINT.of(One::from(field), 0.1).unwrap(), 20, ends).unwrap().search();
     assert!(found.is_found() && found.points == free.points && found.points[10][0] < 0.0, "{}", found.points[10]);
 }
 
 #[test]
 fn bad_input_is_refused() {
-    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum::default()), 0.1).unwrap();
     let ends = [at([0.0]), at([1.0])];
     for steps in [0, 1] {
         let refused = BoundaryPath::new(&ld, steps, ends);

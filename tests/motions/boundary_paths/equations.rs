@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::gauss::Gauss;
-use discrete_herglotz::rules::{Method, Midpoint};
+use discrete_herglotz::rules::{Method, Rule};
 use proptest::prelude::*;
 
 /// Every method, on systems that are nonlinear in q, in z, forced, and with a mass that depends on the position.
@@ -55,7 +55,7 @@ fn the_damped_oscillator_in_closed_form() {
     let decay = |k: usize| sigma.powf(0.5 * k as f64);
     let n = steps as f64 * theta;
     let other = (last / decay(steps) - first * n.cos()) / n.sin();
-    let ld = Midpoint::new(one(HarmonicOscillator { gamma }), h).unwrap();
+    let ld = Rule::MIDPOINT.of(one(HarmonicOscillator { gamma }), h).unwrap();
     let found = BoundaryPath::new(&ld, steps, [at([first]), at([last])]).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 1.0);
     let exact = |k: usize| decay(k) * (first * (k as f64 * theta).cos() + other * (k as f64 * theta).sin());
@@ -76,7 +76,7 @@ fn the_order_of_convergence() {
     let truth = BoundaryPath::new(&ld, 10, ends).unwrap().search();
     assert!(truth.is_found());
     let error = |every: usize| {
-        let ld = Midpoint::new(system, 0.1 / every as f64).unwrap();
+        let ld = Rule::MIDPOINT.of(system, 0.1 / every as f64).unwrap();
         let found = BoundaryPath::new(&ld, 10 * every, ends).unwrap().search();
         assert!(found.is_found());
         max_abs_or_nan((0..=10).map(|k| (found.points[k * every] - truth.points[k]).max_abs_or_nan()))
@@ -96,7 +96,7 @@ proptest! {
     #[test]
     fn random_ends(u in prop::collection::vec(-0.8f64..0.8, 4), steps in 2usize..80, z0 in -1.0f64..1.0) {
         fn run<const N: usize, L: Lagrangian<N>>(system: L, u: &[f64], steps: usize, z0: f64) {
-            let ld = Midpoint::new(system, 1.0 / steps as f64).unwrap();
+            let ld = Rule::MIDPOINT.of(system, 1.0 / steps as f64).unwrap();
             let ends = [SVector::from_fn(|i, _| u[i]), SVector::from_fn(|i, _| u[i + N])];
             let problem = BoundaryPath::new(&ld, steps, ends.map(End::Position)).unwrap().starting_at(0.3, z0).unwrap();
             let found = problem.search();

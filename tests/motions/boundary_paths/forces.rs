@@ -11,25 +11,22 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan};
 use contact_geom::{Force, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, End, branch};
-use discrete_herglotz::rules::{Flow, Method, Midpoint, Node, Quadrature, Rule};
+use discrete_herglotz::rules::{Flow, Method, Node, Rule};
 use discrete_herglotz::splitting::ActionStrang;
 use discrete_herglotz::theory::DiscretePath;
 use discrete_herglotz::{DiscreteLagrangian, Stepper};
 use std::f64::consts::PI;
 
 /// Simpson's rule for the action, as a user writes it.
-#[derive(Clone, Copy, Debug)]
-struct Simpson;
-
-impl Rule for Simpson {
-    const NAME: &'static str = "simpson";
-    const ORDER: u32 = 2;
-    const NODES: &'static [Node] = &[
+const SIMPSON: Rule = Rule {
+    name: "simpson",
+    order: 2,
+    nodes: &[
         Node { weight: 1.0 / 6.0, place: 0.0, action: 0.0 },
         Node { weight: 4.0 / 6.0, place: 0.5, action: 0.5 },
         Node { weight: 1.0 / 6.0, place: 1.0, action: 1.0 },
-    ];
-}
+    ],
+};
 
 /// The drag `-c |v| v`, coordinate by coordinate.
 #[derive(Clone, Copy, Debug)]
@@ -123,7 +120,7 @@ fn paths_are_the_runs_of_their_rules() {
         for method in Method::RULES {
             assert_is_the_run(&format!("{name} {method}"), &by(*method, system.clone(), h), t0, start);
         }
-        assert_is_the_run(&format!("{name} simpson"), &Quadrature::<_, Simpson>::new(system, h).unwrap(), t0, start);
+        assert_is_the_run(&format!("{name} simpson"), &SIMPSON.of(system, h).unwrap(), t0, start);
     }
     let pendulum = forced_one(one(Pendulum { gamma: -0.1 }), Quadratic(0.3));
     of("pendulum", pendulum, 0.0, VelocityPoint::new([0.3], [0.9], 0.0));
@@ -168,7 +165,7 @@ fn periodic_paths_with_forces() {
     // Where forces and Lagrangian depend on the action.
     let plane = forced_two(two(CoupledPlane { c: 1.5, ..CoupledPlane::default() }), Mixing);
     of(&by(Method::Trapezoidal, plane, 3.0 / steps as f64), steps, 0.2);
-    of(&Quadrature::<_, Simpson>::new(plane, 3.0 / steps as f64).unwrap(), steps, 0.2);
+    of(&SIMPSON.of(plane, 3.0 / steps as f64).unwrap(), steps, 0.2);
 }
 
 /// Two balls in wells with a spring, one driven with the period 3.
@@ -252,14 +249,14 @@ fn conjugate_points_with_drag() {
 fn a_branch_along_the_drag() {
     let ends = [at([0.0]), at([1.2])];
     let pendulum = one(Pendulum { gamma: -0.1 });
-    let problem = |c: f64| BoundaryPath::new(Midpoint::new(forced_one(pendulum, Quadratic(c)), 0.05)?, 40, ends);
+    let problem = |c: f64| BoundaryPath::new(Rule::MIDPOINT.of(forced_one(pendulum, Quadratic(c)), 0.05)?, 40, ends);
     let paths = branch(problem, [0.0, 1.0], 0.2, 50).unwrap();
     let (last, found) = (&paths[paths.len() - 1], problem(1.0).unwrap().search());
     assert!(last.0 == 1.0 && last.1.is_found() && found.is_found(), "{}", last.0);
     // Two searches for one path, each to the rounding of the positions in 40 steps.
     let off = largest_of(&found.points.iter().zip(&last.1.points).map(|(a, b)| a - b).collect::<Vec<_>>());
     assert!(off <= 16.0 * EPS * 40.0 * 1.2, "{off:e}");
-    let free = BoundaryPath::new(&Midpoint::new(pendulum, 0.05).unwrap(), 40, ends).unwrap().search();
+    let free = BoundaryPath::new(&Rule::MIDPOINT.of(pendulum, 0.05).unwrap(), 40, ends).unwrap().search();
     assert!((0..=40).all(|k| (free.points[k] - paths[0].1.points[k]).max_abs_or_nan() <= 16.0 * EPS * 40.0 * 1.2));
 }
 

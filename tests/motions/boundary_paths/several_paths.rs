@@ -9,7 +9,7 @@ use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan};
 use contact_geom::{VelocityPoint, legendre};
 use discrete_herglotz::DiscreteLagrangian;
 use discrete_herglotz::boundary::{BoundaryPath, CriticalPath, PathStatus, continuation};
-use discrete_herglotz::rules::Midpoint;
+use discrete_herglotz::rules::Rule;
 use discrete_herglotz::theory::{DiscretePath, discrete_flow};
 
 /// Both solutions by deflation, a minimum of the action and one of index 1, against `q = -2 ln(cosh(a (t - 1/2)) /
@@ -17,7 +17,7 @@ use discrete_herglotz::theory::{DiscretePath, discrete_flow};
 #[test]
 fn bratu_has_two_paths_or_none() {
     let (lambda, steps) = (2.0, 400);
-    let ld = Midpoint::new(One::from(Bratu::undamped(lambda)), 1.0 / steps as f64).unwrap();
+    let ld = Rule::MIDPOINT.of(One::from(Bratu::undamped(lambda)), 1.0 / steps as f64).unwrap();
     let problem = BoundaryPath::new(&ld, steps, [at([0.0]), at([0.0])]).unwrap();
     let lower = problem.search();
     let upper = problem.clone().avoiding(&[&lower], 1.0).unwrap().search();
@@ -29,7 +29,7 @@ fn bratu_has_two_paths_or_none() {
         let bound = a.powi(4) / (steps * steps) as f64;
         assert!((found.points[steps / 2][0] - maximum).abs() <= bound, "{} {maximum}", found.points[steps / 2][0]);
     }
-    let ld = Midpoint::new(One::from(Bratu::undamped(4.0)), 1.0 / steps as f64).unwrap();
+    let ld = Rule::MIDPOINT.of(One::from(Bratu::undamped(4.0)), 1.0 / steps as f64).unwrap();
     let none = BoundaryPath::new(&ld, steps, [at([0.0]), at([0.0])]).unwrap().search();
     assert!(matches!(none.status, PathStatus::Stalled | PathStatus::NotConverged), "{}", none.status);
     assert!(none.points.len() == steps + 1 && none.residual > 1e-4 && none.residual < 0.1, "{:e}", none.residual);
@@ -39,7 +39,7 @@ fn bratu_has_two_paths_or_none() {
 #[test]
 fn several_paths_of_a_pendulum_by_deflation() {
     let (h, steps) = (0.05, 200);
-    let ld = Midpoint::new(one(Pendulum { gamma: -0.05 }), h).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum { gamma: -0.05 }), h).unwrap();
     let problem = BoundaryPath::new(&ld, steps, [at([0.0]), at([0.5])]).unwrap();
     let mut found = vec![problem.search()];
     for _ in 0..4 {
@@ -93,14 +93,14 @@ fn negative_directions<D: DiscreteLagrangian<1>>(ld: &D, path: &CriticalPath<1>)
 #[test]
 fn continuation_follows_a_path() {
     // The distance of the ends grows to several turns.
-    let ld = Midpoint::new(one(Pendulum { gamma: -0.05 }), 0.05).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum { gamma: -0.05 }), 0.05).unwrap();
     let problem = |k: u32| BoundaryPath::new(&ld, 100, [at([0.0]), at([0.2 * f64::from(k)])]).unwrap();
     let paths = continuation((0..=40).map(problem)).unwrap();
     assert!(paths.len() == 41 && paths.iter().all(CriticalPath::is_found));
     check(&ld, (0.0, 0.0), &paths[40], 8.0);
     // With refined steps each path is the start of the next, and two corrections suffice for the last.
     let refined = |n: usize| {
-        let ld = Midpoint::new(two(DoublePendulum::default()), 1.0 / n as f64).unwrap();
+        let ld = Rule::MIDPOINT.of(two(DoublePendulum::default()), 1.0 / n as f64).unwrap();
         BoundaryPath::new(ld, n, [at([0.0, 0.1]), at([0.9, 0.4])]).unwrap()
     };
     let paths = continuation([7, 50, 400, 401].map(refined)).unwrap();
@@ -108,7 +108,11 @@ fn continuation_follows_a_path() {
     assert_eq!(paths.iter().map(|path| path.points.len()).collect::<Vec<_>>(), [8, 51, 401, 402]);
     // Where no path exists continuation ends, and keeps the paths found before.
     let bratu = |lambda: f64| {
-        BoundaryPath::new(Midpoint::new(One::from(Bratu::undamped(lambda)), 0.01).unwrap(), 100, [at([0.0]), at([0.0])])
+        BoundaryPath::new(
+            Rule::MIDPOINT.of(One::from(Bratu::undamped(lambda)), 0.01).unwrap(),
+            100,
+            [at([0.0]), at([0.0])],
+        )
     };
     let paths = continuation([3.0, 3.4, 3.6, 3.8].map(|lambda| bratu(lambda).unwrap())).unwrap();
     assert_eq!(paths.iter().map(CriticalPath::is_found).collect::<Vec<_>>(), [true, true, false]);
@@ -118,7 +122,7 @@ fn continuation_follows_a_path() {
 #[test]
 fn the_initial_path_of_the_user() {
     let (h, steps) = (0.05, 160);
-    let ld = Midpoint::new(one(Pendulum { gamma: -0.05 }), h).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum { gamma: -0.05 }), h).unwrap();
     // A motion by the flow, perturbed by a thousandth.
     let start = legendre(&Pendulum { gamma: -0.05 }, 0.0, &VelocityPoint::new([0.2], [1.7], 0.0));
     let mut x = discrete_herglotz::theory::legendre_minus_inverse(&ld, 0.0, &start, &[1.7].into()).unwrap();

@@ -5,7 +5,7 @@ use super::{By, gauss, pendulum_start, splitting};
 use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
-use discrete_herglotz::rules::QuadratureMethod;
+use discrete_herglotz::rules::Rule;
 use discrete_herglotz::{Ensemble, InputError, Integrator, SplittingScheme, Status, Steps, Until};
 
 #[test]
@@ -19,7 +19,7 @@ fn a_member_that_fails_has_its_error_and_the_others_continue() {
     };
     let good = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.1], 0.0);
     let bowl = One::from(Bowl);
-    for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(QuadratureMethod::default())] {
+    for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(Rule::MIDPOINT)] {
         let all = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
             let ensemble = Ensemble::new(&bowl, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(1);
             let mut all = Vec::new();

@@ -6,7 +6,7 @@ use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::UnresolvedStep;
 use discrete_herglotz::ensemble::{EnsembleError, Member};
-use discrete_herglotz::rules::QuadratureMethod;
+use discrete_herglotz::rules::Rule;
 use discrete_herglotz::{Ensemble, InputError, Integrator, Problem, SplittingScheme, Status, Steps, Until};
 
 #[test]
@@ -100,7 +100,7 @@ fn an_accuracy_holds_for_every_member() {
 #[test]
 fn an_accuracy_without_lanes_is_that_of_each_member() {
     let pendulum = pendulum(-0.1);
-    let by = By::Rule(QuadratureMethod::default());
+    let by = By::Rule(Rule::MIDPOINT);
     let ensemble = Ensemble::new(&pendulum, 0.0, 20, pendulum_start).by(by).accuracy(1e-3);
     for member in members(&ensemble, Until::Time(2.0)).iter().step_by(5) {
         let problem = Problem::new(&pendulum, 0.0, pendulum_start(member.index)).unwrap();

@@ -11,7 +11,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     InputError, SplittingScheme, Stepper,
-    rules::{Composition, Midpoint},
+    rules::{Composition, Rule},
     splitting::Splitting,
 };
 
@@ -123,7 +123,7 @@ fn compositions() {
             for scheme in SplittingScheme::ALL.into_iter().filter(|scheme| !scheme.is_nystrom()) {
                 on_some(CASES, &format!("{} with {}", system.name(), scheme.name()), 2 * N + 3, |u| {
                     let ((t, x), h) = (system.sample(&u[1..]), step_from(u[0]));
-                    let rule = |h| Midpoint::new(system, h);
+                    let rule = |h| Rule::MIDPOINT.of(system, h);
                     let map = |from| step(Composition::new(rule, &scheme, h, t, from));
                     bounded(defect(map, &legendre(system, t, &x))?.0, BOUND)
                 });

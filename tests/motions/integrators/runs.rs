@@ -15,7 +15,7 @@ use contact_geom::{
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, InputError, MomentumDecay, Outcome, Plan, Problem, Rows, Run, SelectionFailure,
     SplittingScheme, Status, Steps, Until,
-    rules::{Flow, Method, Midpoint},
+    rules::{Flow, Method, Rule},
 };
 use exact_lagrangian::herglotz_flow;
 use std::f64::consts::PI;
@@ -420,7 +420,7 @@ fn a_span_may_be_negative() {
 #[test]
 fn from_two_points() {
     let pendulum = one(Pendulum::default());
-    let ld = Midpoint::new(&pendulum, 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(&pendulum, 0.1).unwrap();
     let points = DiscretePoint::new([0.3], [0.35], 0.1);
     let problem = Problem::from_points(&pendulum, &ld, 0.5, points).unwrap();
     let flow = Flow::from_points(&ld, 0.5, points).unwrap();

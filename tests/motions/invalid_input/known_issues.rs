@@ -11,7 +11,7 @@ use contact_geom::{
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, Stepper, StepperOptions, Steps, Until,
     gauss::{Gauss, GaussStepper},
-    rules::{Composition, Flow, Method, Midpoint, Rectangle},
+    rules::{Composition, Flow, Method, Rule},
 };
 use std::fs;
 use std::path::Path;
@@ -107,7 +107,7 @@ fn a_composition_takes_its_rule_on_trust() {
     let error = |steps: usize| {
         let h = 1.0 / steps as f64;
         let start = PhasePoint::new([1.0], [0.0], 0.0);
-        let rule = |h| Rectangle::new(oscillator, h);
+        let rule = |h| Rule::RECTANGLE.of(oscillator, h);
         let mut run = Composition::new(rule, &SplittingScheme::YOSHIDA_4, h, 0.0, start).unwrap();
         run.advance(steps).unwrap();
         (run.state().q[0] - 1.0f64.cos()).abs()
@@ -118,7 +118,7 @@ fn a_composition_takes_its_rule_on_trust() {
 
 #[test]
 fn two_points_lose_the_digits_that_their_difference_loses() {
-    let ld = Midpoint::new(one(Pendulum::default()), 1e-8).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum::default()), 1e-8).unwrap();
     let start = PhasePoint::new([1.0], [0.5], 0.0);
     let mut flow = Flow::new(&ld, 0.0, start).unwrap();
     flow.step().unwrap();

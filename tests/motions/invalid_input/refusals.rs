@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, InputError, Outcome, Problem, Row, Rows, Status, StepError, Steps, Until,
-    rules::{Flow, Method, Midpoint, Rectangle},
+    rules::{Flow, Method, Rule},
 };
 use exact_lagrangian::{
     ContactExponential, ExactError, ExactLagrangian, compose, error_orders,
@@ -18,7 +18,7 @@ use exact_lagrangian::{
 /// Equal points are invalid only where a discrete Lagrangian is singular on the diagonal.
 #[test]
 fn equal_points() {
-    let ld = Rectangle::new(one(FreeParticle::default()), 0.1).unwrap();
+    let ld = Rule::RECTANGLE.of(one(FreeParticle::default()), 0.1).unwrap();
     assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
 }
 
@@ -85,7 +85,7 @@ fn exact_input() {
         assert_eq!(ContactExponential::new(one(Pendulum::default()), h).err(), Some(InputError::Step { h }));
         let orders = error_orders(
             &one(Pendulum::default()),
-            |h| Midpoint::new(one(Pendulum::default()), h),
+            |h| Rule::MIDPOINT.of(one(Pendulum::default()), h),
             0.0,
             &VelocityPoint::new([1.0], [0.5], 0.0),
             h,

@@ -42,7 +42,7 @@ use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::support::linear;
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, Symmetry, VelocityPoint, herglotz_field};
-use discrete_herglotz::rules::{LeftMidpoint, Method, Rectangle, UnknownMethod};
+use discrete_herglotz::rules::{Method, Quadrature, Rule, UnknownMethod};
 use discrete_herglotz::{AnyIntegrator, UnknownIntegrator, UnresolvedStep};
 use exact_lagrangian::{ContactExponential, ExactError, herglotz_flow};
 use input::Odd;
@@ -54,8 +54,8 @@ fn pendulum_at(p: f64) -> PhasePoint<1> {
 }
 
 /// A drag that makes the conformal factor of a step of 0.1 negative.
-fn strong() -> LeftMidpoint<One> {
-    LeftMidpoint::new(one(FreeParticle { gamma: -20.0 }), 0.1).unwrap()
+fn strong() -> Quadrature<One> {
+    Rule::LEFT_MIDPOINT.of(one(FreeParticle { gamma: -20.0 }), 0.1).unwrap()
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn geometry_errors() {
             herglotz_field(&Massless, 0.0, &VelocityPoint::new([0.1], [0.2], 0.0)).unwrap_err()
         }, ["singular", "pivot 0e0"];
         GeometryError::Undefined { .. } => {
-            let ld = Rectangle::new(One::from(Odd::Explosive), 0.1).unwrap();
+            let ld = Rule::RECTANGLE.of(One::from(Odd::Explosive), 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
             discrete_herglotz::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];

@@ -8,7 +8,7 @@ use discrete_herglotz::{
     DiscreteLagrangian, SplittingScheme, Stepper,
     checks::check_claims,
     gauss::Gauss,
-    rules::Midpoint,
+    rules::Rule,
     solve::Solver,
     splitting::Splitting,
     theory::{derived_jet, derived_second_jet},
@@ -65,7 +65,7 @@ fn claims<const N: usize>() {
 }
 
 fn rule<const N: usize>() {
-    let midpoint = Midpoint::new(chain::<N>(), STEP).unwrap();
+    let midpoint = Rule::MIDPOINT.of(chain::<N>(), STEP).unwrap();
     let step = midpoint.forward(0.0, &start(), &SVector::zeros(), &mut Solver::default()).unwrap();
     check::<N>("midpoint", 1.0, &step.end, second::<N>());
 }
@@ -119,7 +119,7 @@ fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
 fn derived_jets_of_many_coordinates() {
     const N: usize = 11;
     let chain = Chain::<N>::default();
-    let midpoint = Midpoint::new(chain, 0.3).unwrap();
+    let midpoint = Rule::MIDPOINT.of(chain, 0.3).unwrap();
     let x = DiscretePoint {
         q0: SVector::<f64, N>::from_fn(|i, _| (1.7 * i as f64).sin()),
         q1: SVector::from_fn(|i, _| (1.7 * i as f64 + 0.2).sin()),

@@ -6,7 +6,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, SplittingScheme, Stepper,
-    rules::{Composition, Flow, Midpoint, Trapezoidal},
+    rules::{Composition, Flow, Rule},
     splitting::{ActionSplitting, Splitting, Strang},
 };
 
@@ -35,7 +35,7 @@ fn no_run_passes_a_pole() -> Outcome {
     let (pole, start) = (One::from(Pole), PhasePoint::new([0.0], [0.3], 1.0));
     for steps in [4, 7, 20, 33, 100, 1000] {
         let h = 2.0 / steps as f64;
-        let (midpoint, trapezoidal) = (Midpoint::new(&pole, h)?, Trapezoidal::new(&pole, h)?);
+        let (midpoint, trapezoidal) = (Rule::MIDPOINT.of(&pole, h)?, Rule::TRAPEZOIDAL.of(&pole, h)?);
         // A start whose first step fails is refused.
         assert!(Flow::new(&midpoint, 0.0, start).map_or(true, |flow| is_reported(flow, steps)), "midpoint, {steps}");
         assert!(
@@ -43,7 +43,7 @@ fn no_run_passes_a_pole() -> Outcome {
             "trapezoidal, {steps}"
         );
         let scheme = &SplittingScheme::YOSHIDA_4;
-        let composition = Composition::new(|h| Trapezoidal::new(&pole, h), scheme, h, 0.0, start);
+        let composition = Composition::new(|h| Rule::TRAPEZOIDAL.of(&pole, h), scheme, h, 0.0, start);
         assert!(composition.map_or(true, |motion| is_reported(motion, steps)), "composition, {steps}");
         assert!(is_reported(ActionSplitting::new(&pole, scheme, h, 0.0, start)?, steps), "splitting, {steps}");
     }
@@ -70,7 +70,7 @@ fn no_run_passes_a_centre_of_force() -> Outcome {
                         missed.push((scheme.name(), gamma, aside, h));
                     }
                 }
-                let (midpoint, strang) = (Midpoint::new(&kepler, h)?, Strang::new(&kepler, h, 0.0, &start)?);
+                let (midpoint, strang) = (Rule::MIDPOINT.of(&kepler, h)?, Strang::new(&kepler, h, 0.0, &start)?);
                 all += 2;
                 if !is_reported(Flow::new(&midpoint, 0.0, start)?, steps) {
                     missed.push(("midpoint", gamma, aside, h));
@@ -137,12 +137,12 @@ fn assert_rules_resolve<L: Lagrangian<N>, const N: usize>(
     start: PhasePoint<N>,
     steps: usize,
 ) -> Outcome {
-    let (midpoint, trapezoidal) = (Midpoint::new(l, h)?, Trapezoidal::new(l, h)?);
+    let (midpoint, trapezoidal) = (Rule::MIDPOINT.of(l, h)?, Rule::TRAPEZOIDAL.of(l, h)?);
     assert_not_flagged("midpoint", Flow::new(&midpoint, t0, start)?, steps);
     assert_not_flagged("trapezoidal", Flow::new(&trapezoidal, t0, start)?, steps);
     for scheme in [SplittingScheme::YOSHIDA_4, SplittingScheme::SUZUKI_UMENO_8] {
         let stages = scheme.stages();
-        let rule = |h| Midpoint::new(l, h);
+        let rule = |h| Rule::MIDPOINT.of(l, h);
         let motion = Composition::new(rule, &scheme, h * stages as f64, t0, start)?;
         assert_not_flagged(scheme.name(), motion, steps / stages);
     }
@@ -180,7 +180,7 @@ fn what_is_resolved_is_not_flagged() -> Outcome {
         let motion = Splitting::new(&pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.with_resolution_check();
         assert_not_flagged(scheme.name(), motion, 10_000 / scheme.stages());
     }
-    let midpoint = Midpoint::new(&pulse, 0.01)?;
+    let midpoint = Rule::MIDPOINT.of(&pulse, 0.01)?;
     assert_not_flagged("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
     // Fast and slow in the unit of time.
     for scale in [1e-6, 1e6] {
@@ -256,24 +256,24 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
         matches!(result, Err(InputError::Geometry(GeometryError::Singular { .. })))
     }
     let (linear, start) = (One::from(Linear), PhasePoint::new([1.0], [1.0], 0.0));
-    let (midpoint, trapezoidal) = (Midpoint::new(&linear, 0.1)?, Trapezoidal::new(&linear, 0.1)?);
+    let (midpoint, trapezoidal) = (Rule::MIDPOINT.of(&linear, 0.1)?, Rule::TRAPEZOIDAL.of(&linear, 0.1)?);
     assert!(singular(Flow::new(&midpoint, 0.0, start)) && singular(Flow::new(&trapezoidal, 0.0, start)));
     let points = contact_geom::DiscretePoint::new([1.0], [1.1], 0.0);
     assert!(Flow::from_points(&midpoint, 0.0, points).is_err());
-    let rule = |h| Midpoint::new(&linear, h);
+    let rule = |h| Rule::MIDPOINT.of(&linear, h);
     assert!(singular(Composition::new(rule, &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start)));
 
     for condition in [1.0, 1e4, 1e8, 1e10, 1e12, 1e14] {
         let system = Two::from(Stretched(condition));
         let v = SVector::from([0.7, -0.2]);
         let start = legendre(&system, 0.0, &contact_geom::VelocityPoint { q: SVector::from([0.3, 0.4]), v, z: 0.1 });
-        let ld = Midpoint::new(&system, 0.1)?;
+        let ld = Rule::MIDPOINT.of(&system, 0.1)?;
         let mut flow = Flow::new(&ld, 0.0, start)?;
         assert_eq!(Stepper::advance(&mut flow, 10), Ok(()), "{condition:e}");
         // The sum falls like a particle, whatever the difference: its momentum has the condition one.
         let reference = Two::from(Stretched(1.0));
         let start = legendre(&reference, 0.0, &contact_geom::VelocityPoint { q: SVector::from([0.3, 0.4]), v, z: 0.1 });
-        let ld = Midpoint::new(&reference, 0.1)?;
+        let ld = Rule::MIDPOINT.of(&reference, 0.1)?;
         let mut expected = Flow::new(&ld, 0.0, start)?;
         assert_eq!(Stepper::advance(&mut expected, 10), Ok(()));
         let sum = |flow: &Flow<_, 2>| flow.state().q.sum();
@@ -283,11 +283,11 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
     }
     // Beyond 1/eps it is singular, whatever its pivots.
     let stretched = Two::from(Stretched(1e17));
-    let ld = Midpoint::new(&stretched, 0.1)?;
+    let ld = Rule::MIDPOINT.of(&stretched, 0.1)?;
     assert!(singular(Flow::new(&ld, 0.0, PhasePoint::new([0.3, 0.4], [0.5, 0.5], 0.1))));
 
     let units = Two::from(Units);
-    let ld = Midpoint::new(&units, 0.1)?;
+    let ld = Rule::MIDPOINT.of(&units, 0.1)?;
     assert_eq!(DiscreteLagrangian::<2>::step_size(&ld), 0.1);
     assert!(Flow::new(&ld, 0.0, PhasePoint::new([0.0, 0.0], [1e10, 1e-10], 0.0)).is_ok());
     Ok(())
@@ -309,12 +309,15 @@ fn what_is_not_finite_is_refused() -> Outcome {
             ("z", 0.0, PhasePoint::new([1.0], [1.0], bad)),
         ];
         for (name, t0, start) in cases {
-            let ld = Midpoint::new(&pendulum, 0.1)?;
+            let ld = Rule::MIDPOINT.of(&pendulum, 0.1)?;
             assert!(named(Flow::new(&ld, t0, start), name), "{name}");
             assert!(named(Splitting::new(&pendulum, scheme, 0.1, t0, start), name), "{name}");
             assert!(named(Strang::new(&pendulum, 0.1, t0, &start), name), "{name}");
             assert!(named(ActionSplitting::new(&square, scheme, 0.1, t0, start), name), "{name}");
-            assert!(named(Composition::new(|h| Midpoint::new(&pendulum, h), scheme, 0.1, t0, start), name), "{name}");
+            assert!(
+                named(Composition::new(|h| Rule::MIDPOINT.of(&pendulum, h), scheme, 0.1, t0, start), name),
+                "{name}"
+            );
             for method in discrete_herglotz::rules::Method::ALL {
                 assert!(named(method.discretise(&pendulum, 0.1, t0, &start), name), "{method} {name}");
             }

@@ -12,7 +12,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,
-    rules::{Method, Quadrature, Rule, RuleVisitor},
+    rules::{Method, Rule},
 };
 
 /// A name is parsed back to its method, so that no two names are equal; the error for an unknown name lists all
@@ -59,35 +59,26 @@ fn rules_take_every_lagrangian() {
 /// Each entry of the table is the rule of its name, to the bit.
 #[test]
 fn rules_by_name() {
-    #[derive(Default)]
-    struct Same(Vec<Method>);
-    impl RuleVisitor for Same {
-        fn visit<R: Rule>(&mut self, method: Method) {
-            let (system, x) = (OneCoordinate::from(CoupledInZ::default()), DiscretePoint::new([0.3], [0.4], 0.7));
-            let by_name = discretise(method, &system, 0.1, 0.0, &VelocityPoint::new([0.3], [0.4], 0.7));
-            let by_type = Quadrature::<_, R>::new(&system, 0.1);
-            let (by_name, by_type) = (by_name.unwrap(), by_type.unwrap());
-            assert_eq!(by_name.step_size(), by_type.step_size());
-            assert_eq!(by_name.value::<f64>(0.0, &x), by_type.value(0.0, &x));
-            assert_eq!(by_name.jet(0.0, &x), by_type.jet(0.0, &x));
-            assert_eq!(by_name.second_jet(0.0, &x), by_type.second_jet(0.0, &x));
-            let (from, guess, mut solver) =
-                (PhasePoint::new([0.3], [0.8], 0.7), SVector::from([0.9]), Default::default());
-            assert_eq!(
-                by_name.forward(0.0, &from, &guess, &mut solver),
-                by_type.forward(0.0, &from, &guess, &mut solver)
-            );
-            assert_eq!(
-                by_name.backward(0.0, &from, &guess, &mut solver),
-                by_type.backward(0.0, &from, &guess, &mut solver)
-            );
-            assert_eq!((method.name(), method.order()), (R::NAME, R::ORDER));
-            self.0.push(method);
-        }
+    let (system, x) = (OneCoordinate::from(CoupledInZ::default()), DiscretePoint::new([0.3], [0.4], 0.7));
+    let rules: Vec<Rule> = Method::RULES.iter().filter_map(|method| method.rule()).collect();
+    assert_eq!(rules, Rule::ALL);
+    for method in Method::RULES {
+        let rule = method.rule().unwrap();
+        let by_name = discretise(*method, &system, 0.1, 0.0, &VelocityPoint::new([0.3], [0.4], 0.7)).unwrap();
+        let by_rule = rule.of(&system, 0.1).unwrap();
+        assert_eq!(by_name.step_size(), by_rule.step_size());
+        assert_eq!(by_name.value::<f64>(0.0, &x), by_rule.value(0.0, &x));
+        assert_eq!(by_name.jet(0.0, &x), by_rule.jet(0.0, &x));
+        assert_eq!(by_name.second_jet(0.0, &x), by_rule.second_jet(0.0, &x));
+        let (from, guess, mut solver) = (PhasePoint::new([0.3], [0.8], 0.7), SVector::from([0.9]), Default::default());
+        assert_eq!(by_name.forward(0.0, &from, &guess, &mut solver), by_rule.forward(0.0, &from, &guess, &mut solver));
+        assert_eq!(
+            by_name.backward(0.0, &from, &guess, &mut solver),
+            by_rule.backward(0.0, &from, &guess, &mut solver)
+        );
+        assert_eq!((method.name(), method.order()), (rule.name, rule.order));
+        assert_eq!(rule.name.parse(), Ok(*method));
     }
-    let mut same = Same::default();
-    Method::visit_rules(&mut same);
-    assert_eq!(same.0, Method::RULES);
 }
 
 /// No method accepts a step that is 0 or not finite; a negative step runs backward.

@@ -11,7 +11,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, Problem, Rows, Status, StepError, Stepper, Steps, Until,
-    rules::{Flow, Method, Midpoint},
+    rules::{Flow, Method, Rule},
     solve::Solver,
     theory::legendre_minus,
 };
@@ -79,7 +79,7 @@ fn forward_and_backward() {
 fn small_steps_keep_their_digits() {
     for exponent in 1..=5 {
         let steps = 10usize.pow(exponent);
-        let ld = Midpoint::new(OneCoordinate::from(Pendulum::default()), 1.0 / steps as f64).unwrap();
+        let ld = Rule::MIDPOINT.of(OneCoordinate::from(Pendulum::default()), 1.0 / steps as f64).unwrap();
         let start = PhasePoint::new([1.0], [0.5], 0.2);
         let mut flow = Flow::new(&ld, 0.0, start).unwrap();
         assert_eq!(flow.advance(steps), Ok(()));
@@ -97,7 +97,7 @@ fn small_steps_keep_their_digits() {
 fn a_large_chain() {
     let run = || {
         let chain = Chain::<48> { ends: contact_examples::systems::Ends::Free, ..Chain::default() };
-        let ld = Midpoint::new(&chain, 0.1).unwrap();
+        let ld = Rule::MIDPOINT.of(&chain, 0.1).unwrap();
         let start = legendre(&chain, 0.0, &chain.initial());
         let mut sigma = 1.0;
         let before = start.p.sum();

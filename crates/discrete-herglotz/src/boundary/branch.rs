@@ -77,7 +77,7 @@ struct Corrections<const N: usize> {
 ///
 /// ```
 /// use contact_geom::{Lagrangian, Scalar, nalgebra::SVector};
-/// use discrete_herglotz::{boundary::{BoundaryPath, End, branch}, rules::Midpoint};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End, branch}, rules::Rule};
 ///
 /// // Bratu's problem q'' = -lambda e^q has two paths below lambda = 3.5138, and none above.
 /// struct Bratu(f64);
@@ -87,7 +87,7 @@ struct Corrections<const N: usize> {
 ///     }
 /// }
 /// let ends = [End::Position([0.0].into()); 2];
-/// let problem = |lambda: f64| BoundaryPath::new(Midpoint::new(Bratu(lambda), 0.01)?, 100, ends);
+/// let problem = |lambda: f64| BoundaryPath::new(Rule::MIDPOINT.of(Bratu(lambda), 0.01)?, 100, ends);
 /// let paths = branch(problem, [3.0, 4.0], 0.1, 100)?;
 /// let (first, last) = (&paths[0], &paths[paths.len() - 1]);
 /// assert!(first.0 == 3.0 && last.0 == 3.0 && last.1.points[50][0] > 2.0 * first.1.points[50][0]);

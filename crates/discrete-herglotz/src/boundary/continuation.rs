@@ -18,11 +18,11 @@ use contact_geom::nalgebra::SVector;
 ///
 /// ```
 /// use contact_examples::systems::Pendulum;
-/// use discrete_herglotz::{boundary::{BoundaryPath, End, continuation}, rules::Midpoint};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End, continuation}, rules::Rule};
 ///
 /// // The same span with more and more steps.
 /// let ends = [End::Position([0.0].into()), End::Position([1.0].into())];
-/// let problem = |n: usize| BoundaryPath::new(Midpoint::new(Pendulum { gamma: -0.1 }, 2.0 / n as f64)?, n, ends);
+/// let problem = |n: usize| BoundaryPath::new(Rule::MIDPOINT.of(Pendulum { gamma: -0.1 }, 2.0 / n as f64)?, n, ends);
 /// let found = continuation([problem(10)?, problem(100)?, problem(1000)?])?;
 /// assert!(found.len() == 3 && found[2].is_found());
 /// # Ok::<(), discrete_herglotz::InputError>(())

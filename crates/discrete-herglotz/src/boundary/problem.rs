@@ -24,10 +24,10 @@ use contact_geom::nalgebra::SVector;
 ///
 /// ```
 /// use contact_examples::systems::Pendulum;
-/// use discrete_herglotz::{boundary::{BoundaryPath, End}, rules::Midpoint};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End}, rules::Rule};
 ///
 /// // From rest position to 1 in time 2, by 200 steps.
-/// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.01)?;
+/// let ld = Rule::MIDPOINT.of(Pendulum { gamma: -0.1 }, 0.01)?;
 /// let ends = [End::Position([0.0].into()), End::Position([1.0].into())];
 /// let found = BoundaryPath::new(ld, 200, ends)?.search();
 /// assert!(found.is_found());

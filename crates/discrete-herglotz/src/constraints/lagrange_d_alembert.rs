@@ -4,7 +4,7 @@ use super::drag_rattle::substeps;
 use super::nonholonomic::EQUATIONS;
 use super::{ConstrainedStart, Nonholonomic};
 use crate::integration::check_unforced;
-use crate::rules::{DiscretizationMethod, MidpointRule, QuadratureMethod};
+use crate::rules::{DiscretizationMethod, Rule};
 use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
 use contact_geom::constraints::{Distribution, nonholonomic_motion};
 use contact_geom::nalgebra::SVector;
@@ -36,7 +36,7 @@ use contact_geom::{Lagrangian, VelocityPoint};
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct LagrangeDAlembert<W, const M: usize, D = QuadratureMethod<MidpointRule>> {
+pub struct LagrangeDAlembert<W, const M: usize, D = Rule> {
     /// The constraints.
     pub distribution: W,
     /// The scheme by which steps are composed; [`SplittingScheme::STRANG`] is one step of the rule.
@@ -48,7 +48,7 @@ pub struct LagrangeDAlembert<W, const M: usize, D = QuadratureMethod<MidpointRul
 impl<W, const M: usize> LagrangeDAlembert<W, M> {
     /// Constraints with the symmetric midpoint rule, composed by a scheme.
     pub fn new(distribution: W, scheme: SplittingScheme) -> Self {
-        LagrangeDAlembert { distribution, scheme, rule: QuadratureMethod::default() }
+        LagrangeDAlembert { distribution, scheme, rule: Rule::MIDPOINT }
     }
 }
 

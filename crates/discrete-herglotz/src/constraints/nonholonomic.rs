@@ -38,10 +38,10 @@ use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoi
 /// use contact_examples::systems::constrained::KnifeEdge;
 /// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::constraints::{ConstrainedStart, Nonholonomic};
-/// use discrete_herglotz::{SplittingScheme, Stepper, rules::Midpoint};
+/// use discrete_herglotz::{SplittingScheme, Stepper, rules::Rule};
 /// let blade = KnifeEdge { slope: 1.0, gamma: -0.1 };
 /// let start = ConstrainedStart::new(VelocityPoint::new([0.0; 3], [0.0, 0.0, 1.0], 0.0));
-/// let rule = |h| Midpoint::new(blade, h);
+/// let rule = |h| Rule::MIDPOINT.of(blade, h);
 /// let mut motion = Nonholonomic::new(blade, blade, rule, &SplittingScheme::SUZUKI_4, 0.1, &start)?;
 /// motion.advance(100)?;
 /// assert!((motion.state().p[2] - (-1f64).exp()).abs() < 1e-3); // horizontal: p = sigma p

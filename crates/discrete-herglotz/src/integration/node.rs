@@ -11,3 +11,11 @@ pub struct Node {
     /// The fraction `b` at which the action is taken; a rule with 0 at all nodes is explicit in z.
     pub action: f64,
 }
+
+impl Node {
+    /// The node of the adjoint rule: its reflection in time.
+    #[inline(always)]
+    pub fn reflected(&self) -> Node {
+        Node { weight: self.weight, place: 1.0 - self.place, action: 1.0 - self.action }
+    }
+}

@@ -1,10 +1,6 @@
 //! Discrete paths on `Q x Q x R^2`, where the discrete Lagrangian depends on both actions of a step.
 
-use crate::{
-    DiscreteLagrangian, StepError,
-    rules::{Quadrature, Rule},
-    theory::DiscretePath,
-};
+use crate::{DiscreteLagrangian, StepError, rules::Quadrature, theory::DiscretePath};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian};
 
@@ -14,9 +10,9 @@ impl<const N: usize> DiscretePath<N> {
     ///
     /// # Errors
     /// Those of the discrete Lagrangian.
-    pub fn extended_residuals<L: Lagrangian<N>, R: Rule>(
+    pub fn extended_residuals<L: Lagrangian<N>>(
         &self,
-        ld: &Quadrature<L, R>,
+        ld: &Quadrature<L>,
         t0: f64,
         z0: f64,
     ) -> Result<Vec<SVector<f64, N>>, StepError> {

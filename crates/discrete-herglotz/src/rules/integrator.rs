@@ -11,7 +11,6 @@ use crate::{
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint};
 use std::borrow::Cow;
-use std::marker::PhantomData;
 
 /// A discretisation method: it constructs the discrete Lagrangian of a problem for a time step. [`CustomMethod`] makes
 /// one from a closure.
@@ -98,33 +97,22 @@ macro_rules! integrates {
 }
 
 integrates!(<> Method);
-integrates!(<R: Rule> QuadratureMethod<R>);
+integrates!(<> Rule);
 integrates!(<F: Sized> CustomMethod<F>);
 
-/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that uses it compiles
-/// only this rule.
-#[derive(Clone, Copy, Debug)]
-pub struct QuadratureMethod<R>(PhantomData<R>);
-
-impl<R> Default for QuadratureMethod<R> {
-    fn default() -> Self {
-        QuadratureMethod(PhantomData)
-    }
-}
-
-impl<'a, L: Lagrangian<N> + 'a, R: Rule, const N: usize> DiscretizationMethod<'a, L, N> for QuadratureMethod<R> {
-    type DiscreteLagrangian = Quadrature<&'a L, R>;
+impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> for Rule {
+    type DiscreteLagrangian = Quadrature<&'a L>;
 
     fn info(&self) -> MethodInfo {
-        MethodInfo { symmetric: R::is_symmetric(), ..MethodInfo::of_discrete::<N>(R::NAME, R::ORDER) }
+        MethodInfo { symmetric: self.is_symmetric(), ..MethodInfo::of_discrete::<N>(self.name, self.order) }
     }
 
     fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError> {
-        Quadrature::new(problem.lagrangian, h)
+        self.of(problem.lagrangian, h)
     }
 
     fn step_formula(&self) -> Option<StepFormula> {
-        Some(StepFormula::Rule(R::NODES))
+        Some(StepFormula::Rule(self.nodes))
     }
 }
 
@@ -149,7 +137,7 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
     }
 
     fn step_formula(&self) -> Option<StepFormula> {
-        Some(self.nodes().map_or(StepFormula::Splitting(SplittingScheme::STRANG), StepFormula::Rule))
+        Some(self.rule().map_or(StepFormula::Splitting(SplittingScheme::STRANG), |rule| StepFormula::Rule(rule.nodes)))
     }
 }
 
@@ -159,9 +147,9 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
 /// ```
 /// use contact_examples::systems::Pendulum;
 /// use contact_geom::VelocityPoint;
-/// use discrete_herglotz::{CustomMethod, Problem, Steps, Until, rules::Midpoint};
+/// use discrete_herglotz::{CustomMethod, Problem, Steps, Until, rules::Rule};
 /// let pendulum = Pendulum { gamma: -0.1 };
-/// let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));
+/// let mine = CustomMethod::new("mine", 2, |h| Rule::MIDPOINT.of(&pendulum, h));
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
 /// let outcome = problem.by(mine).steps(Steps::Size(0.1)).run(Until::Time(10.0))?;
 /// println!("q = {}", outcome.q[0]);

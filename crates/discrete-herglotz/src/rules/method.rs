@@ -1,9 +1,8 @@
 //! The table of methods: their properties, and the discrete Lagrangian of a method chosen at run time.
 
-use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use crate::{
     DiscreteLagrangian, DiscreteStep, InputError, StepError,
-    rules::{LeftMidpoint, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal},
+    rules::{Quadrature, Rule},
     solve::Solver,
     splitting::Strang,
 };
@@ -29,50 +28,20 @@ use thiserror::Error;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
-/// Where the method is known at compile time, its own type ([`Midpoint`](crate::rules::Midpoint) and so on) avoids the
-/// dispatch in every step.
+/// Where the method is known to be a quadrature rule, [`Rule::of`] avoids the dispatch in every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Method {
-    /// The rectangle rule, [`RectangleRule`].
+    /// The rectangle rule, [`Rule::RECTANGLE`].
     Rectangle,
-    /// The midpoint rule of the paper, [`LeftMidpointRule`].
+    /// The midpoint rule of the paper, [`Rule::LEFT_MIDPOINT`].
     LeftMidpoint,
-    /// The symmetric midpoint rule, [`MidpointRule`].
+    /// The symmetric midpoint rule, [`Rule::MIDPOINT`].
     Midpoint,
-    /// The symmetric trapezoidal rule, [`TrapezoidalRule`].
+    /// The symmetric trapezoidal rule, [`Rule::TRAPEZOIDAL`].
     Trapezoidal,
     /// The Strang splitting, [`Strang`].
     Strang,
-}
-
-/// A visitor of the quadrature rules; see [`Method::visit_rules`].
-pub trait RuleVisitor {
-    /// Visits one rule, which is this method.
-    fn visit<R: Rule>(&mut self, method: Method);
-}
-
-/// The properties of a method.
-struct Known {
-    name: &'static str,
-    order: u32,
-    symmetric: bool,
-    implicit_in_z: bool,
-    exact_rate: bool,
-}
-
-impl Known {
-    /// The properties of a quadrature rule, derived from its nodes.
-    fn of_rule<R: Rule>() -> Self {
-        Known {
-            name: R::NAME,
-            order: R::ORDER,
-            symmetric: R::is_symmetric(),
-            implicit_in_z: R::NODES.iter().any(|node| node.action != 0.0),
-            // The conformal factor is a rational function of h gamma for all nodes.
-            exact_rate: false,
-        }
-    }
 }
 
 impl Method {
@@ -89,62 +58,42 @@ impl Method {
         Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
     }
 
-    /// Visits every quadrature rule.
-    pub fn visit_rules(visitor: &mut impl RuleVisitor) {
-        visitor.visit::<RectangleRule>(Method::Rectangle);
-        visitor.visit::<LeftMidpointRule>(Method::LeftMidpoint);
-        visitor.visit::<MidpointRule>(Method::Midpoint);
-        visitor.visit::<TrapezoidalRule>(Method::Trapezoidal);
-    }
-
-    fn known(self) -> Known {
+    /// The quadrature rule; `None` for the Strang splitting.
+    pub fn rule(self) -> Option<Rule> {
         match self {
-            Method::Rectangle => Known::of_rule::<RectangleRule>(),
-            Method::LeftMidpoint => Known::of_rule::<LeftMidpointRule>(),
-            Method::Midpoint => Known::of_rule::<MidpointRule>(),
-            Method::Trapezoidal => Known::of_rule::<TrapezoidalRule>(),
-            Method::Strang => {
-                Known { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
-            }
-        }
-    }
-
-    /// The nodes of a quadrature rule; `None` for the Strang splitting.
-    pub(crate) fn nodes(self) -> Option<&'static [Node]> {
-        match self {
-            Method::Rectangle => Some(RectangleRule::NODES),
-            Method::LeftMidpoint => Some(LeftMidpointRule::NODES),
-            Method::Midpoint => Some(MidpointRule::NODES),
-            Method::Trapezoidal => Some(TrapezoidalRule::NODES),
+            Method::Rectangle => Some(Rule::RECTANGLE),
+            Method::LeftMidpoint => Some(Rule::LEFT_MIDPOINT),
+            Method::Midpoint => Some(Rule::MIDPOINT),
+            Method::Trapezoidal => Some(Rule::TRAPEZOIDAL),
             Method::Strang => None,
         }
     }
 
     /// The name in tables, in lower case with underscores.
     pub fn name(self) -> &'static str {
-        self.known().name
+        self.rule().map_or("strang", |rule| rule.name)
     }
 
     /// The order of the flow.
     pub fn order(self) -> u32 {
-        self.known().order
+        self.rule().map_or(2, |rule| rule.order)
     }
 
     /// Whether the method is symmetric (equal to its adjoint): a step with `-h` is the inverse of the step with `h`.
     pub fn symmetric(self) -> bool {
-        self.known().symmetric
+        self.rule().is_none_or(|rule| rule.is_symmetric())
     }
 
     /// Whether, for L that depends on z, the action at the end of a step is defined implicitly; otherwise it is an
     /// explicit function of `(q0, q1, z0)`.
     pub fn implicit_in_z(self) -> bool {
-        self.known().implicit_in_z
+        self.rule().is_some_and(|rule| rule.is_implicit_in_z())
     }
 
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the exact flow. For a
     /// quadrature rule it is a rational function of `h gamma`, `1 + h gamma` for a rule that is explicit in z.
     pub fn exact_rate(self) -> bool {
-        self.known().exact_rate
+        self == Method::Strang
     }
 
     /// Checks that a Lagrangian of this structure satisfies the hypotheses of the method. The quadrature rules apply to
@@ -180,12 +129,9 @@ impl Method {
     ) -> Result<AnyDiscreteLagrangian<L, N>, InputError> {
         crate::integration::problem::check_time(t)?;
         state.check()?;
-        Ok(match self {
-            Method::Rectangle => AnyDiscreteLagrangian::Rectangle(Quadrature::new(lagrangian, h)?),
-            Method::LeftMidpoint => AnyDiscreteLagrangian::LeftMidpoint(Quadrature::new(lagrangian, h)?),
-            Method::Midpoint => AnyDiscreteLagrangian::Midpoint(Quadrature::new(lagrangian, h)?),
-            Method::Trapezoidal => AnyDiscreteLagrangian::Trapezoidal(Quadrature::new(lagrangian, h)?),
-            Method::Strang => AnyDiscreteLagrangian::Strang(Strang::new(lagrangian, h, t, state)?),
+        Ok(match self.rule() {
+            Some(rule) => AnyDiscreteLagrangian::Rule(rule.of(lagrangian, h)?),
+            None => AnyDiscreteLagrangian::Strang(Strang::new(lagrangian, h, t, state)?),
         })
     }
 }
@@ -198,14 +144,8 @@ impl Method {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum AnyDiscreteLagrangian<L, const N: usize> {
-    /// The rectangle rule.
-    Rectangle(Rectangle<L>),
-    /// The midpoint rule of the paper.
-    LeftMidpoint(LeftMidpoint<L>),
-    /// The symmetric midpoint rule.
-    Midpoint(Midpoint<L>),
-    /// The symmetric trapezoidal rule.
-    Trapezoidal(Trapezoidal<L>),
+    /// A quadrature rule.
+    Rule(Quadrature<L>),
     /// The Strang splitting.
     Strang(Strang<L, N>),
 }
@@ -214,10 +154,7 @@ pub enum AnyDiscreteLagrangian<L, const N: usize> {
 macro_rules! each {
     ($self:ident, $ld:ident => $result:expr) => {
         match $self {
-            AnyDiscreteLagrangian::Rectangle($ld) => $result,
-            AnyDiscreteLagrangian::LeftMidpoint($ld) => $result,
-            AnyDiscreteLagrangian::Midpoint($ld) => $result,
-            AnyDiscreteLagrangian::Trapezoidal($ld) => $result,
+            AnyDiscreteLagrangian::Rule($ld) => $result,
             AnyDiscreteLagrangian::Strang($ld) => $result,
         }
     };

@@ -2,6 +2,7 @@
 
 use crate::integration::Node;
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
+use crate::rules::Rule;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
 use crate::solve::newton::{Linearised, NewtonStart, max_abs, newton};
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
@@ -12,26 +13,9 @@ use contact_geom::{
     numbers::{AugmentedVector, TangentVector},
     support::gradient_rounding,
 };
-use std::marker::PhantomData;
 
 /// The round-off allowed in a residual, in units of the round-off of the terms of L: a few nodes with a few units each.
 const RESIDUAL_ROUNDINGS: f64 = 64.0;
-
-/// A quadrature rule for the action of one step.
-pub trait Rule: 'static {
-    /// The name in tables, in lower case with underscores.
-    const NAME: &'static str;
-    /// The order of the flow.
-    const ORDER: u32;
-    /// The nodes.
-    const NODES: &'static [Node];
-
-    /// Whether the rule is symmetric (equal to its adjoint): its nodes are invariant under reflection in time.
-    fn is_symmetric() -> bool {
-        let mirrored = |n: &Node| Node { weight: n.weight, place: 1.0 - n.place, action: 1.0 - n.action };
-        Self::NODES.iter().all(|node| Self::NODES.contains(&mirrored(node)))
-    }
-}
 
 /// The discrete Lagrangian of a [`Rule`]: `L_d(q0, q1, z0) = z1 - z0`, where
 /// `z1 = z0 + S(q0, q1, z0, z1)` and `S = h sum_i w_i L(node i)`.
@@ -43,10 +27,13 @@ pub trait Rule: 'static {
 /// An applied force f is evaluated at the same nodes, with places `a_i`: the discrete forces are
 /// `F- = h sum_i w_i (1 - a_i) f_i / (1 - S_z1)` and `F+ = h sum_i w_i a_i f_i / (1 - S_z1)`.
 #[derive(Clone, Copy, Debug)]
-pub struct Quadrature<L, R> {
+pub struct Quadrature<L> {
     lagrangian: L,
     h: f64,
-    rule: PhantomData<R>,
+    rule: Rule,
+    /// Whether the rule, and its adjoint, is implicit in the action at the end of the step.
+    implicit: bool,
+    adjoint_is_implicit: bool,
 }
 
 /// The partial derivatives of `S` on `Q x Q x R^2`.
@@ -64,13 +51,13 @@ pub struct ExtendedJet<const N: usize> {
     pub z1: f64,
 }
 
-impl<L, R: Rule> Quadrature<L, R> {
-    /// The rule applied to a Lagrangian with the time step `h`.
+impl<L> Quadrature<L> {
+    /// A rule applied to a Lagrangian with the time step `h`.
     ///
     /// # Errors
     /// [`InputError::Step`] unless `h` is finite and not 0 (it is negative for steps backward in time),
     /// [`InputError::Dimension`] if `N = 0`.
-    pub fn new<const N: usize>(lagrangian: L, h: f64) -> Result<Self, InputError>
+    pub fn new<const N: usize>(rule: Rule, lagrangian: L, h: f64) -> Result<Self, InputError>
     where
         L: Lagrangian<N>,
     {
@@ -80,7 +67,8 @@ impl<L, R: Rule> Quadrature<L, R> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        Ok(Quadrature { lagrangian, h, rule: PhantomData })
+        let adjoint_is_implicit = rule.nodes.iter().any(|node| node.action != 1.0);
+        Ok(Quadrature { lagrangian, h, rule, implicit: rule.is_implicit_in_z(), adjoint_is_implicit })
     }
 
     /// The Lagrangian.
@@ -88,14 +76,9 @@ impl<L, R: Rule> Quadrature<L, R> {
         &self.lagrangian
     }
 
-    /// Whether the rule, or its adjoint, is implicit in the action at the end of the step.
-    const fn implicit(adjoint: bool) -> bool {
-        let (mut i, mut implicit) = (0, false);
-        while i < R::NODES.len() {
-            implicit = implicit || R::NODES[i].action != if adjoint { 1.0 } else { 0.0 };
-            i += 1;
-        }
-        implicit
+    /// The rule.
+    pub fn rule(&self) -> &Rule {
+        &self.rule
     }
 
     /// `S` and its partial derivatives at a point of `Q x Q x R^2`; paper, section 6.
@@ -106,7 +89,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     {
         let h = self.h;
         let mut jet = ExtendedJet { value: 0.0, s1: SVector::zeros(), s2: SVector::zeros(), z0: 0.0, z1: 0.0 };
-        for node in R::NODES {
+        for node in self.rule.nodes {
             let (at, w) = (place(node, h, x, z1), h * node.weight);
             let (value, g) = self.value_and_gradient(t + node.place * h, &at);
             jet.value += w * value;
@@ -118,6 +101,11 @@ impl<L, R: Rule> Quadrature<L, R> {
             jet.z1 += w * node.action * g.z;
         }
         jet
+    }
+
+    #[inline(always)]
+    fn is_implicit<const ADJOINT: bool>(&self) -> bool {
+        if ADJOINT { self.adjoint_is_implicit } else { self.implicit }
     }
 
     /// The action `z1` at the end of the step, by Newton's method over any scalar type.
@@ -132,7 +120,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         for _ in 0..crate::solve::newton::ITERATION_LIMIT {
             let unknown = Dual { re: z1, d: SVector::<T, 1>::new(T::one()) };
             let mut defect = Dual::constant(x.z0) - unknown;
-            for node in R::NODES {
+            for node in self.rule.nodes {
                 let lifted = DiscretePoint {
                     q0: x.q0.map(Dual::constant),
                     q1: x.q1.map(Dual::constant),
@@ -148,7 +136,7 @@ impl<L, R: Rule> Quadrature<L, R> {
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            if !Self::implicit(false) {
+            if !self.implicit {
                 return Ok(z1);
             }
             if size <= f64::EPSILON * z1.pivot_size() || size >= last {
@@ -189,7 +177,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let implicit = Self::implicit(ADJOINT);
+        let implicit = self.is_implicit::<ADJOINT>();
         let mut sums = Sums {
             value: 0.0,
             residual: from.p,
@@ -197,7 +185,7 @@ impl<L, R: Rule> Quadrature<L, R> {
             right_z: SVector::zeros(),
             slope: AugmentedVector::null(),
         };
-        for node in R::NODES {
+        for node in self.rule.nodes {
             let node = directed::<ADJOINT>(node);
             let at = VelocityPoint {
                 q: from.q + u * (node.place * h),
@@ -247,6 +235,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
+        let implicit = self.is_implicit::<ADJOINT>();
         let (resolution, impulse) = ((max_abs(&from.q) / h).abs(), max_abs(&from.p) * h.abs());
         let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
         let rounding = |u: &SVector<f64, N>, z1: f64| {
@@ -256,12 +245,12 @@ impl<L, R: Rule> Quadrature<L, R> {
         let root = newton(start, solver, rounding, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
         let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
-        for node in R::NODES {
+        for node in self.rule.nodes {
             let node = directed::<ADJOINT>(node);
             let at = VelocityPoint {
                 q: from.q + u * (node.place * h),
                 v: u,
-                z: if Self::implicit(ADJOINT) { from.z * (1.0 - node.action) + root.z * node.action } else { from.z },
+                z: if implicit { from.z * (1.0 - node.action) + root.z * node.action } else { from.z },
             };
             let (l, pull, rate) = rates_at(&self.lagrangian, t + node.place * h, &at);
             value += node.weight * l;
@@ -274,7 +263,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         // `p1 (1 - S_z1) - p0 (1 + S_z0) = h sum w L_q`. This increment contains neither the round-off of u nor that of
         // `1 + S_z0`, which would have the same sign in all steps.
         let change = (force + from.p * (slope_0 + slope_1)) * h;
-        if !Self::implicit(ADJOINT) {
+        if !implicit {
             let end = PhasePoint { q, p: from.p + change, z: from.z + h * value };
             return Ok(DiscreteStep { end, velocity: u, sigma, iterations: root.iterations });
         }
@@ -287,7 +276,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     }
 }
 
-impl<L, R: Rule> Quadrature<L, R> {
+impl<L> Quadrature<L> {
     /// A forward step that is never inlined; see [`forward`](DiscreteLagrangian::forward) for the reason.
     #[inline(never)]
     fn step_apart<const N: usize>(
@@ -324,7 +313,7 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
 /// The node, or its reflection for the adjoint rule.
 #[inline(always)]
 fn directed<const ADJOINT: bool>(node: &Node) -> Node {
-    if ADJOINT { Node { place: 1.0 - node.place, action: 1.0 - node.action, ..*node } } else { *node }
+    if ADJOINT { node.reflected() } else { *node }
 }
 
 /// The point of TQ x R at which L is evaluated for a node.
@@ -337,7 +326,7 @@ fn place<T: Scalar, const N: usize>(node: &Node, h: f64, x: &DiscretePoint<N, T>
     }
 }
 
-impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadrature<L, R> {
+impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Quadrature<L> {
     const FORCED: bool = L::HINTS.forced;
 
     fn has_forces(&self) -> bool {
@@ -352,7 +341,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         let z1 = self.end_action(t, x)?;
         let [mut minus, mut plus] = [SVector::<T, N>::from_fn(|_, _| T::zero()); 2];
         let mut pivot = T::one();
-        for node in R::NODES {
+        for node in self.rule.nodes {
             let (at, time, w) = (place(node, self.h, x, z1), T::from(t + node.place * self.h), self.h * node.weight);
             let force = self.lagrangian.applied_force(time, &at);
             for i in 0..N {
@@ -391,13 +380,13 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
     }
 
     fn order(&self) -> Option<u32> {
-        Some(R::ORDER)
+        Some(self.rule.order)
     }
 
     // Inlined into `second_jet`, so that both share their subexpressions.
     #[inline(always)]
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
-        if !Self::implicit(false) {
+        if !self.implicit {
             let s = self.extended_jet(t, x, x.z0);
             let jet = DiscreteJet::new(s.value, s.s1, s.s2, s.z0);
             return if s.value.is_finite() { Ok(jet) } else { Err(StepError::NonFinite) };
@@ -424,7 +413,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
             dzz: 0.0,
         };
         let mut slope = 0.0;
-        for node in R::NODES {
+        for node in self.rule.nodes {
             let (at, time, w) = (place(node, h, x, z1), t + node.place * h, h * node.weight);
             let l = self.lagrangian.hessian(time, &at);
             // The derivatives of the position in `q0` and `q1`; those of the velocity are `-1/h` and `1/h`.
@@ -460,7 +449,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
                 jet.d2z += of_end * (l.zz * w * z);
             }
         }
-        if Self::implicit(false) {
+        if self.implicit {
             let factor = 1.0 / (1.0 - slope);
             jet.d11 *= factor;
             jet.d12 *= factor;

@@ -2,7 +2,7 @@
 
 use crate::DiscreteLagrangian;
 use crate::gauss::VirtualWork;
-use crate::rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
+use crate::rules::Rule;
 use crate::solve::Solver;
 use crate::statements::measures::pull;
 use crate::theory::{discrete_forces, discrete_momentum, hamiltonian_flow_jacobian, legendre_minus, legendre_plus};
@@ -55,13 +55,8 @@ pub fn forced_residual<const N: usize>(
     if statement != Statement::VirtualWork {
         let x = DiscretePoint { q0: x.q - x.v * (0.5 * h), q1: x.q + x.v * (0.5 * h), z0: x.z };
         let of = (t, &x, symmetries);
-        for residual in [
-            of_rule(statement, &Rectangle::new(lagrangian, h).map_err(undefined)?, of)?,
-            of_rule(statement, &LeftMidpoint::new(lagrangian, h).map_err(undefined)?, of)?,
-            of_rule(statement, &Midpoint::new(lagrangian, h).map_err(undefined)?, of)?,
-            of_rule(statement, &Trapezoidal::new(lagrangian, h).map_err(undefined)?, of)?,
-        ] {
-            worst = worst.max_or_nan(residual);
+        for rule in Rule::ALL {
+            worst = worst.max_or_nan(of_rule(statement, &rule.of(lagrangian, h).map_err(undefined)?, of)?);
         }
     }
     Ok(Some(worst))

@@ -8,7 +8,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::{Force, Forced, Scalar, Symmetry, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, LagrangeDAlembert, Nonholonomic};
-use discrete_herglotz::rules::{Method, Midpoint};
+use discrete_herglotz::rules::{Method, Rule};
 use discrete_herglotz::{
     Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Observer, Problem, ResumeState, Rows,
     SplittingScheme, Status, StepView, Steps, Stop, Until,
@@ -238,11 +238,8 @@ fn what_does_not_apply_is_refused() {
     let nystrom = SplittingScheme::ALL.into_iter().find(SplittingScheme::is_nystrom).unwrap();
     assert!(matches!(refused(start(&blade), nystrom), Some(InputError::Hypothesis { .. })));
     // Compositions of a rule that is not symmetric have order one.
-    let by = LagrangeDAlembert::<_, 1, _> {
-        distribution: &blade,
-        scheme: SplittingScheme::STRANG,
-        rule: discrete_herglotz::rules::QuadratureMethod::<discrete_herglotz::rules::RectangleRule>::default(),
-    };
+    let by =
+        LagrangeDAlembert::<_, 1, _> { distribution: &blade, scheme: SplittingScheme::STRANG, rule: Rule::RECTANGLE };
     let rectangle = Integrator::<Blade, 3>::check(&by, &blade).err();
     assert!(matches!(rectangle, Some(InputError::Hypothesis { .. })), "{rectangle:?}");
     // A force would be left out.
@@ -251,7 +248,7 @@ fn what_does_not_apply_is_refused() {
     let forced = Integrator::check(&by, &windy).err();
     assert!(matches!(forced, Some(InputError::Forced { .. })), "{forced:?}");
     let at = ConstrainedStart::new(start(&blade));
-    let rule = |h| Midpoint::new(windy, h);
+    let rule = |h| Rule::MIDPOINT.of(windy, h);
     let forced = Nonholonomic::<_, _, _, 3, 1>::new(windy, blade, rule, &SplittingScheme::STRANG, 0.1, &at).err();
     assert!(matches!(forced, Some(InputError::Forced { .. })), "{forced:?}");
     // Round-off is not met.

@@ -19,7 +19,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     DiscreteLagrangian,
-    rules::{Flow, LeftMidpoint, Midpoint},
+    rules::{Flow, Rule},
     theory::{hamiltonian_flow_jacobian, legendre_minus_inverse},
 };
 use std::process::ExitCode;
@@ -49,7 +49,7 @@ fn forms_and_reeb_fields() -> Result<(), Failure> {
     let velocity = system.initial();
     let phase = legendre(&system, t, &velocity);
     // The step of the discrete Lagrangian whose initial momentum is that of `phase`.
-    let ld = Midpoint::new::<1>(system, h)?;
+    let ld = Rule::MIDPOINT.of::<1, _>(system, h)?;
     let points: DiscretePoint<1> = legendre_minus_inverse(&ld, t, &phase, &velocity.v)?;
     let jets = |x: &DiscretePoint<1>| Ok(ld.second_jet(t, x)?);
 
@@ -134,8 +134,8 @@ fn which_maps_are_contact() -> Result<(), Failure> {
         let field = DarbouxField { hamiltonian: &hamiltonian, t: 0.0 };
         let runge_kutta = conformality(&Darboux, &Darboux, &RungeKutta { field, h }, &start.into())?;
         // Steps that solve an equation: by the Jacobian at the point.
-        let midpoint = step(&Midpoint::new::<1>(system, h)?, &start)?;
-        let left = step(&LeftMidpoint::new::<1>(system, h)?, &start)?;
+        let midpoint = step(&Rule::MIDPOINT.of::<1, _>(system, h)?, &start)?;
+        let left = step(&Rule::LEFT_MIDPOINT.of::<1, _>(system, h)?, &start)?;
         text += &format!("  {h:>6} {:>12.9}", (system.gamma * h).exp());
         for map in [(strang.sigma, strang.defect), midpoint, left, (runge_kutta.sigma, runge_kutta.defect)] {
             text += &format!("   {:>12.9} {:>9.1e}", map.0, map.1);

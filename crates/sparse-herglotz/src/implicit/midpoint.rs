@@ -12,7 +12,7 @@ use crate::system::{MassSource, SparseSystem, State};
 use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solve::ITERATION_LIMIT};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
-/// [`Midpoint`](discrete_herglotz::rules::Midpoint), for systems of any size.
+/// [`Rule::MIDPOINT`](discrete_herglotz::rules::Rule::MIDPOINT), for systems of any size.
 ///
 /// With the mean velocity u as the unknown, `q' = q0 + h u/2` and `V_q` at `(t + h/2, q')`, a step solves
 /// `M u + (h/2) V_q = (1 + gamma h/2) p0`; then `q1 = q0 + h u`, `(1 - gamma h/2) p1 = M u - (h/2) V_q`, and

@@ -8,7 +8,7 @@ use contact_examples::systems::{CoupledPlane, Kepler, QuadraticInZ, System};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Forced, Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
 use discrete_herglotz::gauss::Gauss;
-use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint};
+use discrete_herglotz::rules::{Composition, Flow, Method, Rule};
 use discrete_herglotz::splitting::{ActionStrang, Strang};
 use discrete_herglotz::theory::{discrete_forces, legendre_minus, legendre_plus};
 use discrete_herglotz::{
@@ -47,7 +47,7 @@ fn rules_and_compositions_keep_their_orders() {
         }
         let scheme = SplittingScheme::YOSHIDA_4;
         check("composition", 4, &[24, 32, 48, 64], &|h, n| {
-            let mut motion = Composition::new(|h| Midpoint::new(&forced, h), &scheme, h, t, start).unwrap();
+            let mut motion = Composition::new(|h| Rule::MIDPOINT.of(&forced, h), &scheme, h, t, start).unwrap();
             motion.advance(n).unwrap();
             motion.state()
         });

@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
     InputError,
     boundary::{BoundaryPath, CriticalPath, End, branch, continuation},
-    rules::Midpoint,
+    rules::{Quadrature, Rule},
     theory::DiscretePath,
 };
 
@@ -37,7 +37,7 @@ fn paths(report: &mut Report) {
     fn judge(
         report: &mut Report,
         what: &str,
-        problem: Result<BoundaryPath<&Midpoint<One>, 1>, InputError>,
+        problem: Result<BoundaryPath<&Quadrature<One>, 1>, InputError>,
         good: bool,
     ) {
         report.check(problem.is_ok() == good, || format!("{what}: {:?}", problem.as_ref().err()));
@@ -54,7 +54,7 @@ fn paths(report: &mut Report) {
         let other = problem.clone().avoiding(&[&found], 1.0).map(|problem| problem.search());
         report.check(other.as_ref().is_ok_and(sound), || format!("{what}: beside it {other:?}"));
     }
-    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
     let at = |q: f64| End::Position(SVector::from([q]));
     for value in EXTREME {
         let good = value.is_finite();
@@ -78,7 +78,7 @@ fn paths(report: &mut Report) {
         let known = BoundaryPath::new(&ld, 4, [at(0.3), at(0.4)]).unwrap().search();
         let avoiding = BoundaryPath::new(&ld, 4, [at(0.3), at(0.4)]).unwrap().avoiding(&[&known], value);
         report.check(avoiding.is_ok() == (good && value > 0.0), || format!("deflation by {value}"));
-        let pendulum = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
+        let pendulum = Rule::MIDPOINT.of(one(Pendulum::default()), 0.1).unwrap();
         let ends = BoundaryPath::new(&pendulum, 4, [at(0.0), at(value)]);
         let paths = ends.and_then(|problem| continuation([problem.clone(), problem]));
         report.check(paths.is_ok() == good, || format!("continuation to {value}: {paths:?}"));
@@ -88,7 +88,7 @@ fn paths(report: &mut Report) {
         report.check(refused && BoundaryPath::periodic(&ld, steps, [0.0].into()).is_err(), || format!("{steps} steps"));
     }
     // Values at the end of a path of the pendulum.
-    let pendulum = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
+    let pendulum = Rule::MIDPOINT.of(one(Pendulum::default()), 0.1).unwrap();
     let problem = |q: f64| BoundaryPath::new(&pendulum, 4, [at(0.0), at(q)]);
     for value in EXTREME {
         for range in [[value, 0.4], [0.1, value]] {

@@ -9,7 +9,7 @@ use discrete_herglotz::constraints::{
     Constrained, ConstrainedMethod, ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, LagrangeDAlembert,
     Nonholonomic, OffConstraint,
 };
-use discrete_herglotz::{InputError, Integrator, Problem, SplittingScheme, Stepper, Steps, Until, rules::Midpoint};
+use discrete_herglotz::{InputError, Integrator, Problem, SplittingScheme, Stepper, Steps, Until, rules::Rule};
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
@@ -151,7 +151,7 @@ fn steps(report: &mut Report) {
 
 fn knife_edges(report: &mut Report) {
     let motion = |system: KnifeEdge, h: f64, start: &ConstrainedStart<3>| -> Result<Vec<f64>, String> {
-        let rule = |h| Midpoint::new(system, h);
+        let rule = |h| Rule::MIDPOINT.of(system, h);
         let motion = Nonholonomic::new(system, system, rule, &SplittingScheme::STRANG, h, start);
         let mut motion = motion.map_err(|e| e.to_string())?;
         motion.advance(10).map_err(|e| e.to_string())?;

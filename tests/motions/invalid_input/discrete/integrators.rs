@@ -7,11 +7,10 @@ use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{CLAIMING, EXTREME, Report};
 use crate::lagrangians::One;
 use contact_geom::{PhasePoint, VelocityPoint};
-use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, CheckpointError, CustomMethod, DiscreteLagrangian, InputError, Integrator, MethodInfo,
     PlanEntry, Problem, ResumeState, SplittingScheme, Status, StepView, Stepper, StepperOptions, Steps, Until,
-    rules::{CompositionMethod, DiscretizationMethod, Method, Midpoint, QuadratureMethod},
+    rules::{CompositionMethod, DiscretizationMethod, Method, Rule},
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -64,9 +63,9 @@ fn discretisations(report: &mut Report) {
             report.check(if good { made == Ok(h) } else { made.is_err() }, || format!("{}: {made:?}", info.name));
         }
     }
-    one(report, &QuadratureMethod::<MidpointRule>::default());
+    one(report, &Rule::MIDPOINT);
     one(report, &Method::Trapezoidal);
-    one(report, &CustomMethod::new("mine", 2, |h| Midpoint::new(CLAIMING, h)).symmetric());
+    one(report, &CustomMethod::new("mine", 2, |h| Rule::MIDPOINT.of(CLAIMING, h)).symmetric());
 }
 
 /// A stepper starts at a finite state with a valid step, and its states are finite.
@@ -99,7 +98,7 @@ fn integrators(report: &mut Report) {
         let same = rate() == rate();
         report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
     }
-    let rule = QuadratureMethod::<MidpointRule>::default();
+    let rule = Rule::MIDPOINT;
     for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
         one(report, &rule, options);
         one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), options);
@@ -118,7 +117,7 @@ fn integrators(report: &mut Report) {
 fn orders(report: &mut Report) {
     let problem = tame();
     for order in [0, 1, 2, 1000, u32::MAX] {
-        let by = || CustomMethod::new("mine", order, |h| Midpoint::new(CLAIMING, h));
+        let by = || CustomMethod::new("mine", order, |h| Rule::MIDPOINT.of(CLAIMING, h));
         report.check(MethodInfo::of_discrete::<1>("mine", order).order == order, || "another order".into());
         let given = problem.by(by()).steps(Steps::Count(7)).run(Until::Time(0.5)).map(|o| (o.q, o.p));
         report.check(given.is_ok() == (order > 0), || format!("order {order}: {given:?}"));

@@ -13,7 +13,7 @@ use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, DiscreteStep, MomentumDecay, MomentumRow, Problem, Steps, Until,
     checks::{check_claims, check_unforced},
     gauss::Gauss,
-    rules::{Method, Midpoint, Rectangle, Trapezoidal},
+    rules::{Method, Rule},
     solve::{Solver, last_correction},
     splitting::{ActionStrang, Riccati, Strang},
     statements,
@@ -63,6 +63,7 @@ pub const TESTS: &[InputTest] = &[
     InputTest {
         entries: &[
             "Quadrature::new",
+            "Rule::of",
             "Quadrature::lagrangian",
             "Gauss::new",
             "Gauss::stages",
@@ -106,7 +107,7 @@ fn transitions(report: &mut Report) {
 }
 
 fn jets(report: &mut Report) {
-    let ld = Trapezoidal::new(EVERYTHING, 0.1).unwrap();
+    let ld = Rule::TRAPEZOIDAL.of(EVERYTHING, 0.1).unwrap();
     let group = Symmetry::Translation(SVector::from([1.0]));
     for (t, x) in places() {
         let at = DiscretePoint::from(x);
@@ -119,7 +120,7 @@ fn jets(report: &mut Report) {
             report.formula(&input, jet.map(|j| ((j.d11, j.d12, j.d22), (j.d1z, j.d2z, j.dzz))));
         }
         report.formula(&input, sigma_d(&ld, t, &at));
-        let forced = Trapezoidal::new(forced_one(EVERYTHING, AnyForce(0.3)), 0.1).unwrap();
+        let forced = Rule::TRAPEZOIDAL.of(forced_one(EVERYTHING, AnyForce(0.3)), 0.1).unwrap();
         report.formula(&input, forced.forces(t, &at).map(|[minus, plus]| (minus, plus)));
         report.formula(&input, discrete_forces(&forced, t, &at).map(|f| (f.minus, f.plus)));
         report.formula(&input, legendre_minus(&ld, t, &at));
@@ -169,8 +170,8 @@ fn steps(report: &mut Report) {
             report.check(good, || format!("the guess {guess} leads to {step:?}"));
         }
     }
-    one(report, &Midpoint::new(EVERYTHING, 0.1).unwrap());
-    one(report, &Rectangle::new(EVERYTHING, 0.1).unwrap());
+    one(report, &Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap());
+    one(report, &Rule::RECTANGLE.of(EVERYTHING, 0.1).unwrap());
     one(report, &Gauss::new(EVERYTHING, 3, 0.1).unwrap());
     one(report, &Strang::new(CLAIMING, 0.1, 0.4, &triples()[0].into()).unwrap());
 }
@@ -179,7 +180,7 @@ fn constructors(report: &mut Report) {
     let tame: PhasePoint<1> = triples()[0].into();
     for h in EXTREME.into_iter().chain(STEPS) {
         let good = h != 0.0 && h.is_finite();
-        let rule = Midpoint::new(EVERYTHING, h);
+        let rule = Rule::MIDPOINT.of(EVERYTHING, h);
         report.check(rule.is_ok() == good && rule.as_ref().map_or(true, |r| r.step_size() == h), || format!("h = {h}"));
         report.check(rule.is_err() || rule.is_ok_and(|r| r.lagrangian().structure() == Structure::default()), || {
             "another".into()
@@ -210,7 +211,7 @@ fn constructors(report: &mut Report) {
 }
 
 fn paths(report: &mut Report) {
-    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
     for points in [vec![], vec![SVector::from([0.1])]] {
         report.check(DiscretePath::<1>::new(points).is_err(), || "a path without a step".into());
     }
@@ -295,7 +296,7 @@ fn solvers(report: &mut Report) {
 }
 
 fn residuals(report: &mut Report) {
-    let ld = Midpoint::new(one(Pendulum::default()), 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(one(Pendulum::default()), 0.1).unwrap();
     for (t, x) in places() {
         for statement in Statement::ALL {
             let known = statements::STATEMENTS.contains(&statement);

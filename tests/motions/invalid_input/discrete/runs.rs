@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Start, Status, Steps, Until,
-    rules::{Method, Midpoint},
+    rules::{Method, Rule},
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -112,7 +112,7 @@ fn numbers(o: Outcome<1>) -> Ends {
 
 fn problems(report: &mut Report) {
     let state: PhasePoint<1> = triples()[0].into();
-    let rules = [0.1, -0.1].map(|h| Midpoint::new(CLAIMING, h).unwrap());
+    let rules = [0.1, -0.1].map(|h| Rule::MIDPOINT.of(CLAIMING, h).unwrap());
     for (t, x) in places() {
         let velocity = Problem::new(&CLAIMING, t, VelocityPoint::from(x));
         report.entry_point(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));

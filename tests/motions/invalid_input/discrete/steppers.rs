@@ -16,7 +16,7 @@ use discrete_herglotz::{
     Until,
     checks::{EnergyDrift, EnergySample},
     gauss::{Gauss, GaussRoute, GaussStepper, TransformedStepper, VirtualWork},
-    rules::{Composition, Flow, Midpoint},
+    rules::{Composition, Flow, Rule},
     splitting::{ActionFlow, ActionMap, ActionSplitting, DragSplitting, Riccati, Splitting},
 };
 
@@ -163,7 +163,7 @@ fn virtual_work(report: &mut Report) {
 
 fn compositions(report: &mut Report) {
     let scheme = SplittingScheme::YOSHIDA_4;
-    constructor(report, |h, t, x| Composition::new(|h| Midpoint::new(EVERYTHING, h), &scheme, h, t, x));
+    constructor(report, |h, t, x| Composition::new(|h| Rule::MIDPOINT.of(EVERYTHING, h), &scheme, h, t, x));
 }
 
 fn splittings(report: &mut Report) {
@@ -202,13 +202,14 @@ fn splittings(report: &mut Report) {
 fn steppers(report: &mut Report) {
     let start: PhasePoint<1> = triples()[0].into();
     let gauss = Gauss::new(EVERYTHING, 4, 0.1).unwrap();
-    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
     let steppers: [Box<dyn Stepper<1> + '_>; 4] = [
         Box::new(gauss.stepper(0.0, start, start.p).unwrap()),
         Box::new(Flow::new(&ld, 0.0, start).unwrap()),
         Box::new(Splitting::new(&CLAIMING, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),
         Box::new(
-            Composition::new(|h| Midpoint::new(EVERYTHING, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start).unwrap(),
+            Composition::new(|h| Rule::MIDPOINT.of(EVERYTHING, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start)
+                .unwrap(),
         ),
     ];
     let mut other = gauss.stepper(0.0, PhasePoint { p: -start.p, ..start }, -start.p).unwrap();
@@ -232,7 +233,7 @@ fn steppers(report: &mut Report) {
 }
 
 fn flows(report: &mut Report) {
-    let ld = Midpoint::new(EVERYTHING, 0.1).unwrap();
+    let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
     for (t, x) in starts() {
         drive(report, &(t, x), Flow::new(&ld, t, x));
         drive(report, &(t, x), Flow::from_points(&ld, t, DiscretePoint::from(ChartVector::from(x))));

@@ -15,7 +15,7 @@ use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
 use discrete_herglotz::gauss::Gauss;
 use discrete_herglotz::hamiltonian::{HamiltonianSplitting, Kinetic, PieceStepper, Quadratic};
-use discrete_herglotz::rules::{Composition, Flow, Method, Midpoint, Rectangle};
+use discrete_herglotz::rules::{Composition, Flow, Method, Rule};
 use discrete_herglotz::splitting::Strang;
 use discrete_herglotz::theory::DiscretePath;
 use discrete_herglotz::{
@@ -190,15 +190,15 @@ fn input_errors() {
             let (gauss, start) = (Gauss::new(Stopped, 3, 0.1).unwrap(), PhasePoint::new([0.0], [1.0], 0.0));
             gauss.transformed_stepper(0.0, start, start.p).err().unwrap()
         }, ["is 0", "positive and finite"];
-        InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
+        InputError::Dimension => Rule::MIDPOINT.of(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
         InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "is 0", "at least 1"];
         InputError::PathLength { .. } => {
             let ends = [End::Position([0.0].into()), End::Free];
             let path = DiscretePath::new(vec![[0.0].into(); 3]).unwrap();
-            BoundaryPath::new(Midpoint::new(pendulum, 0.1).unwrap(), 5, ends).unwrap().from_path(path).err().unwrap()
+            BoundaryPath::new(Rule::MIDPOINT.of(pendulum, 0.1).unwrap(), 5, ends).unwrap().from_path(path).err().unwrap()
         }, ["2 steps", "problem has 5", "5 + 1 points"];
         InputError::Geometry(_) => {
-            Flow::new(&Midpoint::new(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
+            Flow::new(&Rule::MIDPOINT.of(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
         }, ["p[0] = NaN", "finite"];
         InputError::Constraint(_) => {
             let hanging = RigidPendulum::<2> { gravity: 1.0, gamma: -0.1 };
@@ -220,7 +220,7 @@ fn input_errors() {
             problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
         }, ["switching_functions", "Hints { switching_functions: true"];
         InputError::Hypothesis { .. } => {
-            let rule = |h| Midpoint::new(pendulum, h);
+            let rule = |h| Rule::MIDPOINT.of(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
         }, ["requires a composition", "another method"];
         InputError::PieceSum { .. } => {
@@ -242,7 +242,7 @@ fn input_errors() {
         }, ["a discrete Lagrangian does not take", "`GaussCollocation`"];
         InputError::FirstStep(_) => {
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
-            Flow::new(&Rectangle::new(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()
+            Flow::new(&Rule::RECTANGLE.of(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()
         }, ["the first step fails", "not finite"];
     });
 }

@@ -13,7 +13,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::switching::{Control, Impact, Impacts};
 use contact_geom::{DiscretePoint, Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::gauss::Gauss;
-use discrete_herglotz::rules::{Method, Midpoint, Rectangle};
+use discrete_herglotz::rules::{Method, Rule};
 use discrete_herglotz::solve::Solver;
 use discrete_herglotz::{
     AnyIntegrator, DiscreteLagrangian, DividedGauss, Event, Events, InputError, Problem, Status, StepError, Stepper,
@@ -114,7 +114,7 @@ fn step_errors() {
             stepper.advance(1).unwrap_err().cause
         }, ["residual of", "iterations", "smaller step"];
         StepError::Singular { .. } => {
-            let ld = Midpoint::new(Massless, 0.1).unwrap();
+            let ld = Rule::MIDPOINT.of(Massless, 0.1).unwrap();
             forward(&|solver| ld.forward(0.0, &pendulum_at(0.5), &guess, solver).err())
         }, ["pivot", "not regular", "smaller step"];
         StepError::SigmaVanished { .. } => {
@@ -183,7 +183,7 @@ fn step_errors() {
         }, ["accumulate at t = 1", "how the motion continues"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
-            let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
+            let ld = Rule::RECTANGLE.of(Kepler::<2>::default(), 0.1).unwrap();
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
             ld.forward(0.0, &centre, &[0.0, 1.0].into(), &mut Solver::default()).unwrap_err()
         }, ["not finite", "leaves the domain"];

@@ -5,7 +5,7 @@ use contact_examples::systems::{Kepler, SphericalPendulum, System};
 use contact_geom::{DiscretePoint, Lagrangian, numbers::max_or_nan};
 use discrete_herglotz::{
     MomentumDecay, Problem, SplittingScheme, Status, Steps, Until,
-    rules::{LeftMidpoint, Method},
+    rules::{Method, Rule},
     theory::discrete_symmetry_defect,
 };
 
@@ -46,7 +46,7 @@ fn along_a_run() {
 /// A group that is no symmetry of L is no symmetry of L_d.
 #[test]
 fn without_symmetry() {
-    let ld = LeftMidpoint::new(Kepler::<2>::default(), 0.1).unwrap();
+    let ld = Rule::LEFT_MIDPOINT.of(Kepler::<2>::default(), 0.1).unwrap();
     let shift = contact_geom::Symmetry::Translation(contact_geom::nalgebra::SVector::from([1.0, 0.0]));
     let x = DiscretePoint::new([1.0, 0.0], [1.0, 0.1], 0.0);
     assert!(discrete_symmetry_defect(&ld, &shift, 0.0, &x).is_ok_and(|d| d > 0.01));

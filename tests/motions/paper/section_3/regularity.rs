@@ -4,7 +4,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, StepError,
-    rules::{Flow, Midpoint},
+    rules::{Flow, Rule},
     theory::{discrete_flow, discrete_regularity},
 };
 
@@ -39,7 +39,7 @@ fn a_singular_one_is_refused() {
             v[0] * q[0] - z * 0.1
         }
     }
-    let ld = Midpoint::new(NoInertia, 0.1);
+    let ld = Rule::MIDPOINT.of(NoInertia, 0.1);
     let ld = ld.unwrap();
     let x = DiscretePoint::new([0.3], [0.5], 0.0);
     assert!(discrete_regularity(&ld, 0.0, &x).is_ok_and(|r| r.fibre.smallest == 0.0));

@@ -11,16 +11,16 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     DiscreteLagrangian,
-    rules::{Method, Quadrature, Rule, RuleVisitor},
+    rules::Rule,
     theory::{DiscretePath, legendre_minus, legendre_plus},
 };
 
-fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
-    on_random(&format!("{} with {}", system.name(), R::NAME), 2 * N + 3, |u| {
+fn with_rule<const N: usize, S: System<N>>(rule: Rule, system: &S) {
+    on_random(&format!("{} with {}", system.name(), rule.name), 2 * N + 3, |u| {
         let (t, v) = system.sample(&u[1..]);
         let h = step_from(u[0]);
         let x = around(&v, h);
-        let ld = Quadrature::<_, R>::new(system, h).map_err(|e| e.to_string())?;
+        let ld = rule.of(system, h).map_err(|e| e.to_string())?;
 
         // Statement 41: z1 = z0 + S, and the momenta through S are those of L_d.
         let jet = ld.jet(t, &x).map_err(|e| e.to_string())?;
@@ -59,13 +59,7 @@ fn with_every_rule() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            Method::visit_rules(&mut OnSystem(system));
-        }
-    }
-    struct OnSystem<'a, S, const N: usize>(&'a S);
-    impl<S: System<N>, const N: usize> RuleVisitor for OnSystem<'_, S, N> {
-        fn visit<R: Rule>(&mut self, _method: Method) {
-            with_rule::<R, N, S>(self.0);
+            Rule::ALL.into_iter().for_each(|rule| with_rule(rule, system));
         }
     }
     visit_catalogue(&mut Visitor);

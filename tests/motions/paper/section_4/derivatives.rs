@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ChartVector, DiscretePoint, Lagrangian, Parametric, Scalar, VelocityPoint, legendre, numbers::MaxAbsOrNan,
 };
-use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
+use discrete_herglotz::{DiscreteLagrangian, rules::Rule, solve::Solver};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, error_orders, statements as exact};
 
 /// The derivatives by central differences of the value, extrapolated twice, without duals: with a step d their error is
@@ -99,7 +99,7 @@ fn a_momentum_that_depends_on_time() {
         }
         let composed = exact::composition(&Swelling, t, &x, (0.1, 0.2));
         assert!(composed.as_ref().is_ok_and(|r| *r < 1e-12), "t = {t}: {composed:?}");
-        let orders = error_orders(&Swelling, |h| Midpoint::new(&Swelling, h), t, &x, 0.25);
+        let orders = error_orders(&Swelling, |h| Rule::MIDPOINT.of(&Swelling, h), t, &x, 0.25);
         let ok = orders.as_ref().is_ok_and(|o| {
             let momenta = [&o.legendre_minus, &o.legendre_plus].iter().all(|m| m.order.is(2.0, 0.15));
             momenta && [&o.value, &o.flow].iter().all(|m| m.order.is(3.0, 0.15))

@@ -6,7 +6,7 @@ use contact_examples::systems::FreeParticle;
 use contact_geom::{DiscretePoint, Scalar, VelocityPoint, numbers::MaxOrNan};
 use discrete_herglotz::{
     DiscreteLagrangian, StepError,
-    rules::{LeftMidpoint, Rectangle},
+    rules::Rule,
     theory::{discrete_flow, legendre_minus},
 };
 use exact_lagrangian::QuadraticExact;
@@ -49,8 +49,8 @@ fn explicit_step() {
         let of = |next: Result<DiscretePoint<1>, StepError>| {
             next.map_or(f64::NAN, |n| (n.q1[0] - q2).abs().max_or_nan((n.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs()))
         };
-        let rectangle = Rectangle::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
-        let midpoint = LeftMidpoint::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
+        let rectangle = Rule::RECTANGLE.of(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
+        let midpoint = Rule::LEFT_MIDPOINT.of(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
         if rectangle.is_nan() || midpoint.is_nan() { f64::NAN } else { rectangle.max_or_nan(midpoint) }
     });
 }

@@ -6,7 +6,7 @@ use contact_examples::systems::{Duffing, OneCoordinate, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, numbers::MaxOrNan};
 use discrete_herglotz::{
     InputError,
-    rules::{Flow, LeftMidpoint},
+    rules::{Flow, Rule},
     theory::discrete_flow,
 };
 
@@ -17,7 +17,7 @@ fn any_potential<S: System<1>>(system: &S, gamma: f64, slope: impl Fn(f64) -> f6
         let (t, v) = system.sample(&u[1..]);
         let h = step_from(u[0]);
         let (q0, q1) = (v.q[0], v.q[0] + h * v.v[0]);
-        let ld = LeftMidpoint::new(system, h).map_err(|e| e.to_string())?;
+        let ld = Rule::LEFT_MIDPOINT.of(system, h).map_err(|e| e.to_string())?;
         let next = discrete_flow(&ld, t, &DiscretePoint::new([q0], [q1], v.z)).map_err(|e| e.to_string())?;
         let q2 = next.q1[0];
         let left = (q1 - q0) / h - h / 2.0 * slope((q0 + q1) / 2.0);
@@ -42,7 +42,7 @@ fn midpoint_equations() {
 #[test]
 fn sigma_vanishes_for_large_steps() {
     for (gamma, sigma) in [(-2.0, 0.0), (-3.0, -0.5)] {
-        let ld = LeftMidpoint::new(OneCoordinate::from(Pendulum { gamma }), 0.5).unwrap();
+        let ld = Rule::LEFT_MIDPOINT.of(OneCoordinate::from(Pendulum { gamma }), 0.5).unwrap();
         let by_points = Flow::from_points(&ld, 0.0, DiscretePoint::new([0.0], [1.0], 0.0)).err();
         assert_eq!(by_points, Some(InputError::Sigma { sigma }));
         let by_state = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [1.0], 0.0)).err();

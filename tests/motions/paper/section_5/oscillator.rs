@@ -4,7 +4,7 @@
 use crate::common::{on_random, within};
 use contact_examples::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{DiscretePoint, VelocityPoint, numbers::MaxOrNan};
-use discrete_herglotz::{DiscreteLagrangian, rules::LeftMidpoint, theory::discrete_flow};
+use discrete_herglotz::{DiscreteLagrangian, rules::Rule, theory::discrete_flow};
 use exact_lagrangian::QuadraticExact;
 
 /// `q2 = -((h^3 g + 4 h g + h^2 + 4) q0 + (h^3 g - 4 h g + 2 h^2 - 8) q1) / (h^2 + 4)`, and z1.
@@ -13,8 +13,9 @@ fn oscillator() {
     on_random("harmonic oscillator", 5, |u| {
         let (q0, q1, z0) = (4.0 * u[0] - 2.0, 4.0 * u[1] - 2.0, u[2] - 0.5);
         let (g, h) = (-1.0 + 1.5 * u[3], 0.05 + 0.5 * u[4]);
-        let ld =
-            LeftMidpoint::new(OneCoordinate::from(HarmonicOscillator { gamma: g }), h).map_err(|e| e.to_string())?;
+        let ld = Rule::LEFT_MIDPOINT
+            .of(OneCoordinate::from(HarmonicOscillator { gamma: g }), h)
+            .map_err(|e| e.to_string())?;
         let next = discrete_flow(&ld, 0.0, &DiscretePoint::new([q0], [q1], z0)).map_err(|e| e.to_string())?;
         let h3 = h.powi(3);
         let q2 = -((h3 * g + 4.0 * h * g + h * h + 4.0) * q0 + (h3 * g - 4.0 * h * g + 2.0 * h * h - 8.0) * q1)

@@ -1,7 +1,7 @@
 //! The observed orders of the schemes.
 
 use super::{ActionSplitting, Outcome, SCHEMES, Splitting, distance, run};
-use crate::rules::{Composition, Midpoint};
+use crate::rules::{Composition, Rule};
 use crate::test_lagrangians::{Curved, InPlane, Inertia, OnLine, Tides};
 use crate::{InputError, SplittingScheme, Stepper};
 use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
@@ -14,7 +14,7 @@ const DURATION: f64 = 4.0;
 /// midpoint rule.
 fn by_midpoint<const N: usize>(l: &impl Lagrangian<N>, start: PhasePoint<N>) -> Result<PhasePoint<N>, InputError> {
     let (steps, scheme) = (400, SplittingScheme::SOFRONIOU_SPALETTA_10);
-    Ok(run(Composition::new(|h| Midpoint::new(l, h), &scheme, DURATION / steps as f64, 0.0, start)?, steps))
+    Ok(run(Composition::new(|h| Rule::MIDPOINT.of(l, h), &scheme, DURATION / steps as f64, 0.0, start)?, steps))
 }
 
 /// Asserts that the observed order of each scheme agrees with its order to 0.15: the slope of the error over the last

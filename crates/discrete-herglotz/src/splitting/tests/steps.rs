@@ -1,7 +1,7 @@
 //! The steps of a splitting: conformal factors, round-off, and the bits of their results.
 
 use super::{ActionSplitting, Outcome, SCHEMES, Splitting, Strang, run};
-use crate::rules::{Composition, Flow, Midpoint};
+use crate::rules::{Composition, Flow, Rule};
 use crate::test_lagrangians::{Curved, Fall, Free, InPlane, Inertia, OnLine, Quartic, Tides};
 use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
 use contact_examples::systems::{Duffing, LaneEmden};
@@ -73,8 +73,10 @@ fn what_is_observed_changes_no_bit() -> Outcome {
         assert_same_bits(scheme.name(), || Ok(motion()?.compensated()))?;
     }
     let kahan_li = &SplittingScheme::KAHAN_LI_6;
-    assert_same_bits("composition", || Composition::new(|h| Midpoint::new(&curved, h), kahan_li, 0.05, 0.5, start))?;
-    let midpoint = Midpoint::new(&curved, 0.05)?;
+    assert_same_bits("composition", || {
+        Composition::new(|h| Rule::MIDPOINT.of(&curved, h), kahan_li, 0.05, 0.5, start)
+    })?;
+    let midpoint = Rule::MIDPOINT.of(&curved, 0.05)?;
     assert_same_bits("midpoint", || Flow::new(&midpoint, 0.5, start))?;
     let strang = Strang::new(&tides, 0.05, 0.5, &start)?;
     assert_same_bits("strang", || Flow::new(&strang, 0.5, start))?;

@@ -5,7 +5,7 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, n
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian,
-    rules::{Flow, LeftMidpoint, Midpoint},
+    rules::{Flow, Rule},
 };
 use exact_lagrangian::{ExactLagrangian, herglotz_flow};
 
@@ -52,8 +52,8 @@ fn distance(run: &States, curve: &States) -> f64 {
 pub fn write(out: &Directory) -> Result<String, Failure> {
     let (h, steps, _) = RUN;
     let exact = run(&ExactLagrangian::<_, 1>::new(SYSTEM, h)?)?;
-    let left = run(&LeftMidpoint::new::<1>(SYSTEM, h)?)?;
-    let middle = run(&Midpoint::new::<1>(SYSTEM, h)?)?;
+    let left = run(&Rule::LEFT_MIDPOINT.of::<1, _>(SYSTEM, h)?)?;
+    let middle = run(&Rule::MIDPOINT.of::<1, _>(SYSTEM, h)?)?;
     let curve = curve()?;
     let columns = [
         "t",

@@ -3,10 +3,7 @@
 use contact_examples::systems::Pendulum;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::DiscretePoint;
-use discrete_herglotz::{
-    DiscreteLagrangian,
-    rules::{LeftMidpoint, Midpoint},
-};
+use discrete_herglotz::{DiscreteLagrangian, rules::Rule};
 use exact_lagrangian::ExactLagrangian;
 
 /// A pendulum with strong drag, since the rules differ mainly in how they treat z.
@@ -45,8 +42,8 @@ impl Row {
 /// The section for a time step.
 fn section(h: f64) -> Result<Vec<Row>, Failure> {
     let exact = ExactLagrangian::<_, 1>::new(PENDULUM, h)?;
-    let left = LeftMidpoint::new::<1>(PENDULUM, h)?;
-    let middle = Midpoint::new::<1>(PENDULUM, h)?;
+    let left = Rule::LEFT_MIDPOINT.of::<1, _>(PENDULUM, h)?;
+    let middle = Rule::MIDPOINT.of::<1, _>(PENDULUM, h)?;
     let (q0, z0) = AT;
     let (fastest, samples) = SAMPLES;
     let row = |k: i32| -> Result<Row, Failure> {

@@ -8,7 +8,7 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     DiscreteLagrangian, MomentumRow,
-    rules::{Flow, LeftMidpoint, Midpoint},
+    rules::{Flow, Rule},
     theory::hamiltonian_flow_jacobian,
 };
 
@@ -56,8 +56,8 @@ fn factors(ld: &impl DiscreteLagrangian<1>) -> Result<Vec<Factor>, Failure> {
 /// against the true `e^(gamma t)`. For the rule with z at the left end, measured and product agree in every bit.
 pub fn conformal_factor(out: &Directory) -> Result<(), Failure> {
     let h = PENDULUM_RUN.0;
-    let left = factors(&LeftMidpoint::new::<1>(PENDULUM, h)?)?;
-    let middle = factors(&Midpoint::new::<1>(PENDULUM, h)?)?;
+    let left = factors(&Rule::LEFT_MIDPOINT.of::<1, _>(PENDULUM, h)?)?;
+    let middle = factors(&Rule::MIDPOINT.of::<1, _>(PENDULUM, h)?)?;
     let points = |rows: &[Factor], entry: fn(&Factor) -> f64| -> Vec<(f64, f64)> {
         rows.iter().map(|r| (r.t, entry(r))).collect()
     };
@@ -114,8 +114,8 @@ fn momenta(ld: &impl DiscreteLagrangian<2>) -> Result<Vec<MomentumRow>, Failure>
 /// against the true `e^(gamma t)`.
 pub fn angular_momentum(out: &Directory) -> Result<(), Failure> {
     let h = KEPLER_RUN.0;
-    let left = momenta(&LeftMidpoint::new::<2>(KEPLER, h)?)?;
-    let middle = momenta(&Midpoint::new::<2>(KEPLER, h)?)?;
+    let left = momenta(&Rule::LEFT_MIDPOINT.of::<2, _>(KEPLER, h)?)?;
+    let middle = momenta(&Rule::MIDPOINT.of::<2, _>(KEPLER, h)?)?;
     let initial = left.first().map_or(f64::NAN, |r| r.momentum);
     let exact = |t: f64| initial * (KEPLER.gamma * t).exp();
     let deviation = |r: &MomentumRow| (r.t, (r.momentum / exact(r.t) - 1.0).abs());

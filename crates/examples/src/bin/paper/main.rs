@@ -32,7 +32,7 @@ use area::Area;
 use clap::Parser;
 use contact_examples::systems::{FreeParticle, HarmonicOscillator};
 use contact_examples::{Directory, Failure, finish, number, print};
-use discrete_herglotz::rules::{LeftMidpoint, Rectangle};
+use discrete_herglotz::rules::Rule;
 use published::PublishedRow;
 use series::{GAMMA, Row, STEP};
 use std::path::PathBuf;
@@ -58,11 +58,11 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&area.report())?;
 
     let particle = FreeParticle { gamma: GAMMA };
-    let rectangle = Rectangle::new::<1>(particle, STEP)?;
+    let rectangle = Rule::RECTANGLE.of::<1, _>(particle, STEP)?;
     let free = series::rows(&particle, &rectangle, 100)?;
     let free_published = published::free_particle(free.len())?;
     let spring = HarmonicOscillator { gamma: GAMMA };
-    let oscillator = series::rows(&spring, &LeftMidpoint::new::<1>(spring, STEP)?, 50)?;
+    let oscillator = series::rows(&spring, &Rule::LEFT_MIDPOINT.of::<1, _>(spring, STEP)?, 50)?;
     let oscillator_published = published::harmonic_oscillator(&oscillator)?;
     out.table("free_particle.csv", &series::COLUMNS, free.iter().map(row))?;
     out.table("harmonic_oscillator.csv", &series::COLUMNS, oscillator.iter().map(row))?;

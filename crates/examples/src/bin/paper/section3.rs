@@ -7,7 +7,7 @@ use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legen
 use discrete_herglotz::statements::{STATEMENTS, residual};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,
-    rules::{Method, Quadrature, Rule, RuleVisitor},
+    rules::{Method, Quadrature, Rule},
     theory::{DiscretePath, derived_jet},
 };
 
@@ -30,20 +30,9 @@ pub fn check<const N: usize, S: System<N>>(system: &S, checks: &mut Checks) {
         for method in Method::applicable(&system.structure()) {
             with_method(method, system, h, checks);
         }
-        Method::visit_rules(&mut Checked { system, h, checks });
-    }
-}
-
-/// What is checked with every rule.
-struct Checked<'a, S, const N: usize> {
-    system: &'a S,
-    h: f64,
-    checks: &'a mut Checks,
-}
-
-impl<S: System<N>, const N: usize> RuleVisitor for Checked<'_, S, N> {
-    fn visit<R: Rule>(&mut self, _method: Method) {
-        with_rule::<R, N, S>(self.system, self.h, self.checks);
+        for rule in Rule::ALL {
+            with_rule(rule, system, h, checks);
+        }
     }
 }
 
@@ -75,9 +64,9 @@ fn with_method<const N: usize, S: System<N>>(method: Method, system: &S, h: f64,
 }
 
 /// Statements 16 and 41, on rules alone.
-fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S, h: f64, checks: &mut Checks) {
-    let subject = |statement| Subject::discrete(statement, system.name(), R::NAME, h);
-    let ld = match Quadrature::<_, R>::new(system, h) {
+fn with_rule<const N: usize, S: System<N>>(rule: Rule, system: &S, h: f64, checks: &mut Checks) {
+    let subject = |statement| Subject::discrete(statement, system.name(), rule.name, h);
+    let ld = match rule.of(system, h) {
         Ok(ld) => ld,
         Err(error) => return checks.record(&subject(Statement::VermeerenBravettiSeri), Err(error)),
     };
@@ -91,8 +80,8 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S, h: f64, checks: 
 ///
 /// On a path that solves neither, their residuals differ by the factor `1 - S_z1` of the later step, which does not
 /// vanish; so they vanish together. Relative to the momenta that cancel in them.
-fn equivalent_conditions<R: Rule, const N: usize, S: System<N>>(
-    ld: &Quadrature<&S, R>,
+fn equivalent_conditions<const N: usize, S: System<N>>(
+    ld: &Quadrature<&S>,
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<f64, InputError> {
@@ -123,8 +112,8 @@ fn equivalent_conditions<R: Rule, const N: usize, S: System<N>>(
 /// Statement 41, its first half: a rule on Q x Q x R^2 gives `p0 = -S_1/(1 + S_z0)`, `p1 = S_2/(1 - S_z1)` and the
 /// factor `(1 + S_z0)/(1 - S_z1)`, and these are the momenta and sigma_d of the L_d on Q x Q x R that solves it for
 /// `z1`, its derivatives taken from its value alone.
-fn momenta_from_both_spaces<R: Rule, const N: usize, S: System<N>>(
-    ld: &Quadrature<&S, R>,
+fn momenta_from_both_spaces<const N: usize, S: System<N>>(
+    ld: &Quadrature<&S>,
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<f64, GeometryError> {

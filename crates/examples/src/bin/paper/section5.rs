@@ -10,7 +10,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, VelocityPoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, InputError,
-    rules::{LeftMidpoint, Rectangle},
+    rules::Rule,
     theory::{HamiltonianFlow, derived_jet, discrete_flow, hamiltonian_flow, sigma_d},
 };
 use exact_lagrangian::QuadraticExact;
@@ -76,7 +76,8 @@ fn next_step(
 
 /// Statement 37: `q2 = (h gamma + 2) q1 - (h gamma + 1) q0`, `z1 = (q1 - q0)^2/(2h) + (h gamma + 1) z0`.
 fn free_particle_step(system: &FreeParticle, h: f64, t: f64, x: &DiscretePoint<1>) -> Result<f64, GeometryError> {
-    let ld = Rectangle::new::<1>(system, h).map_err(|_| GeometryError::Undefined { what: "the rectangle rule" })?;
+    let ld =
+        Rule::RECTANGLE.of::<1, _>(system, h).map_err(|_| GeometryError::Undefined { what: "the rectangle rule" })?;
     let (q0, q1, drag) = (x.q0[0], x.q1[0], h * system.gamma);
     let q2 = system.third_point(q0, q1, h);
     next_step(&ld, t, x, q2, (q1 - q0) * (q1 - q0) / (2.0 * h) + (drag + 1.0) * x.z0)
@@ -122,7 +123,9 @@ fn exact<E: Example>(
 /// Statement 38: `q2 = -((h^3 gamma + 4 h gamma + h^2 + 4) q0 + (h^3 gamma - 4 h gamma + 2 h^2 - 8) q1)/(h^2 + 4)` and
 /// `z1 = (q1 - q0)^2/(2h) - h (q1 + q0)^2/8 + (h gamma + 1) z0`.
 fn oscillator_step(system: &HarmonicOscillator, h: f64, t: f64, x: &DiscretePoint<1>) -> Result<f64, GeometryError> {
-    let ld = LeftMidpoint::new::<1>(system, h).map_err(|_| GeometryError::Undefined { what: "the midpoint rule" })?;
+    let ld = Rule::LEFT_MIDPOINT
+        .of::<1, _>(system, h)
+        .map_err(|_| GeometryError::Undefined { what: "the midpoint rule" })?;
     let (q0, q1, gamma) = (x.q0[0], x.q1[0], system.gamma);
     let q2 = system.third_point(q0, q1, h);
     let kinetic = (q1 - q0) * (q1 - q0) / (2.0 * h);
@@ -164,8 +167,9 @@ fn midpoint<const N: usize>(
     checks: &mut Checks,
 ) {
     let residual = |h: f64, t: f64, x: &DiscretePoint<N>| -> Result<f64, GeometryError> {
-        let ld =
-            LeftMidpoint::new::<N>(system, h).map_err(|_| GeometryError::Undefined { what: "the midpoint rule" })?;
+        let ld = Rule::LEFT_MIDPOINT
+            .of::<N, _>(system, h)
+            .map_err(|_| GeometryError::Undefined { what: "the midpoint rule" })?;
         let next = discrete_flow(&ld, t, x)?;
         let (u0, u1) = ((x.q1 - x.q0) / h, (next.q1 - next.q0) / h);
         let (before, after) = (slope(&((x.q0 + x.q1) * 0.5)), slope(&((next.q0 + next.q1) * 0.5)));

@@ -13,7 +13,7 @@ use contact_geom::{
 use discrete_herglotz::{
     DiscreteLagrangian,
     boundary::{BoundaryPath, End},
-    rules::LeftMidpoint,
+    rules::Rule,
 };
 use std::hint::black_box;
 use std::time::Instant;
@@ -41,7 +41,7 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
         let mut differences = [f64::NAN; 2];
         // The three alternate, so that other load on the machine affects all of them.
         for _ in 0..(200_000 / steps).clamp(3, 50) {
-            let ld = LeftMidpoint::new(Springs::<N>, SPAN / steps as f64)?;
+            let ld = Rule::LEFT_MIDPOINT.of(Springs::<N>, SPAN / steps as f64)?;
             let problem = BoundaryPath::new(&ld, steps, ends().map(End::Position))?;
             let start = Instant::now();
             let found = black_box(problem.search());
@@ -83,7 +83,7 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
     }
     if !report.quick {
         // The time of a whole search, with derivatives by automatic differentiation.
-        let ld = LeftMidpoint::new(Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }, SPAN / 1e5)?;
+        let ld = Rule::LEFT_MIDPOINT.of(Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }, SPAN / 1e5)?;
         let start = Instant::now();
         let found = BoundaryPath::new(&ld, 100_000, ends().map(End::Position))?.search();
         let seconds = start.elapsed().as_secs_f64();

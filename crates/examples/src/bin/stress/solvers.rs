@@ -12,7 +12,7 @@ use contact_geom::{ChartVector, PhasePoint, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, InputError, Start, Stepper, StepperOptions, Steps,
     gauss::GaussStepper,
-    rules::{Flow, Midpoint, Trapezoidal},
+    rules::{Flow, Rule},
     solve::Solver,
 };
 use std::time::{Duration, Instant};
@@ -66,7 +66,7 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
     for (name, system) in [("quartic", hard), ("relativistic", fast)] {
         let state = PhasePoint::new([0.5], [0.4], 0.1);
         for guess in [0.0, 0.3, 0.999, 1.0, -5.0, 1e3, 1e10, 1e160, f64::MAX, f64::INFINITY, f64::NAN] {
-            let (midpoint, trapezoidal) = (Midpoint::new(&system, 0.25)?, Trapezoidal::new(&system, 0.25)?);
+            let (midpoint, trapezoidal) = (Rule::MIDPOINT.of(&system, 0.25)?, Rule::TRAPEZOIDAL.of(&system, 0.25)?);
             let v = SVector::from([guess]);
             let gauss = discrete_herglotz::Problem::new(&system, 0.0, Start::Momentum(state, v))
                 .and_then(|motion| GaussStepper::new(&motion, 8, 0.25, StepperOptions::default()));
