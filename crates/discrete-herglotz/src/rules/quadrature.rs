@@ -34,6 +34,8 @@ pub struct Quadrature<L> {
     /// Whether the rule, and its adjoint, is implicit in the action at the end of the step.
     implicit: bool,
     adjoint_is_implicit: bool,
+    /// Whether it is the symmetric midpoint rule, which is its own adjoint.
+    is_midpoint: bool,
 }
 
 /// The partial derivatives of `S` on `Q x Q x R^2`.
@@ -68,7 +70,8 @@ impl<L> Quadrature<L> {
             return Err(InputError::Step { h });
         }
         let adjoint_is_implicit = rule.nodes.iter().any(|node| node.action != 1.0);
-        Ok(Quadrature { lagrangian, h, rule, implicit: rule.is_implicit_in_z(), adjoint_is_implicit })
+        let is_midpoint = rule.nodes == Rule::MIDPOINT.nodes;
+        Ok(Quadrature { lagrangian, h, rule, implicit: rule.is_implicit_in_z(), adjoint_is_implicit, is_midpoint })
     }
 
     /// The Lagrangian.
@@ -101,11 +104,6 @@ impl<L> Quadrature<L> {
             jet.z1 += w * node.action * g.z;
         }
         jet
-    }
-
-    #[inline(always)]
-    fn is_implicit<const ADJOINT: bool>(&self) -> bool {
-        if ADJOINT { self.adjoint_is_implicit } else { self.implicit }
     }
 
     /// The action `z1` at the end of the step, by Newton's method over any scalar type.
@@ -166,8 +164,9 @@ impl<L> Quadrature<L> {
     /// `r_j = (h a e_j, e_j, 0)` of the velocity and `(0, 0, b)` of the end action. Nested dual numbers carry only
     /// these directions, in blocks. An applied force f adds `sum w h (1-a) f_i` to the residual.
     #[inline(always)]
-    fn linearise<const N: usize, const ADJOINT: bool>(
+    fn linearise<const N: usize>(
         &self,
+        Form { nodes, adjoint, implicit }: Form<'_>,
         t: f64,
         h: f64,
         from: &PhasePoint<N>,
@@ -177,7 +176,6 @@ impl<L> Quadrature<L> {
     where
         L: Lagrangian<N>,
     {
-        let implicit = self.is_implicit::<ADJOINT>();
         let mut sums = Sums {
             value: 0.0,
             residual: from.p,
@@ -185,8 +183,8 @@ impl<L> Quadrature<L> {
             right_z: SVector::zeros(),
             slope: AugmentedVector::null(),
         };
-        for node in self.rule.nodes {
-            let node = directed::<ADJOINT>(node);
+        for node in nodes {
+            let node = directed(node, adjoint);
             let at = VelocityPoint {
                 q: from.q + u * (node.place * h),
                 v: *u,
@@ -224,8 +222,9 @@ impl<L> Quadrature<L> {
 
     /// One step of the rule (or of its adjoint, with `h` negative and `t` the time at its start).
     #[inline(always)]
-    fn step<const N: usize, const ADJOINT: bool>(
+    fn step<const N: usize>(
         &self,
+        form: Form<'_>,
         t: f64,
         h: f64,
         from: &PhasePoint<N>,
@@ -235,18 +234,18 @@ impl<L> Quadrature<L> {
     where
         L: Lagrangian<N>,
     {
-        let implicit = self.is_implicit::<ADJOINT>();
+        let Form { nodes, adjoint, implicit } = form;
         let (resolution, impulse) = ((max_abs(&from.q) / h).abs(), max_abs(&from.p) * h.abs());
         let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
         let rounding = |u: &SVector<f64, N>, z1: f64| {
             let x = VelocityPoint { q: from.q + u * (0.5 * h), v: *u, z: z1 };
             rounding_of_residual(&self.lagrangian, (t + 0.5 * h, h), &x, &from.p)
         };
-        let root = newton(start, solver, rounding, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
+        let root = newton(start, solver, rounding, |u, z1| Ok(self.linearise(form, t, h, from, u, z1)))?;
         let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
-        for node in self.rule.nodes {
-            let node = directed::<ADJOINT>(node);
+        for node in nodes {
+            let node = directed(node, adjoint);
             let at = VelocityPoint {
                 q: from.q + u * (node.place * h),
                 v: u,
@@ -276,11 +275,38 @@ impl<L> Quadrature<L> {
     }
 }
 
+/// The nodes of a step, whether they are reflected for the adjoint rule, and whether the step is implicit in the action.
+#[derive(Clone, Copy)]
+struct Form<'n> {
+    nodes: &'n [Node],
+    adjoint: bool,
+    implicit: bool,
+}
+
+/// The symmetric midpoint rule, whose steps are those of compositions.
+const MIDPOINT: Form<'static> = Form { nodes: Rule::MIDPOINT.nodes, adjoint: false, implicit: true };
+
 impl<L> Quadrature<L> {
-    /// A forward step that is never inlined; see [`forward`](DiscreteLagrangian::forward) for the reason.
+    /// A step of the symmetric midpoint rule over h; never inlined, see [`forward`](DiscreteLagrangian::forward).
     #[inline(never)]
-    fn step_apart<const N: usize>(
+    fn midpoint_step<const N: usize>(
         &self,
+        (t, h): (f64, f64),
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<DiscreteStep<N>, StepError>
+    where
+        L: Lagrangian<N>,
+    {
+        self.step(MIDPOINT, t, h, from, guess, solver)
+    }
+
+    /// A step of a rule with one node that is explicit in z, of weight 1; never inlined.
+    #[inline(never)]
+    fn explicit_step<const N: usize>(
+        &self,
+        node: &Node,
         t: f64,
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
@@ -289,7 +315,25 @@ impl<L> Quadrature<L> {
     where
         L: Lagrangian<N>,
     {
-        self.step::<N, false>(t, self.h, from, guess, solver)?.checked()
+        let nodes = &[Node { weight: 1.0, action: 0.0, ..*node }];
+        self.step(Form { nodes, adjoint: false, implicit: false }, t, self.h, from, guess, solver)
+    }
+
+    /// A step of any rule forward, or of its adjoint backward with `h` negative.
+    #[inline(never)]
+    fn step_of_nodes<const N: usize>(
+        &self,
+        adjoint: bool,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<DiscreteStep<N>, StepError>
+    where
+        L: Lagrangian<N>,
+    {
+        let (implicit, h) = if adjoint { (self.adjoint_is_implicit, -self.h) } else { (self.implicit, self.h) };
+        self.step(Form { nodes: self.rule.nodes, adjoint, implicit }, t, h, from, guess, solver)
     }
 }
 
@@ -312,8 +356,8 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
 
 /// The node, or its reflection for the adjoint rule.
 #[inline(always)]
-fn directed<const ADJOINT: bool>(node: &Node) -> Node {
-    if ADJOINT { node.reflected() } else { *node }
+fn directed(node: &Node, adjoint: bool) -> Node {
+    if adjoint { node.reflected() } else { *node }
 }
 
 /// The point of TQ x R at which L is evaluated for a node.
@@ -470,11 +514,19 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Quadrature<L> {
         solver: &mut Solver<N>,
     ) -> Result<DiscreteStep<N>, StepError> {
         // Inlined, a step with one unknown stays in registers (58 against 81 ns for the pendulum). With more unknowns
-        // it spills, and a separate function is faster (162 against 209 ns for the double pendulum).
-        if N == 1 {
-            self.step::<N, false>(t, self.h, from, guess, solver)?.checked()
-        } else {
-            self.step_apart(t, from, guess, solver)
+        // it spills, and a separate function is faster (162 against 209 ns for the double pendulum). The nodes, or their
+        // number and weight, are constants of these steps.
+        if self.is_midpoint && N == 1 {
+            return self.step(MIDPOINT, t, self.h, from, guess, solver)?.checked();
+        }
+        if self.is_midpoint {
+            return self.midpoint_step((t, self.h), from, guess, solver)?.checked();
+        }
+        match self.rule.nodes {
+            [node @ Node { weight: 1.0, action: 0.0, .. }] => {
+                self.explicit_step(node, t, from, guess, solver)?.checked()
+            }
+            _ => self.step_of_nodes(false, t, from, guess, solver)?.checked(),
         }
     }
 
@@ -486,7 +538,11 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Quadrature<L> {
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
     ) -> Result<DiscreteStep<N>, StepError> {
-        let back = self.step::<N, true>(t + self.h, -self.h, from, guess, solver)?;
+        let back = if self.is_midpoint {
+            self.midpoint_step((t + self.h, -self.h), from, guess, solver)
+        } else {
+            self.step_of_nodes(true, t + self.h, from, guess, solver)
+        }?;
         DiscreteStep { sigma: 1.0 / back.sigma, ..back }.checked()
     }
 }
