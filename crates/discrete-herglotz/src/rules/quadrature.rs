@@ -241,7 +241,13 @@ impl<L> Quadrature<L> {
             let x = VelocityPoint { q: from.q + u * (0.5 * h), v: *u, z: z1 };
             rounding_of_residual(&self.lagrangian, (t + 0.5 * h, h), &x, &from.p)
         };
-        let root = newton(start, solver, rounding, |u, z1| Ok(self.linearise(form, t, h, from, u, z1)))?;
+        let root = newton(
+            start,
+            solver,
+            rounding,
+            #[inline(always)]
+            |u, z1| Ok(self.linearise(form, t, h, from, u, z1)),
+        )?;
         let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
         for node in nodes {
