@@ -3,6 +3,7 @@
 mod checks;
 mod collocation_stepper;
 mod dense;
+mod dynamic;
 mod initial_mass;
 pub(crate) mod integrator;
 pub(crate) mod limits;

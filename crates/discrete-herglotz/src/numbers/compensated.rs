@@ -21,6 +21,14 @@ pub(crate) fn values<const N: usize>(x: &[CompensatedSum; N]) -> [f64; N] {
     values
 }
 
+/// Copies the values of compensated sums.
+#[inline(always)]
+pub(crate) fn copy_values(x: &[CompensatedSum], values: &mut [f64]) {
+    for (value, x) in values.iter_mut().zip(x) {
+        *value = x.value;
+    }
+}
+
 impl From<f64> for CompensatedSum {
     fn from(value: f64) -> Self {
         CompensatedSum { value, rest: 0.0 }
@@ -96,19 +104,19 @@ impl From<Quad> for Unevaluated {
 /// Whether the increments of positions, of velocities or momenta, and of the action are finite; any NaN or infinity
 /// makes their sum not finite.
 #[inline(always)]
-pub(crate) fn finite<const N: usize>(dq: &[Unevaluated; N], dy: &[Unevaluated; N], dz: Unevaluated) -> bool {
+pub(crate) fn finite(dq: &[Unevaluated], dy: &[Unevaluated], dz: Unevaluated) -> bool {
     let mut sum = dz.head;
-    for d in 0..N {
-        sum += dq[d].head + dy[d].head;
+    for (dq, dy) in dq.iter().zip(dy) {
+        sum += dq.head + dy.head;
     }
     sum.is_finite()
 }
 
 /// Adds increments to compensated sums.
 #[inline(always)]
-pub(crate) fn add<const N: usize>(x: &mut [CompensatedSum; N], changes: &[Unevaluated; N]) {
-    for d in 0..N {
-        x[d].add(changes[d]);
+pub(crate) fn add(x: &mut [CompensatedSum], changes: &[Unevaluated]) {
+    for (x, change) in x.iter_mut().zip(changes) {
+        x.add(*change);
     }
 }
 

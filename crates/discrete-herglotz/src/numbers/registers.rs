@@ -200,16 +200,10 @@ impl StageMap {
         });
     }
 
-    /// `y_d = start_d + M x_d` for N vectors, two at a time, so that the matrix is loaded half as often. The results
+    /// `y_d = start_d + M x_d` for several vectors, two at a time, so that the matrix is loaded half as often. The results
     /// are bitwise those of [`apply`](Self::apply).
     #[inline(always)]
-    pub fn apply_to_each<S: Simd, const N: usize>(
-        &self,
-        x: &[Stages; N],
-        s: usize,
-        y: &mut [Stages; N],
-        start: &[Stages; N],
-    ) {
+    pub fn apply_to_each<S: Simd>(&self, x: &[Stages], s: usize, y: &mut [Stages], start: &[Stages]) {
         for (i, (x, y)) in x.chunks(2).zip(y.chunks_mut(2)).enumerate() {
             match (x, y) {
                 ([a, b], [c, d]) => over_groups!(S, blocks::<S>(s), r, K at most 2 => {

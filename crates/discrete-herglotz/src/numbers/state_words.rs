@@ -52,12 +52,22 @@ impl<T: Saved, const M: usize> Saved for [T; M] {
 }
 
 /// The length must be the same when it is read back.
-impl<T: Saved> Saved for Vec<T> {
+impl<T: Saved> Saved for [T] {
     fn save(&self, to: &mut Vec<u64>) {
         self.iter().for_each(|x| x.save(to));
     }
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         self.iter_mut().try_for_each(|x| x.load(from))
+    }
+}
+
+/// The length must be the same when it is read back.
+impl<T: Saved> Saved for Vec<T> {
+    fn save(&self, to: &mut Vec<u64>) {
+        self.as_slice().save(to);
+    }
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.as_mut_slice().load(from)
     }
 }
 

@@ -30,13 +30,7 @@ impl Tail {
     /// compared. For at most [`FEW_STAGES`] stages the result is 0, since the last coefficient then says nothing beyond
     /// the order of the step. All values must be finite.
     #[inline(always)]
-    pub fn defect<S: Simd, const N: usize>(
-        &self,
-        values: &[Stages; N],
-        factor: Option<&Stages>,
-        positions: &[Stages; N],
-        time: f64,
-    ) -> f64 {
+    pub fn defect<S: Simd>(&self, values: &[Stages], factor: Option<&Stages>, positions: &[Stages], time: f64) -> f64 {
         if self.s <= FEW_STAGES {
             return 0.0;
         }

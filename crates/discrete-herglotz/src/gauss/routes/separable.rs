@@ -242,7 +242,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 (small, again) = (Some(weight), self.newton.is_some());
             }
             let base = &self.base;
-            self.left.head.b.apply_to_each::<S, N>(&self.rest, s, &mut self.x, base);
+            self.left.head.b.apply_to_each::<S>(&self.rest, s, &mut self.x, base);
             if aside {
                 aside = false;
                 self.begin::<S>(small);
@@ -297,7 +297,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         let predicted_well = iteration.first() <= MIN_CHECKED_CHANGE && !solved;
         let h = self.table.h;
-        self.defect = if predicted_well { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
+        self.defect = if predicted_well { 0.0 } else { self.tail.defect::<S>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
             self.age = self.age.saturating_add(1);
             if iteration.count() > SLOW_NEWTON && self.age > MIN_JACOBIAN_AGE {

@@ -25,7 +25,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
         self.defect = 0.0;
         if first > MIN_CHECKED_CHANGE {
             let rates = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
-            self.defect = self.tail.defect::<S, N>(&self.v, rates, &self.x, self.table.h);
+            self.defect = self.tail.defect::<S>(&self.v, rates, &self.x, self.table.h);
         }
         if first > MIN_CHECKED_CHANGE || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {
             let one = Lanes::<S>::splat(1.0);

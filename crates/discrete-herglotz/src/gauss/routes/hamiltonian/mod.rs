@@ -292,8 +292,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
     fn assess_resolution<S: Simd>(&mut self, first: f64) {
         self.defect = 0.0;
         if first > MIN_CHECKED_CHANGE {
-            let of_velocities = self.tail.defect::<S, N>(&self.v, None, &self.x, self.table.h);
-            let of_momenta = self.tail.defect::<S, N>(&self.p_stages, None, &self.p_stages, 1.0);
+            let of_velocities = self.tail.defect::<S>(&self.v, None, &self.x, self.table.h);
+            let of_momenta = self.tail.defect::<S>(&self.p_stages, None, &self.p_stages, 1.0);
             self.defect = max_or_nan(of_velocities, of_momenta);
         }
         if first > MIN_CHECKED_CHANGE || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {

@@ -1,0 +1,49 @@
+//! A solved step as a curve, whose defect in Herglotz' equations is sampled between the nodes.
+
+use crate::gauss::dynamic::dense::{Solved, SolvedStep};
+use crate::gauss::dynamic::system::{CollocationSystem, Typed};
+use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::registers::Stages;
+use contact_geom::Lagrangian;
+
+/// To be written.
+pub(crate) trait SampleKernel {}
+
+impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {}
+
+/// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
+/// transformation they are polynomials in tau, each multiplied by the rate dt/dtau.
+pub(crate) struct Curve {
+    pub s: usize,
+    pub t: f64,
+    pub h: f64,
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
+    pub z: f64,
+    pub v: Vec<Stages>,
+    pub force: Vec<Stages>,
+    pub rate: Stages,
+    pub l: Stages,
+    /// Whether z is part of the stage equations; if not, `l` holds L at `z = 0`.
+    pub acts: bool,
+    /// The rates of the time transformation at the start and at the end.
+    pub rates: [f64; 2],
+}
+
+impl Curve {
+    /// Sets the stages of a step that has momenta and actions.
+    pub fn of_solved(&mut self, _solved: &Solved) {
+        todo!()
+    }
+
+    /// Sets the stages from the accelerations and positions of a condensed step.
+    pub fn of_accelerations(
+        &mut self,
+        _system: &dyn CollocationSystem,
+        _step: &SolvedStep<'_>,
+        _table: &Condensed,
+        [_a, _x]: [&[Stages]; 2],
+    ) {
+        todo!()
+    }
+}
