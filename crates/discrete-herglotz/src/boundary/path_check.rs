@@ -58,7 +58,7 @@ fn first_unresolved<D: DiscreteLagrangian<N>, const N: usize>(
         velocities = [velocities[1], velocities[2], velocities[3], (q1 - q0) / h];
         let [.., last] = &velocities;
         if k == 0 {
-            floor = rounding(&q0, last, h);
+            floor = rounding(q0.as_slice(), last.as_slice(), h);
         }
         if k < 3 {
             continue;

@@ -294,7 +294,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
             }
             let defect = with_route!(&*run.route, route => route.defect());
             if defect > 1.0 && !run.is_at_rest(t + h) {
-                run.monitor.note(run.k, defect);
+                run.monitor.steps.note(run.k, defect);
             }
             if run.sequence.is_some() {
                 run.update_sequence();

@@ -11,7 +11,7 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 
-/// Monitor of the steps of a run: the first step that cannot have resolved the motion, and the latest suspect interval.
+/// Monitor of the steps of a run: the first step that cannot have resolved the motion, and when an interval is suspect.
 ///
 /// The defect of a step is the sum of two consecutive second differences of the velocity with opposite directions, in
 /// units of the largest of the velocities. An oscillation of frequency omega has such differences where its velocity
@@ -22,27 +22,19 @@ use contact_geom::{
 /// A single second difference is a weaker indication: it is `(omega h)^2` times the velocity, and a jump of the force
 /// also causes one. One that is larger than all before therefore yields a [`SuspectInterval`], which the run examines.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ResolutionMonitor<const N: usize> {
+pub(crate) struct StepMonitor {
     pub first: Option<UnresolvedStep>,
-    pub suspect: Option<SuspectInterval<N>>,
     /// The threshold for the next suspect interval: the square of a second difference, in units of the velocity.
     pub sharpest: f64,
     /// Changes of position below this are round-off.
     pub floor: f64,
 }
 
-/// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of
-/// the initial position, so that it also holds where the motion has come to rest near the origin.
-pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
-    let extent = max_or_nan(size(q), size(v) * h.abs());
-    if extent.is_finite() { POSITION_ROUND_OFF * extent } else { 0.0 }
-}
-
-impl<const N: usize> ResolutionMonitor<N> {
+impl StepMonitor {
     /// A monitor for a motion from a position and a velocity, with steps of length h.
-    pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
+    pub fn new(q: &[f64], v: &[f64], h: f64) -> Self {
         let sharpest = MIN_SUSPECT_DIFFERENCE * MIN_SUSPECT_DIFFERENCE;
-        ResolutionMonitor { first: None, suspect: None, sharpest, floor: rounding(q, v, h) }
+        StepMonitor { first: None, sharpest, floor: rounding(q, v, h) }
     }
 
     /// Records the first step with a defect above one.
@@ -56,17 +48,43 @@ impl<const N: usize> ResolutionMonitor<N> {
         }
     }
 
-    /// Records a suspect interval with this sharpness; the next one needs a larger second difference.
+    /// Raises the threshold after a suspect interval with this sharpness: the next one needs a larger second difference.
+    pub fn suspect(&mut self, sharpness: f64) {
+        self.sharpest = MIN_SUSPECT_GROWTH * MIN_SUSPECT_GROWTH * sharpness;
+    }
+}
+
+/// The monitor of the steps of a run, with the latest suspect interval.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ResolutionMonitor<const N: usize> {
+    pub steps: StepMonitor,
+    pub suspect: Option<SuspectInterval<N>>,
+}
+
+/// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of
+/// the initial position, so that it also holds where the motion has come to rest near the origin.
+pub(crate) fn rounding(q: &[f64], v: &[f64], h: f64) -> f64 {
+    let extent = max_or_nan(size(q), size(v) * h.abs());
+    if extent.is_finite() { POSITION_ROUND_OFF * extent } else { 0.0 }
+}
+
+impl<const N: usize> ResolutionMonitor<N> {
+    /// A monitor for a motion from a position and a velocity, with steps of length h.
+    pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
+        ResolutionMonitor { steps: StepMonitor::new(q.as_slice(), v.as_slice(), h), suspect: None }
+    }
+
+    /// Records a suspect interval with this sharpness.
     #[cold]
     #[inline(never)]
     pub fn suspect(&mut self, sharpness: f64, suspect: SuspectInterval<N>) {
-        self.sharpest = MIN_SUSPECT_GROWTH * MIN_SUSPECT_GROWTH * sharpness;
+        self.steps.suspect(sharpness);
         self.suspect = Some(suspect);
     }
 }
 
 /// The largest absolute component of a vector.
-pub(crate) fn size<const N: usize>(x: &SVector<f64, N>) -> f64 {
+pub(crate) fn size(x: &[f64]) -> f64 {
     max_abs_or_nan(x.iter().copied())
 }
 
@@ -80,20 +98,32 @@ pub(crate) fn sharper<const N: usize>(
     floor: f64,
     sharpest: f64,
 ) -> Option<f64> {
-    if turn.dot(turn) > sharpest * velocity.dot(velocity) { sharpness([turn, velocity, q], h, floor) } else { None }
+    let (of_turn, of_velocity) = (turn.dot(turn), velocity.dot(velocity));
+    if of_turn > sharpest * of_velocity && moves([turn.as_slice(), q.as_slice()], h, floor) {
+        Some(of_turn / of_velocity)
+    } else {
+        None
+    }
 }
 
+/// [`sharper`] for vectors of any length.
+pub(crate) fn sharper_of([turn, velocity, q]: [&[f64]; 3], h: f64, floor: f64, sharpest: f64) -> Option<f64> {
+    let square = |x: &[f64]| x.iter().fold(0.0, |sum, x| sum + x * x);
+    let (of_turn, of_velocity) = (square(turn), square(velocity));
+    (of_turn > sharpest * of_velocity && moves([turn, q], h, floor)).then(|| of_turn / of_velocity)
+}
+
+/// Whether a change of the velocity within a time h changes the position q by more than round-off.
 #[cold]
 #[inline(never)]
-fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64, floor: f64) -> Option<f64> {
-    let moves = size(turn) * h.abs() > max_or_nan(POSITION_ROUND_OFF * size(q), floor);
-    moves.then(|| turn.dot(turn) / velocity.dot(velocity))
+fn moves([turn, q]: [&[f64]; 2], h: f64, floor: f64) -> bool {
+    size(turn) * h.abs() > max_or_nan(POSITION_ROUND_OFF * size(q), floor)
 }
 
 /// A bound for the round-off of the value of L, from the round-off of its terms and of its forces at a position. The
 /// forces are included because near an equilibrium at which terms cancel, the potential is small of second order in the
 /// displacement.
-pub(crate) fn value_rounding<const N: usize>(of_terms: f64, of_force: &SVector<f64, N>, q: &SVector<f64, N>) -> f64 {
+pub(crate) fn value_rounding(of_terms: f64, of_force: &[f64], q: &[f64]) -> f64 {
     of_terms + size(of_force) * size(q)
 }
 
@@ -113,17 +143,19 @@ pub(crate) fn defect<const N: usize>(
 ) -> Option<f64> {
     let before = second * -2.0 + first + third;
     let now = third * -2.0 + second + fourth;
-    if now.dot(&before) < 0.0 { turning([&before, &now], [second, third, fourth], q, h, floor) } else { None }
+    let velocities = [second.as_slice(), third.as_slice(), fourth.as_slice()];
+    let changes = [before.as_slice(), now.as_slice()];
+    if now.dot(&before) < 0.0 { turning(changes, velocities, q.as_slice(), h, floor) } else { None }
 }
 
 /// The defect of two second differences of opposite directions among three velocities; `None` where it is at most one.
 ///
 /// Differences that change q by less than [`MIN_RELATIVE_DISPLACEMENT`] of its size are ignored.
 #[inline(never)]
-pub(crate) fn turning<const N: usize>(
-    changes: [&SVector<f64, N>; 2],
-    velocities: [&SVector<f64, N>; 3],
-    q: &SVector<f64, N>,
+pub(crate) fn turning(
+    changes: [&[f64]; 2],
+    velocities: [&[f64]; 3],
+    q: &[f64],
     h: f64,
     floor: f64,
 ) -> Option<f64> {
@@ -146,15 +178,15 @@ saved!([] UnresolvedStep { step, defect });
 
 impl<const N: usize> Saved for ResolutionMonitor<N> {
     fn save(&self, to: &mut Vec<u64>) {
-        save_option(self.first.as_ref(), to);
+        save_option(self.steps.first.as_ref(), to);
         save_option(self.suspect.as_ref(), to);
-        [self.sharpest, self.floor].save(to);
+        [self.steps.sharpest, self.steps.floor].save(to);
     }
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
-        self.first = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
+        self.steps.first = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         let nowhere = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
         self.suspect = load_option(from, || SuspectInterval { step: 0, steps: 0, t: 0.0, from: nowhere, to: nowhere })?;
-        self.sharpest.load(from)?;
-        self.floor.load(from)
+        self.steps.sharpest.load(from)?;
+        self.steps.floor.load(from)
     }
 }

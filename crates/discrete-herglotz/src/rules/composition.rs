@@ -154,7 +154,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// Takes one step; the state changes only if every substep succeeds.
     fn step(&mut self) -> Result<(), StepError> {
         let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
-        let mut sharpest = self.monitor.sharpest;
+        let mut sharpest = self.monitor.steps.sharpest;
         for i in 0..self.substeps.len() {
             let substep = self.substeps[i];
             let next = self.substep(&substep, &state, &velocity)?;
@@ -164,7 +164,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             self.evaluations += u64::from(next.iterations) + 1;
             (state, velocity) = (next.end, next.velocity);
         }
-        if sharpest > self.monitor.sharpest
+        if sharpest > self.monitor.steps.sharpest
             && let Some(step) = self.taken.checked_sub(1)
         {
             // The cause of a change of the first mean velocity may lie in the previous step.
@@ -196,20 +196,22 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         let last = std::mem::replace(&mut self.change, change);
         if self.taken > 0 {
             let found = if change.dot(&last) < 0.0 {
-                turning([&last, &change], [before, now, now], &next.end.q, substep.length, self.monitor.floor)
+                let velocities = [before.as_slice(), now.as_slice(), now.as_slice()];
+                let changes = [last.as_slice(), change.as_slice()];
+                turning(changes, velocities, next.end.q.as_slice(), substep.length, self.monitor.steps.floor)
             } else {
                 None
             };
             if let Some(defect) = found {
-                self.monitor.note(self.taken, defect);
+                self.monitor.steps.note(self.taken, defect);
             }
-            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.monitor.floor, *sharpest)
+            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.monitor.steps.floor, *sharpest)
             {
                 *sharpest = sharpness;
             }
         }
         if let Some(defect) = self.rules[substep.rule].defect([now; 4], &next.end, next.sigma) {
-            self.monitor.note(self.taken, defect);
+            self.monitor.steps.note(self.taken, defect);
         }
     }
 }
@@ -258,7 +260,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.monitor.first
+        self.monitor.steps.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {

@@ -103,7 +103,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// The first step so far that was flagged as unresolved: for example with fewer than six steps per period of the
     /// velocity, or a conformal factor outside of `[1/3, 3]`.
     pub fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.monitor.first
+        self.monitor.steps.first
     }
 
     /// The current state `(q, p, z)`.
@@ -141,7 +141,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         }
         // The second difference is valid from the third step on.
         let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
-        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.monitor.floor, self.monitor.sharpest)
+        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.monitor.steps.floor, self.monitor.steps.sharpest)
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // The cause of a change of the mean velocities lies in this step or the previous one.
@@ -168,10 +168,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     #[cold]
     #[inline(never)]
     fn record_defect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {
-        let still = at_rest(velocities, self.ld.step_size(), self.monitor.floor);
+        let still = at_rest(velocities, self.ld.step_size(), self.monitor.steps.floor);
         let of_factor = || self.ld.defect([&SVector::zeros(); 4], &next.end, next.sigma);
         if let Some(defect) = if still { of_factor() } else { Some(defect) } {
-            self.monitor.note(self.k - 1, defect);
+            self.monitor.steps.note(self.k - 1, defect);
         }
     }
 
@@ -239,7 +239,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.monitor.first
+        self.monitor.steps.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {

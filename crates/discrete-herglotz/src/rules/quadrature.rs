@@ -355,7 +355,7 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
     p: &SVector<f64, N>,
 ) -> [f64; 2] {
     let (of_value, once) = gradient_rounding(lagrangian, t, x);
-    let of_action = value_rounding(of_value, &once.x, &x.q);
+    let of_action = value_rounding(of_value, once.x.as_slice(), x.q.as_slice());
     [h.abs() * (max_abs(&once.x) + max_abs(p) * once.z) + max_abs(&once.y), h.abs() * of_action]
         .map(|e| RESIDUAL_ROUNDINGS * e)
 }

@@ -203,7 +203,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.progress.monitor.first
+        self.progress.monitor.steps.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {

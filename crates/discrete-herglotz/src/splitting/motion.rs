@@ -89,8 +89,10 @@ impl<const N: usize> CompensatedState<N> {
         let now = (self.force - force) * s;
         let before = std::mem::replace(&mut self.change, now);
         if now.dot(&before) < 0.0 {
-            let momenta = [momentum, &self.p.value, &(self.p.value + self.force * s)];
-            if let Some(defect) = turning([&before, &now], momenta, &self.q.value, s, checks.floor) {
+            let next = self.p.value + self.force * s;
+            let momenta = [momentum.as_slice(), self.p.value.as_slice(), next.as_slice()];
+            let changes = [before.as_slice(), now.as_slice()];
+            if let Some(defect) = turning(changes, momenta, self.q.value.as_slice(), s, checks.floor) {
                 checks.defect = max_or_nan(checks.defect, defect);
             }
         }
@@ -160,7 +162,7 @@ impl<const N: usize> SplittingRun<N> {
     /// The initial value of the check results for the next steps.
     #[inline(always)]
     pub(super) fn checks(&self) -> DriftChecks {
-        DriftChecks { defect: 0.0, sharpest: self.monitor.sharpest, floor: self.monitor.floor }
+        DriftChecks { defect: 0.0, sharpest: self.monitor.steps.sharpest, floor: self.monitor.steps.floor }
     }
 
     /// Takes steps in chunks. A chunk that ends with a non-finite value, or that contains the first unresolved step or
@@ -176,8 +178,8 @@ impl<const N: usize> SplittingRun<N> {
             let Reached { motion, state, checks: DriftChecks { defect, sharpest, .. } } = after(self, chunk);
             // A non-finite value in the motion makes this state or the next one non-finite.
             let finite = ChartVector::from(state).is_finite() && motion.sigma.is_finite();
-            let defect = (defect > 0.0 && self.monitor.first.is_none()).then_some(defect);
-            let sharper = sharpest > self.monitor.sharpest;
+            let defect = (defect > 0.0 && self.monitor.steps.first.is_none()).then_some(defect);
+            let sharper = sharpest > self.monitor.steps.sharpest;
             if chunk > 1 && (!finite || defect.is_some() || sharper) {
                 longest = 1;
                 continue;
@@ -186,7 +188,7 @@ impl<const N: usize> SplittingRun<N> {
                 return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
             if let Some(defect) = defect {
-                self.monitor.note(self.taken, defect);
+                self.monitor.steps.note(self.taken, defect);
                 longest = MAX_UNCHECKED_STEPS;
             } else if sharper {
                 let (t, from) = (self.time_after(0), self.state);

@@ -162,7 +162,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.progress.monitor.first
+        self.progress.monitor.steps.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {

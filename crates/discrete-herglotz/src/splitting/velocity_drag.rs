@@ -167,7 +167,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for DragSplitting<'_, L, N> {
     }
 
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.progress.monitor.first
+        self.progress.monitor.steps.first
     }
 
     fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {

@@ -7,9 +7,13 @@ use crate::numbers::registers::Stages;
 use contact_geom::Lagrangian;
 
 /// To be written.
-pub(crate) trait SampleKernel {}
+pub(crate) trait SampleKernel {
+    fn sample_defect(&self, arch: crate::numbers::instructions::Instructions, curve: &Curve, transformed: bool, set: usize) -> crate::gauss::DefectSample;
+}
 
-impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {}
+impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
+    fn sample_defect(&self, _: crate::numbers::instructions::Instructions, _: &Curve, _: bool, _: usize) -> crate::gauss::DefectSample { todo!() }
+}
 
 /// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
 /// transformation they are polynomials in tau, each multiplied by the rate dt/dtau.
@@ -31,6 +35,7 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
+    pub fn new(_s: usize, _t: f64, _h: f64, _q: &[f64], _p: &[f64], _z: f64) -> Self { todo!() }
     /// Sets the stages of a step that has momenta and actions.
     pub fn of_solved(&mut self, _solved: &Solved) {
         todo!()

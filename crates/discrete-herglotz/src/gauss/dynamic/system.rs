@@ -7,6 +7,7 @@ use crate::gauss::dynamic::routes::hamiltonian::HamiltonianKernel;
 use crate::gauss::dynamic::routes::separable::SeparableKernel;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::position_newton::curvature;
+use crate::integration::{AtState, at_state};
 use crate::solve::mass_matrix::mass_matrix;
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -152,6 +153,20 @@ pub(crate) trait SystemAtPoints {
     /// Those of the inverse Legendre transform.
     fn velocity(&self, t: f64, state: PointRef<'_>, near: &[f64], out: &mut [f64]) -> Result<(), StepError>;
 
+    /// The velocity at a state, near a guess, with `L_q + f` and `L_z` there in `out.q` and `out.z`; of a contact
+    /// Hamiltonian whatever the rank of `H_pp`.
+    ///
+    /// # Errors
+    /// Those of the inverse Legendre transform.
+    fn at_state(
+        &self,
+        t: f64,
+        state: PointRef<'_>,
+        near: &[f64],
+        v: &mut [f64],
+        out: &mut Gradient,
+    ) -> Result<(), StepError>;
+
     /// The rate dt/dtau of the time transformation.
     fn dt_dtau(&self, q: &[f64]) -> f64;
 }
@@ -266,6 +281,21 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
     fn velocity(&self, t: f64, at: PointRef<'_>, near: &[f64], out: &mut [f64]) -> Result<(), StepError> {
         let x = legendre_inverse(self.0, t, &state::<N>(at), &vector_of(near))?;
         out.copy_from_slice(x.v.as_slice());
+        Ok(())
+    }
+
+    fn at_state(
+        &self,
+        t: f64,
+        at: PointRef<'_>,
+        near: &[f64],
+        v: &mut [f64],
+        out: &mut Gradient,
+    ) -> Result<(), StepError> {
+        let AtState { x, force, rate, .. } = at_state(self.0, t, &state::<N>(at), &vector_of(near))?;
+        v.copy_from_slice(x.v.as_slice());
+        out.q.copy_from_slice(force.as_slice());
+        out.z = rate;
         Ok(())
     }
 

@@ -51,11 +51,11 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             _ => {}
         }
         let [a, b, c, d] = &*velocities;
-        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.monitor.floor, self.monitor.sharpest);
+        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.monitor.steps.floor, self.monitor.steps.sharpest);
         let few = self.s <= FEW_STAGES;
-        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.monitor.floor) {
+        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.monitor.steps.floor) {
             // As for quadrature rules, the defect becomes known one step later.
-            self.monitor.note(self.k.saturating_sub(1), defect);
+            self.monitor.steps.note(self.k.saturating_sub(1), defect);
         }
         if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
             let t = self.t0 + step as f64 * h;
@@ -70,7 +70,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         if self.of_sigma > 1.0 && self.k > 0 {
             return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
         }
-        self.monitor.first.or_else(|| {
+        self.monitor.steps.first.or_else(|| {
             let sets = with_route!(&*self.route, run => StageRoute::sample_sets(run));
             let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.sample_defect(sets)?;
             let allowed = if self.s > FEW_STAGES { MAX_STEP_DEFECT } else { MAX_STEP_DEFECT_OF_FEW_STAGES };
@@ -96,8 +96,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             return false;
         };
         let rounding = rounding_at_state(self.lagrangian, t, &x, &state).1;
-        size(&x.v) * self.h.abs() <= self.monitor.floor
-            && size(&(force + state.p * rate)) <= COLLOCATION_ROUNDINGS * size(&rounding.x)
+        size(x.v.as_slice()) * self.h.abs() <= self.monitor.steps.floor
+            && size((force + state.p * rate).as_slice()) <= COLLOCATION_ROUNDINGS * size(rounding.x.as_slice())
     }
 
     /// Bounds on the round-off in the defects of the momenta and of the action in the last step, from the round-off of
@@ -114,7 +114,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let carried = COLLOCATION_ROUNDINGS * (1.0 + self.sigma().ln().abs());
         // Zero where the bound is not finite. Subnormal numbers have lost digits, which the smallest normal number
         // bounds.
-        [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
+        [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, g.x.as_slice(), x.q.as_slice()) * h]
             .map(|once| if (carried * once).is_finite() { carried * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }

@@ -48,14 +48,14 @@ impl<const N: usize> Discretization<'_, N> {
         for (i, acceleration) in accelerations.iter_mut().enumerate() {
             let at = (before + span + after) * (i as f64 / ACCELERATION_PARTS as f64) - before;
             let x = hermite(&start, &end, span, at);
-            speed = max_or_nan(speed, size(&x.v));
+            speed = max_or_nan(speed, size(x.v.as_slice()));
             // Outside the domain of L the acceleration is not finite, and the interval counts as unresolved.
             let (rates, drag) = lagrangian.rates(t + at, &x).ok()?;
             *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
         }
-        let jump = max_abs_or_nan(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
+        let jump = max_abs_or_nan(accelerations.windows(3).map(|a| size((a[2] - a[1] * 2.0 + a[0]).as_slice())));
         // The round-off of forces is relative to the size of the motion at the start and at the current position.
-        let floor = max_or_nan(rounding(&first.q, &first.v, self.h), POSITION_ROUND_OFF * size(&to.q));
+        let floor = max_or_nan(rounding(first.q.as_slice(), first.v.as_slice(), self.h), POSITION_ROUND_OFF * size(to.q.as_slice()));
         let rounded = jump * self.h * self.h <= floor;
         Some(if rounded { 0.0 } else { jump * self.h.abs() / (MAX_ACCELERATION_JUMP * speed) })
     }

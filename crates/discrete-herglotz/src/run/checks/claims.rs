@@ -169,7 +169,7 @@ impl<const N: usize> ClaimMonitor<N> {
         let rounding = |part: usize| {
             let (_, r) = lagrangian.rounding(t, x);
             let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
-            CLAIM_ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
+            CLAIM_ROUNDINGS * [of(&r.x, size(x.q.as_slice())), of(&r.y, size(x.v.as_slice())), r.z][part]
         };
         let mut found = None;
         let mut claim = |made: bool, claim: &'static str, part: usize, difference: Option<(f64, f64)>| {

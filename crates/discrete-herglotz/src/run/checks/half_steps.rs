@@ -39,7 +39,7 @@ impl<const N: usize> Discretization<'_, N> {
         let moved =
             if self.info.order == 1 { FIRST_ORDER_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
         let width =
-            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
+            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(start.q.as_slice(), start.v.as_slice(), self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v = if of_v * self.h.abs() > MIN_RELATIVE_DISPLACEMENT * width {
             relative(of_v, size([&v, &coarse_v, &fine_v]))

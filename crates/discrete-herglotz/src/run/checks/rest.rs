@@ -34,7 +34,7 @@ pub(crate) fn is_at_rest<const N: usize>(
     t: f64,
     state: &PhasePoint<N>,
 ) -> bool {
-    if max_or_nan(size(&state.q), size(&state.p)) >= MAX_SIZE_AT_REST || starts_at_rest(problem) {
+    if max_or_nan(size(state.q.as_slice()), size(state.p.as_slice())) >= MAX_SIZE_AT_REST || starts_at_rest(problem) {
         return false;
     }
     let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: state.z };
@@ -48,5 +48,5 @@ pub(crate) fn is_at_rest<const N: usize>(
 
 /// Whether the start itself is below [`MAX_SIZE_AT_REST`].
 pub(crate) fn starts_at_rest<const N: usize>(problem: &SystemProblem<'_, N>) -> bool {
-    max_or_nan(size(&problem.state.q), size(&problem.state.p)) < MAX_SIZE_AT_REST
+    max_or_nan(size(problem.state.q.as_slice()), size(problem.state.p.as_slice())) < MAX_SIZE_AT_REST
 }

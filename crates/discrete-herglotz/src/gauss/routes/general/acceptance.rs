@@ -61,7 +61,7 @@ impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, 
             })
         };
         let rho = self.one_minus_rho_stages.map(|one_minus_rho_stages| 1.0 - one_minus_rho_stages);
-        let of_action = value_rounding(of_value, &once.x, &x.q) * self.table.h.abs();
+        let of_action = value_rounding(of_value, once.x.as_slice(), x.q.as_slice()) * self.table.h.abs();
         let of_momentum = |d: usize| once.x[d] * self.table.h.abs() + once.y[d];
         holds(1.0, &self.rate.map(|rate| -rate), 0.0, &|i| rho.0[i])
             && holds(self.z.value, &self.l, of_action, &|i| self.z_stages.0[i])
