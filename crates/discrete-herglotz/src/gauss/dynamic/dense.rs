@@ -1,9 +1,15 @@
 //! The solved stages of a step, and its collocation polynomial.
 
 use crate::gauss::dynamic::system::{CollocationSystem, PointRef};
+use crate::DenseStep;
+use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
+use crate::integration::SolvedStages;
+use crate::integration::dense_step::Series;
+use crate::numbers::array::from_fn;
 use crate::numbers::registers::{MAX_STAGES, Stages};
 use crate::numbers::state_words::saved;
+use contact_geom::PhasePoint;
 use contact_geom::nalgebra::DMatrix;
 
 /// The state at the start of a step in the variables of the route: y are velocities in the condensed routes, momenta in
@@ -102,6 +108,18 @@ impl Solved {
         solved
     }
 
+    /// The collocation polynomial through these stages.
+    pub fn curve<const N: usize>(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> DenseStep<N> {
+        let [v, force] = [&self.v, &self.force].map(|of| from_fn(|d| through(&of[d], s)));
+        DenseStep::new(s, (t, h), start, [v, force], [through(&self.rate, s), through(&self.l, s)])
+    }
+
+    /// These stages for the tangent of the step.
+    pub fn stages<const N: usize>(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> SolvedStages<N> {
+        let [v, force] = [&self.v, &self.force].map(|of| from_fn(|d| of[d]));
+        SolvedStages { s, t, h, start, v, force, rate: self.rate, l: self.l, knows_l: self.knows_l }
+    }
+
     /// Divides stage values by weights, and pads them with 0.
     pub fn unweighted(x: &Stages, weights: &Stages, s: usize) -> Stages {
         let mut values = Stages::ZERO;
@@ -110,4 +128,16 @@ impl Solved {
         }
         values
     }
+}
+
+/// The Legendre series of the polynomial through values at the nodes. The Gauss quadrature of its products with the
+/// Legendre polynomials is exact.
+fn through(values: &Stages, s: usize) -> Series {
+    let mut c = [0.0; MAX_STAGES];
+    for (row, value) in Coefficients::of(s).series.iter().zip(&values.0).take(s) {
+        for (c, entry) in c.iter_mut().zip(row) {
+            *c += entry * value;
+        }
+    }
+    Series(c)
 }

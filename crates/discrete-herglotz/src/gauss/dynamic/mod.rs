@@ -3,6 +3,7 @@
 
 pub(crate) mod curve;
 pub(crate) mod dense;
+pub(crate) mod initial_mass;
 pub(crate) mod routes;
 pub(crate) mod steps;
 pub(crate) mod system;
