@@ -161,7 +161,7 @@ impl General {
         self.take_stage(i);
         let of_value = system.rounding(t + self.table.times.0[i], self.point.at(), &mut self.rounding);
         let size = |x: &[f64]| max_abs_or_nan(x.iter().copied());
-        // As for the value of L elsewhere: with the round-off of its forces at this position.
+        // As in `value_rounding` of the resolution monitor: the round-off of the terms of L and that of its forces.
         let of_action = (of_value + size(&self.rounding.q) * size(&self.point.q)) * self.table.h.abs();
         self.arch.dispatch(CheckStages { general: self, of_action })
     }
