@@ -6,4 +6,5 @@ pub(crate) mod dense;
 pub(crate) mod initial_mass;
 pub(crate) mod routes;
 pub(crate) mod steps;
+pub(crate) mod stages;
 pub(crate) mod system;

@@ -8,12 +8,12 @@ use crate::gauss::dynamic::routes::separable::SeparableKernel;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::position_newton::curvature;
 use crate::integration::{AtState, at_state};
-use crate::solve::mass_matrix::mass_matrix;
+use crate::solve::mass_matrix::{BLOCK, mass_matrix};
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, VelocityPoint,
-    support::{gradient_rounding, rounding_at_state},
+    ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, VelocityPoint,
+    support::{gradient_rounding, rounding_at_state, seed},
 };
 
 /// A point `(q, v, z)` of TQ x R, or a state `(q, p, z)` of T\*Q x R with p in the place of v.
@@ -118,6 +118,9 @@ pub(crate) trait SystemAtPoints {
     /// The value of L.
     fn value(&self, t: f64, x: PointRef<'_>) -> f64;
 
+    /// L, which is returned, its gradient, and `L_q + f`, as Newton's method for the stages evaluates them.
+    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut Gradient, force: &mut [f64]) -> f64;
+
     /// L, its gradient and Hessian, and the applied force with its derivatives.
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives);
 
@@ -216,11 +219,31 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         Lagrangian::value(self.0, t, &vector_of(x.q), &vector_of(x.v), x.z)
     }
 
+    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut Gradient, force: &mut [f64]) -> f64 {
+        let x = point(x);
+        // Dual numbers with many directions would not fit on the stack.
+        let (value, d) = if const { N > BLOCK } {
+            self.0.with_gradient(t, &x)
+        } else {
+            let l: Dual<f64, ChartVector<N>> = self.0.along(t, &seed(&ChartVector::from(x)).into());
+            (l.re, l.d)
+        };
+        gradient.set(&d);
+        force.copy_from_slice(d.x.as_slice());
+        if const { L::HINTS.forced } {
+            let applied = self.0.applied_force(t, &x);
+            for d in 0..N {
+                force[d] += applied[d];
+            }
+        }
+        value
+    }
+
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives) {
         let x = point(x);
-        let (value, gradient) = self.0.with_gradient(t, &x);
-        out.value = value;
-        out.gradient.set(&gradient);
+        out.value = Lagrangian::value(self.0, t, &x.q, &x.v, x.z);
+        // `with_gradient`, which is made for kernels, may round in another way.
+        out.gradient.set(&self.0.gradient(t, &x));
         out.set_hessian(&self.0.hessian(t, &x));
         out.set_force(AppliedForce::of(self.0, t, &x));
     }
