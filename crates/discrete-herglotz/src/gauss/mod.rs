@@ -31,7 +31,9 @@ use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
     support::seed,
 };
-use stages::equations::{Given, Products, StageEquations, Workspace};
+use dynamic::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
+use dynamic::system::{PointRef, Typed};
+use stages::equations::{Given, StageEquations, StepEnd};
 pub(crate) use tables::coefficients::MAX_STAGES;
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian. Its discrete Lagrangian is
@@ -112,11 +114,12 @@ impl<L> Gauss<L> {
         L: Lagrangian<N>,
     {
         let equations = self.equations(t, forward);
-        let given = Given::Start(*from);
-        let mut work = equations.workspace(&given);
-        let iterations = equations.solve(&given, guess, &from.p, &mut work)?;
-        let Workspace { x, l, .. } = &work;
-        let end = equations.end(&given, x, l);
+        let (system, start) = (Typed(&self.lagrangian), PointRef::of_state(from));
+        let mut work = Workspace::new(&system, self.stages(), false);
+        let plain = Plain { system: &system, products: equations.products, t };
+        let iterations = plain.solve(&GivenValues::Start(start), guess.as_slice(), start.v, &mut work)?;
+        let (x, l) = work.solution::<N>();
+        let end = equations.end(&Given::Start(*from), &x, &l);
         let velocity = (0..self.stages()).fold(SVector::zeros(), |sum, j| sum + x.v[j] * self.forward.weight(j));
         DiscreteStep {
             end: PhasePoint { q: end.q, p: end.p, z: from.z + end.action },
@@ -128,19 +131,41 @@ impl<L> Gauss<L> {
     }
 
     /// Solves the stage equations between two given points, over `f64`.
-    fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<(Given<N, f64>, Workspace<N>), StepError>
+    fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<Workspace, StepError>
     where
         L: Lagrangian<N>,
     {
-        let equations = self.equations(t, true);
-        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
+        let system = Typed(&self.lagrangian);
         let u = (x.q1 - x.q0) / self.forward.h;
         let middle = contact_geom::VelocityPoint { q: (x.q0 + x.q1) * 0.5, v: u, z: x.z0 };
         let p = self.lagrangian.gradient(t + 0.5 * self.forward.h, &middle).y;
-        let mut work = equations.workspace(&given);
-        equations.solve(&given, &u, &p, &mut work)?;
-        Ok((given, work))
+        let mut work = Workspace::new(&system, self.stages(), true);
+        let equations = Plain { system: &system, products: &self.forward, t };
+        equations.solve(&ends_of(x), u.as_slice(), p.as_slice(), &mut work)?;
+        Ok(work)
     }
+
+    /// The end of the step between two points over a scalar with derivatives, from the solved stages over `f64`.
+    fn lifted_end<const N: usize, T: Scalar>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N, T>,
+        plain: &DiscretePoint<N>,
+        work: &mut Workspace,
+    ) -> Result<StepEnd<N, T>, StepError>
+    where
+        L: Lagrangian<N>,
+    {
+        let equations = Plain { system: &Typed(&self.lagrangian), products: &self.forward, t };
+        let inverse = equations.inverse_jacobian(&ends_of(plain), work).ok_or(StepError::Singular { pivot: 0.0 })?;
+        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
+        self.equations(t, true).lifted_end(&given, &work.solution().0, &inverse)
+    }
+}
+
+/// The ends of a step as given values.
+fn ends_of<const N: usize>(x: &DiscretePoint<N>) -> GivenValues<'_> {
+    GivenValues::Ends { q0: x.q0.as_slice(), q1: x.q1.as_slice(), z0: x.z0 }
 }
 
 impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
@@ -150,15 +175,14 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         let point = DiscretePoint { q0: x.q0.map(|e| e.re()), q1: x.q1.map(|e| e.re()), z0: x.z0.re() };
-        let (plain, mut work) = self.between(t, &point)?;
-        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
-        Ok(self.equations(t, true).lifted_end(&given, &plain, &mut work)?.action)
+        let mut work = self.between(t, &point)?;
+        Ok(self.lifted_end(t, x, &point, &mut work)?.action)
     }
 
     /// From the momenta of the solved step: `D1 = -sigma_d p0`, `D2 = p1`.
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
-        let (given, Workspace { x, l, .. }) = self.between(t, x)?;
-        let end = self.equations(t, true).end(&given, &x, &l);
+        let (given, (stages, l)) = (Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 }, self.between(t, x)?.solution());
+        let end = self.equations(t, true).end(&given, &stages, &l);
         let sigma = 1.0 / end.rho;
         Ok(DiscreteJet::new(end.action, end.p0 * -sigma, end.p, (1.0 - end.rho) * sigma).with_sigma(sigma))
     }
@@ -166,10 +190,9 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
     /// From the derivatives of the step, by one linear system; the nested dual numbers of [`value`](Self::value) are
     /// not needed.
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
-        let (plain, mut work) = self.between(t, x)?;
-        let x: DiscretePoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*x)).into();
-        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
-        let end = self.equations(t, true).lifted_end(&given, &plain, &mut work)?;
+        let mut work = self.between(t, x)?;
+        let seeded: DiscretePoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*x)).into();
+        let end = self.lifted_end(t, &seeded, x, &mut work)?;
         let sigma = end.rho.recip();
         let (d1, d2) = (end.p0.map(|p| -(p * sigma)), end.p);
         let dz = ((-end.rho + 1.0) * sigma).re;

@@ -1,7 +1,9 @@
 //! The contact defect of a step of contact Gauss collocation with a force.
 
 use crate::gauss::checks::check_step;
-use crate::gauss::stages::equations::{Given, Products, StageEquations};
+use crate::gauss::dynamic::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
+use crate::gauss::dynamic::system::{PointRef, Typed};
+use crate::gauss::stages::equations::{Given, StageEquations};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
@@ -79,12 +81,15 @@ impl<const N: usize> VirtualWork<N> {
         guess: &SVector<f64, N>,
     ) -> Result<Self, StepError> {
         let equations = StageEquations { lagrangian, products, t };
-        let plain = Given::Start(*from);
-        let mut work = equations.workspace(&plain);
-        equations.solve(&plain, guess, &from.p, &mut work)?;
+        let (system, start) = (Typed(lagrangian), PointRef::of_state(from));
+        let plain = Plain { system: &system, products, t };
+        let mut work = Workspace::new(&system, products.s, false);
+        let start = GivenValues::Start(start);
+        plain.solve(&start, guess.as_slice(), from.p.as_slice(), &mut work)?;
+        let inverse = plain.inverse_jacobian(&start, &mut work).ok_or(StepError::Singular { pivot: 0.0 })?;
         let state: PhasePoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*from)).into();
         let given = Given::Start(state);
-        let (x, l) = equations.lifted(&given, &plain, &mut work)?;
+        let (x, l) = equations.lifted(&given, &work.solution().0, &inverse)?;
         let end = equations.end(&given, &x, &l);
 
         let (rho, mut defect) = (end.rho.re, ChartVector { x: from.p, y: SVector::zeros(), z: -1.0 });

@@ -24,6 +24,13 @@ pub(crate) struct PointRef<'r> {
     pub z: f64,
 }
 
+impl<'r> PointRef<'r> {
+    /// A state with its momentum.
+    pub fn of_state<const N: usize>(state: &'r PhasePoint<N>) -> Self {
+        PointRef { q: state.q.as_slice(), v: state.p.as_slice(), z: state.z }
+    }
+}
+
 /// A gradient `(L_q, L_v, L_z)`, or `(H_q, H_p, H_z)` with `H_p` in the place of `L_v`.
 #[derive(Clone, Debug)]
 pub(crate) struct Gradient {
