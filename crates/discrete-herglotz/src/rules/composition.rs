@@ -25,9 +25,9 @@ use contact_geom::nalgebra::SVector;
 /// ```
 /// use contact_examples::systems::DoublePendulum;
 /// use contact_geom::PhasePoint;
-/// use discrete_herglotz::{SplittingScheme, Stepper, rules::{Composition, Midpoint}};
+/// use discrete_herglotz::{SplittingScheme, Stepper, rules::{Composition, Rule}};
 /// let system = DoublePendulum::default();
-/// let rule = |h| Midpoint::new(&system, h);
+/// let rule = |h| Rule::MIDPOINT.of(&system, h);
 /// let start = PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0);
 /// let mut motion = Composition::new(rule, &SplittingScheme::KAHAN_LI_8, 0.1, 0.0, start)?;
 /// assert!(motion.advance(100).is_ok());

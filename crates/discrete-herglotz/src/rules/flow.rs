@@ -36,8 +36,8 @@ pub struct FlowStep<const N: usize> {
 /// ```
 /// use contact_examples::systems::Pendulum;
 /// use contact_geom::PhasePoint;
-/// use discrete_herglotz::{Stepper, rules::{Flow, Midpoint}};
-/// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.1)?;
+/// use discrete_herglotz::{Stepper, rules::{Flow, Rule}};
+/// let ld = Rule::MIDPOINT.of(Pendulum { gamma: -0.1 }, 0.1)?;
 /// let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;
 /// flow.advance(100)?;
 /// println!("q(10) = {}", flow.state().q[0]);
