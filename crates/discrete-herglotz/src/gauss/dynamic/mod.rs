@@ -1,6 +1,7 @@
 //! Contact Gauss collocation with a number of coordinates that is known at run time.
 #![allow(dead_code)]
 
+pub(crate) mod choice;
 pub(crate) mod curve;
 pub(crate) mod dense;
 pub(crate) mod initial_mass;
