@@ -4,4 +4,5 @@
 pub(crate) mod curve;
 pub(crate) mod dense;
 pub(crate) mod routes;
+pub(crate) mod stages;
 pub(crate) mod system;

@@ -117,6 +117,9 @@ pub(crate) trait SystemAtPoints {
     /// The value of L.
     fn value(&self, t: f64, x: PointRef<'_>) -> f64;
 
+    /// The gradient of L.
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient);
+
     /// L, its gradient and Hessian, and the applied force with its derivatives.
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives);
 
@@ -199,6 +202,10 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
 
     fn value(&self, t: f64, x: PointRef<'_>) -> f64 {
         Lagrangian::value(self.0, t, &vector_of(x.q), &vector_of(x.v), x.z)
+    }
+
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) {
+        out.set(&Derivatives::gradient(self.0, t, &point(x)));
     }
 
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives) {

@@ -2,13 +2,14 @@
 
 pub(crate) mod general;
 pub(crate) mod hamiltonian;
+pub(crate) mod linear;
 pub(crate) mod separable;
 
 use crate::StepError;
-use crate::gauss::dynamic::dense::{Solved, SolvedStep, StartValues};
 use crate::gauss::dynamic::curve::Curve;
-use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::dynamic::dense::{Solved, SolvedStep, StartValues};
 use crate::gauss::dynamic::system::CollocationSystem;
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::state_words::Saved;
