@@ -4,10 +4,12 @@ use crate::InputError;
 use crate::gauss::dynamic::initial_mass::InitialMass;
 use crate::gauss::dynamic::routes::StageRoute;
 use crate::gauss::dynamic::routes::general::{Extension, General};
+use crate::gauss::dynamic::routes::linear::Linear;
+use crate::gauss::dynamic::routes::separable::Separable;
 use crate::gauss::dynamic::stages::mass_matrix::Mass;
-use crate::gauss::dynamic::system::{CollocationSystem, PointDerivatives, PointRef};
+use crate::gauss::dynamic::system::{CollocationSystem, Gradient, PointRef};
 use crate::gauss::limits::MAX_LINEAR_DIMENSION;
-use crate::gauss::resolution::tail;
+use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
 use contact_geom::Structure;
@@ -43,11 +45,26 @@ pub(crate) fn route_of(
     h: f64,
     wants_z: bool,
 ) -> Result<ChosenRoute, InputError> {
-    let InitialMass { w, inverse } = InitialMass::of(system, start.t, PointRef { q: start.q, v: start.v, z: start.z })?;
-    let _ = (wants_z, w);
-    let mass = Mass::new(&start.structure, inverse);
-    let at = PointRef { q: start.q, v: start.p, z: start.z };
-    let extension = (Extension::new(start.t, 0.0), false);
-    let general = General::new(extension, StageTable::new(s, h), mass, start.depends_on_action, at, start.v);
-    Ok((Box::new(general), None, 0.0))
+    let (structure, state) = (&start.structure, PointRef { q: start.q, v: start.p, z: start.z });
+    if start.is_hamiltonian {
+        return Err(InputError::Dimension);
+    }
+    let at = PointRef { v: start.v, ..state };
+    let InitialMass { w, inverse } = InitialMass::of(system, start.t, at)?;
+    if !(start.is_separable && structure.has_constant_rate()) {
+        let (extension, mass) = ((Extension::new(start.t, 0.0), false), Mass::new(structure, inverse));
+        let general = General::new(extension, StageTable::new(s, h), mass, start.depends_on_action, state, start.v);
+        return Ok((Box::new(general), None, 0.0));
+    }
+    let mut gradient = Gradient::zeros(start.q.len());
+    system.gradient(start.t, at, &mut gradient);
+    let table = Condensed::of(s, h, gradient.z)?;
+    let of_sigma = of_sigma(1.0 + table.grow.head, table.gamma * h);
+    let is_linear = structure.quadratic && structure.autonomous && start.q.len() <= MAX_LINEAR_DIMENSION;
+    if is_linear && let Some(linear) = Linear::new(system, &table, &inverse, start.t, at, wants_z) {
+        return Ok((Box::new(linear), Some(w), of_sigma));
+    }
+    let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
+    let inverse = (!w.is_identity(0.0)).then_some(inverse);
+    Ok((Box::new(Separable::new(table, left, inverse, at, wants_z)), Some(w), of_sigma))
 }

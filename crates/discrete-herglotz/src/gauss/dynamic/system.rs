@@ -128,6 +128,9 @@ pub(crate) trait SystemAtPoints {
     /// L, which is returned, its gradient, and `L_q + f`, as Newton's method for the stages evaluates them.
     fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut Gradient, force: &mut [f64]) -> f64;
 
+    /// The gradient of L.
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient);
+
     /// L, its gradient and Hessian, and the applied force with its derivatives.
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives);
 
@@ -244,6 +247,10 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
             }
         }
         value
+    }
+
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) {
+        out.set(&Derivatives::gradient(self.0, t, &point(x)));
     }
 
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives) {

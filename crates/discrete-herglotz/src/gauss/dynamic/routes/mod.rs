@@ -2,6 +2,7 @@
 
 pub(crate) mod general;
 pub(crate) mod hamiltonian;
+pub(crate) mod linear;
 pub(crate) mod separable;
 pub(crate) mod transformed;
 

@@ -2,4 +2,8 @@
 
 pub(crate) mod equations;
 pub(crate) mod mass_matrix;
+pub(crate) mod position_newton;
+pub(crate) mod product;
+pub(crate) mod slope_newton;
 pub(crate) mod stage_newton;
+pub(crate) mod stage_values;
