@@ -182,6 +182,7 @@ struct Between {
     integral: StageMap,
 }
 
+/// The part of a defect of values of a size that is beyond their round-off.
 pub(crate) fn beyond_rounding(defect: f64, size: f64) -> f64 {
     // Written so that a NaN is returned.
     if defect <= VALUE_ROUND_OFF * size { 0.0 } else { defect - VALUE_ROUND_OFF * size }

@@ -31,8 +31,8 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for TakeStep<'_, '_, L, N> {
     }
 }
 
-/// A chain with masses that depend on the positions, a magnetic term and a rate that depends on z, of this stiffness, and this amplitude of a force that
-/// depends on time.
+/// A chain with masses that depend on the positions, a magnetic term and a rate that depends on z: its stiffness, and the
+/// amplitude of a force that depends on time.
 #[derive(Debug)]
 struct Chain(f64, f64);
 

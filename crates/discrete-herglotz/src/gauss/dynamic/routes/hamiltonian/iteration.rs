@@ -63,9 +63,9 @@ impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
     /// of each kind relative to its largest value. An action that vanishes by cancellation, as that of a Hamiltonian of
     /// degree one in p, is as large as `h p . v` in this comparison.
     ///
-    /// With `predict`, the velocities follow the new momenta by `H_pp` at an earlier state, before the positions are computed: for a
-    /// motion with kinetic energy an iteration then reduces the error by `(h omega)^2` instead of `h omega`. The actions follow
-    /// the new positions by `dZ = p dQ`. Neither changes the solution.
+    /// With `predict`, the velocities follow the new momenta by `H_pp` at an earlier state, before the positions are
+    /// computed: for a motion with kinetic energy an iteration then reduces the error by `(h omega)^2` instead of
+    /// `h omega`. The actions follow the new positions by `dZ = p dQ`. Neither changes the solution.
     #[inline(always)]
     pub(super) fn move_stages<S: Simd>(&mut self, predict: bool) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
