@@ -41,7 +41,7 @@ pub(crate) struct DefectSample {
     /// The largest `|p.v| + |z L_z|`, for comparison with `of_value`.
     pub kinetic: f64,
     /// The values of L at the start and at the end of the step's curve.
-    ends: [f64; 2],
+    pub ends: [f64; 2],
     /// Whether L may jump between the preceding step and this one.
     pub follows_a_jump: bool,
 }
@@ -182,7 +182,8 @@ struct Between {
     integral: StageMap,
 }
 
-fn beyond_rounding(defect: f64, size: f64) -> f64 {
+/// The part of a defect of values of a size that is beyond their round-off.
+pub(crate) fn beyond_rounding(defect: f64, size: f64) -> f64 {
     // Written so that a NaN is returned.
     if defect <= VALUE_ROUND_OFF * size { 0.0 } else { defect - VALUE_ROUND_OFF * size }
 }
@@ -234,7 +235,7 @@ impl Between {
 
 /// The sum of the sizes of the last two coefficients of values at the stages.
 #[inline(always)]
-fn tail(g: &Coefficients, y: &Stages) -> f64 {
+pub(crate) fn tail(g: &Coefficients, y: &Stages) -> f64 {
     let mut sum = 0.0;
     for row in &g.last {
         sum += weighted(row, y).abs();
@@ -244,7 +245,7 @@ fn tail(g: &Coefficients, y: &Stages) -> f64 {
 
 /// The weighted sum of the stages; the weights after the last stage are 0.
 #[inline(always)]
-fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
+pub(crate) fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     let mut sum = 0.0;
     for i in 0..MAX_STAGES {
         sum += weights[i] * y.0[i];
