@@ -1,33 +1,33 @@
 //! The mass matrix at the start of a run.
 
-use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
-use crate::{InputError, Problem, StepError};
-use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Lagrangian, numbers::max_abs_or_nan};
+use crate::gauss::system::{PointRef, SystemAtPoints};
+use crate::{InputError, StepError};
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{numbers::max_abs_or_nan, support::linear};
 
 /// The mass matrix W at the start of a run, and its inverse.
-pub(crate) struct InitialMass<const N: usize> {
-    pub w: Box<SMatrix<f64, N, N>>,
-    pub inverse: Box<SMatrix<f64, N, N>>,
+pub(crate) struct InitialMass {
+    pub w: DMatrix<f64>,
+    pub inverse: DMatrix<f64>,
 }
 
-impl<const N: usize> InitialMass<N> {
+impl InitialMass {
     /// # Errors
     /// [`InputError::FirstStep`] if W is singular to round-off.
-    pub fn of<L: Lagrangian<N>>(problem: &Problem<'_, L, N>) -> Result<Self, InputError> {
-        let w = kept_mass_matrix(problem.lagrangian, problem.t0, &problem.start);
-        let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
+    pub fn of(system: &dyn SystemAtPoints, t: f64, start: PointRef<'_>) -> Result<Self, InputError> {
+        let n = system.dimension();
+        let (mut w, mut inverse) = (DMatrix::zeros(n, n), DMatrix::identity(n, n));
+        system.mass_matrix(t, start, &mut w);
+        for mut column in inverse.column_iter_mut() {
+            linear::solve(&mut w.clone(), &mut column)
+                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
+        }
         // This condition number is invariant under scaling of the coordinates: |W^-1| |W| = 1 for every diagonal W.
-        let condition = condition_of(&inverse, &w);
+        let product = |i: usize, j: usize| (0..n).map(|k| inverse[(i, k)].abs() * w[(k, j)].abs()).sum::<f64>();
+        let condition = max_abs_or_nan((0..n).map(|i| (0..n).map(|j| product(i, j)).sum()));
         if condition.is_nan() || condition > 0.1 / f64::EPSILON {
             return Err(InputError::FirstStep(StepError::Singular { pivot: 1.0 / condition }));
         }
         Ok(InitialMass { w, inverse })
     }
-}
-
-/// The largest row sum of `|W^-1| |W|`; entry by entry, to save stack space.
-fn condition_of<const N: usize>(inverse: &SMatrix<f64, N, N>, w: &SMatrix<f64, N, N>) -> f64 {
-    let product = |i: usize, j: usize| (0..N).map(|k| inverse[(i, k)].abs() * w[(k, j)].abs()).sum::<f64>();
-    max_abs_or_nan((0..N).map(|i| (0..N).map(|j| product(i, j)).sum()))
 }

@@ -1,9 +1,10 @@
 //! Contact Gauss collocation.
 
 mod checks;
+mod choice;
 mod collocation_stepper;
+mod curve;
 mod dense;
-mod dynamic;
 mod initial_mass;
 pub(crate) mod integrator;
 pub(crate) mod limits;
@@ -11,6 +12,8 @@ pub(crate) mod resolution;
 pub(crate) mod routes;
 pub(crate) mod stages;
 mod stepper;
+mod steps;
+pub(crate) mod system;
 pub(crate) mod tables;
 mod virtual_work;
 mod work_summary;
@@ -19,7 +22,7 @@ pub(crate) use collocation_stepper::CollocationStepper;
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
-pub use dynamic::routes::transformed::TransformedStepper;
+pub use routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
 pub use virtual_work::VirtualWork;
 pub use work_summary::GaussRoute;
@@ -31,9 +34,9 @@ use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
     support::seed,
 };
-use dynamic::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
-use dynamic::system::{PointRef, Typed};
-use stages::equations::{Given, StageEquations, StepEnd};
+use stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
+use system::{PointRef, Typed};
+use stages::lifted_equations::{Given, StageEquations, StepEnd};
 pub(crate) use tables::coefficients::MAX_STAGES;
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian. Its discrete Lagrangian is

@@ -2,10 +2,10 @@
 
 use crate::gauss::checks::check_step;
 use crate::gauss::dense::StepStart;
-use crate::gauss::dynamic::choice::{Start, route_of};
-use crate::gauss::dynamic::routes::RouteState;
-use crate::gauss::dynamic::steps::{GaussSteps, Setup};
-use crate::gauss::dynamic::system::{Typed, vector_of};
+use crate::gauss::choice::{Start, route_of};
+use crate::gauss::routes::RouteState;
+use crate::gauss::steps::{GaussSteps, Setup};
+use crate::gauss::system::{Typed, vector_of};
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};

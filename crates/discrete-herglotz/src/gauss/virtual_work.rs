@@ -1,9 +1,9 @@
 //! The contact defect of a step of contact Gauss collocation with a force.
 
 use crate::gauss::checks::check_step;
-use crate::gauss::dynamic::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
-use crate::gauss::dynamic::system::{PointRef, Typed};
-use crate::gauss::stages::equations::{Given, StageEquations};
+use crate::gauss::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
+use crate::gauss::system::{PointRef, Typed};
+use crate::gauss::stages::lifted_equations::{Given, StageEquations};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{

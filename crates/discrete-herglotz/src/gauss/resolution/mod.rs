@@ -3,5 +3,4 @@
 //! [`crate::resolution`] lists all measures and their thresholds.
 
 pub(crate) mod defect_sample;
-pub(crate) mod sequence;
 pub(crate) mod tail;

@@ -3,77 +3,130 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use crate::gauss::system::{PointRef, SystemAtPoints};
+use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
-use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Structure, support::linear, vector};
 use pulp::Simd;
 
 /// The inverse mass matrix, which maps momentum residuals to changes of velocity.
-pub(crate) enum Mass<const N: usize> {
+pub(crate) enum Mass {
     /// `W^-1` if it is constant.
-    Constant(Box<SMatrix<f64, N, N>>),
-    /// `W^-1` at the stages, by rows, recomputed in each step.
-    Stages(Box<[[Stages; N]]>),
+    Constant(DMatrix<f64>),
+    /// `W^-1` at the stages, recomputed in each step.
+    Stages(Box<StageInverses>),
 }
 
-impl<const N: usize> Mass<N> {
+/// `W^-1` at the stages.
+pub(crate) struct StageInverses {
+    /// The entries, by rows.
+    rows: Vec<Stages>,
+    /// The workspace for an inversion at one stage, if W is not inverted in SIMD lanes.
+    one: Option<OneStage>,
+}
+
+/// The workspace for an inversion at one stage.
+struct OneStage {
+    w: DMatrix<f64>,
+    /// A copy of W, which the solution overwrites.
+    copy: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+impl Mass {
     /// Uses `W^-1` at the start of the run if it is constant.
-    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
+    pub fn new(structure: &Structure, inverse: DMatrix<f64>) -> Self {
         if structure.constant_mass || structure.separable {
-            Mass::Constant(inverse)
-        } else {
-            Mass::Stages(vec![[Stages::ZERO; N]; N].into())
+            return Mass::Constant(inverse);
         }
+        let n = inverse.nrows();
+        let zeros = || DMatrix::zeros(n, n);
+        let one = (n > MAX_DIMENSION_IN_LANES).then(|| OneStage { w: zeros(), copy: zeros(), inverse: zeros() });
+        Mass::Stages(Box::new(StageInverses { rows: vec![Stages::ZERO; n * n], one }))
     }
 
     /// Computes `W^-1` at a block of stages; `false` if W is singular there.
     #[inline(always)]
-    pub fn invert<S: Simd>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
+    pub fn invert<S: Simd, const N: usize>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
         let Mass::Stages(stored) = self else { return true };
+        let rows = &mut stored.rows[..N * N];
         for j in 0..N {
             let mut column: SVector<Lanes<S>, N> = vector!(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
             if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
                 return false;
             }
             for i in 0..N {
-                stored[i][j].set(r, column[i]);
+                rows[i * N + j].set(r, column[i]);
             }
         }
         true
     }
 
-    /// Stores `W^-1` of a stage, and repeats it for all following stages.
-    pub fn keep(&mut self, stage: usize, inverse: &SMatrix<f64, N, N>) {
-        let Mass::Stages(stored) = self else { return };
-        for (i, row) in stored.iter_mut().enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                entry.0[stage..].fill(inverse[(i, j)]);
+    /// Computes `W^-1` at one stage, if W is not inverted in SIMD lanes, and repeats it for all following stages; `false`
+    /// if W is singular there.
+    pub fn invert_stage(&mut self, system: &dyn SystemAtPoints, stage: usize, t: f64, x: PointRef<'_>) -> bool {
+        let Mass::Stages(stored) = self else { return true };
+        let StageInverses { rows, one: Some(OneStage { w, copy, inverse }) } = &mut **stored else { return true };
+        system.mass_matrix(t, x, w);
+        inverse.fill_with_identity();
+        for mut column in inverse.column_iter_mut() {
+            copy.copy_from(w);
+            if linear::solve(copy, &mut column).is_err() {
+                return false;
             }
         }
+        let n = w.nrows();
+        for i in 0..n {
+            for j in 0..n {
+                rows[i * n + j].0[stage..].fill(inverse[(i, j)]);
+            }
+        }
+        true
     }
 
-    /// An entry of `W^-1` at a block of stages.
+    /// `W^-1` as a kernel for N coordinates reads it.
     #[inline(always)]
-    pub fn inverse<S: Simd>(&self, i: usize, j: usize, r: usize) -> Lanes<S> {
+    pub fn inverse<const N: usize>(&self) -> InverseMass<'_> {
         match self {
-            Mass::Constant(w) => Lanes::splat(w[(i, j)]),
-            Mass::Stages(w) => w[i][j].block(r),
+            Mass::Constant(w) => InverseMass::Constant(&w.as_slice()[..N * N]),
+            Mass::Stages(stored) => InverseMass::Stages(&stored.rows[..N * N]),
+        }
+    }
+}
+
+/// The entries of `W^-1`.
+#[derive(Clone, Copy)]
+pub(crate) enum InverseMass<'r> {
+    /// By columns.
+    Constant(&'r [f64]),
+    /// By rows.
+    Stages(&'r [Stages]),
+}
+
+impl InverseMass<'_> {
+    /// An entry at a block of stages.
+    #[inline(always)]
+    pub fn entry<S: Simd, const N: usize>(&self, i: usize, j: usize, r: usize) -> Lanes<S> {
+        match self {
+            InverseMass::Constant(w) => Lanes::splat(w[j * N + i]),
+            InverseMass::Stages(w) => w[i * N + j].block(r),
         }
     }
 }
 
 /// A constant `W^-1` is not saved; that at the stages is part of the last step.
-impl<const N: usize> Saved for Mass<N> {
+impl Saved for Mass {
     fn save(&self, to: &mut Vec<u64>) {
-        if let Mass::Stages(rows) = self {
-            rows.iter().for_each(|row| row.save(to));
+        if let Mass::Stages(stored) = self {
+            stored.rows.save(to);
         }
     }
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
-        if let Mass::Stages(rows) = self {
-            rows.iter_mut().try_for_each(|row| row.load(from))?;
+        if let Mass::Stages(stored) = self {
+            stored.rows.load(from)?;
         }
         Some(())
     }

@@ -1,12 +1,14 @@
-//! The stages of a collocation step: their values in SIMD registers, their equations, and the iterations that solve
-//! them.
+//! The stages of a collocation step: their equations, and the iterations that solve them.
 
 pub(crate) mod applied_force;
+pub(crate) mod curvature;
 pub(crate) mod damping;
 pub(crate) mod equations;
 pub(crate) mod fixed_point;
-pub(crate) mod lagrangian_values;
+pub(crate) mod lifted_equations;
 pub(crate) mod mass_matrix;
-pub(crate) mod parametrization;
 pub(crate) mod position_newton;
-pub(crate) mod simplified_newton;
+pub(crate) mod product;
+pub(crate) mod slope_newton;
+pub(crate) mod stage_newton;
+pub(crate) mod stage_values;

@@ -2,27 +2,35 @@
 //! derivative of the force at each stage.
 
 use crate::StepError;
+use crate::gauss::stages::product::{matrix_product, product};
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::registers::DoubleDoubleStages;
 use crate::solve::DenseLu;
-use crate::solve::mass_matrix::BLOCK;
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::KernelDual};
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::numbers::max_abs_or_nan;
 
-/// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, with
+/// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s n` unknowns, with
 /// the Newton correction `(1 - B a')^-1` times the residual. Made once for a run, so that steps do not allocate.
-pub(crate) struct PositionNewton<const N: usize> {
+///
+/// Vectors have the n components of one stage after those of another.
+pub(crate) struct PositionNewton {
+    n: usize,
     /// `q0 + u v0`.
-    base: Vec<SVector<f64, N>>,
+    base: Vec<f64>,
     /// The positions of the last accepted iterate and of the trial.
-    x: Vec<SVector<f64, N>>,
-    trial: Vec<SVector<f64, N>>,
+    x: Vec<f64>,
+    trial: Vec<f64>,
     /// The accelerations at the trial positions, and the start time of the last step that was solved.
-    a: Vec<SVector<f64, N>>,
+    a: Vec<f64>,
     solved: f64,
+    /// The force at one stage, and its derivative.
+    force: Vec<f64>,
+    curvature: DMatrix<f64>,
     /// `a'` at the stages.
-    slopes: Vec<SMatrix<f64, N, N>>,
+    slopes: Vec<DMatrix<f64>>,
     lu: DenseLu,
     residual: Vec<f64>,
     correction: Vec<f64>,
@@ -30,78 +38,40 @@ pub(crate) struct PositionNewton<const N: usize> {
 }
 
 /// The system and the start of a step.
-pub(crate) struct At<'a, L, const N: usize> {
-    pub lagrangian: &'a L,
+pub(crate) struct At<'a> {
+    pub system: &'a dyn CollocationSystem,
     pub table: &'a Condensed,
     /// `None` where M is the identity.
-    pub inverse_mass: Option<&'a SMatrix<f64, N, N>>,
+    pub inverse_mass: Option<&'a DMatrix<f64>>,
     pub t: f64,
-    pub q: SVector<f64, N>,
-    pub v: SVector<f64, N>,
+    pub q: &'a [f64],
+    pub v: &'a [f64],
 }
 
-/// `L_qq` at a time and a position, for separable L. Only the derivatives in q are computed, at a fraction of the cost
-/// and of the memory of all second derivatives.
-#[inline(never)]
-pub(crate) fn curvature<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t: f64,
-    q: &SVector<f64, N>,
-) -> SMatrix<f64, N, N> {
-    if const { N > BLOCK } {
-        by_directions::<N, BLOCK>(lagrangian, t, q)
-    } else {
-        by_directions::<N, N>(lagrangian, t, q)
-    }
-}
-
-/// `L_qq` by dual numbers with B directions at once.
-#[inline(always)]
-fn by_directions<const N: usize, const B: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t: f64,
-    q: &SVector<f64, N>,
-) -> SMatrix<f64, N, N> {
-    let constant = KernelDual::<f64, SVector<f64, B>>::constant;
-    let still = VelocityPoint { q: q.map(constant), v: SVector::from_element(constant(0.0)), z: constant(0.0) };
-    let mut curvature = SMatrix::zeros();
-    for first in (0..N).step_by(B.max(1)) {
-        let mut x = still;
-        let directions = first..(first + B).min(N);
-        for j in directions.clone() {
-            x.q[j].d[j - first] = 1.0;
-        }
-        let force = lagrangian.force(constant(t), &x);
-        for j in directions {
-            for i in 0..N {
-                curvature[(i, j)] = force[i].d[j - first];
-            }
-        }
-    }
-    curvature
-}
-
-impl<const N: usize> PositionNewton<N> {
-    /// The workspace for steps of `s` stages.
-    pub fn new(s: usize) -> Self {
-        let (points, numbers) = (vec![SVector::zeros(); s], vec![0.0; s * N]);
+impl PositionNewton {
+    /// The workspace for steps of `s` stages and n coordinates.
+    pub fn new(s: usize, n: usize) -> Self {
+        let numbers = || vec![0.0; s * n];
         PositionNewton {
-            base: points.clone(),
-            x: points.clone(),
-            trial: points.clone(),
-            a: points,
+            n,
+            base: numbers(),
+            x: numbers(),
+            trial: numbers(),
+            a: numbers(),
             solved: f64::NEG_INFINITY,
-            slopes: vec![SMatrix::zeros(); s],
-            lu: DenseLu::new(s * N),
-            residual: numbers.clone(),
-            correction: numbers.clone(),
-            next: numbers,
+            force: vec![0.0; n],
+            curvature: DMatrix::zeros(n, n),
+            slopes: vec![DMatrix::zeros(n, n); s],
+            lu: DenseLu::new(s * n),
+            residual: numbers(),
+            correction: numbers(),
+            next: numbers(),
         }
     }
 
     /// The accelerations and the positions of the solved stages.
-    pub fn stages(&self) -> impl Iterator<Item = (&SVector<f64, N>, &SVector<f64, N>)> {
-        self.a.iter().zip(&self.trial)
+    pub fn stages(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        self.a.chunks_exact(self.n).zip(self.trial.chunks_exact(self.n))
     }
 
     /// Solves the stage equations; returns the number of iterations. The initial guess uses the forces of the step
@@ -109,16 +79,18 @@ impl<const N: usize> PositionNewton<N> {
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
-    pub fn solve<L: Lagrangian<N>>(&mut self, at: &At<L, N>) -> Result<u32, StepError> {
-        for (base, u) in self.base.iter_mut().zip(&at.table.u) {
-            *base = at.q + at.v * u.0;
+    pub fn solve(&mut self, at: &At<'_>) -> Result<u32, StepError> {
+        for (base, u) in self.base.chunks_exact_mut(self.n).zip(&at.table.u) {
+            for (base, (q, v)) in base.iter_mut().zip(at.q.iter().zip(at.v)) {
+                *base = q + v * u.0;
+            }
         }
         let follows = at.t - self.solved <= 1.5 * at.table.h;
         self.solved = f64::NEG_INFINITY;
         self.x.copy_from_slice(&self.base);
         if follows {
-            for (x, row) in self.x.iter_mut().zip(&at.table.b) {
-                *x = self.a.iter().zip(row).fold(*x, |sum, (a, b)| sum + a * b.0);
+            for (x, row) in self.x.chunks_exact_mut(self.n).zip(&at.table.b) {
+                add_products(x, row, &self.a);
             }
         }
         let mut outcome = self.iterate(at, if follows { 0 } else { chances(self.residual.len()) });
@@ -133,7 +105,7 @@ impl<const N: usize> PositionNewton<N> {
     }
 
     /// Damped Newton iteration from the positions `x`.
-    fn iterate<L: Lagrangian<N>>(&mut self, at: &At<L, N>, chances: u32) -> Result<u32, StepError> {
+    fn iterate(&mut self, at: &At<'_>, chances: u32) -> Result<u32, StepError> {
         self.trial.copy_from_slice(&self.x);
         self.evaluate(at);
         if !self.residual.iter().all(|r| r.is_finite()) {
@@ -150,12 +122,11 @@ impl<const N: usize> PositionNewton<N> {
                 std::mem::swap(&mut self.correction, &mut self.next);
             }
             let correction = extent(&self.correction);
-            let (position, moved) = self.extents(&at.q);
+            let (position, moved) = self.extents(at.q);
             change = correction / position;
             let next = loop {
-                let steps = self.correction.chunks_exact(N);
-                for ((trial, x), step) in self.trial.iter_mut().zip(&self.x).zip(steps) {
-                    *trial = x + SVector::from_column_slice(step) * damping.part();
+                for ((trial, x), step) in self.trial.iter_mut().zip(&self.x).zip(&self.correction) {
+                    *trial = x + step * damping.part();
                 }
                 self.evaluate(at);
                 self.next.copy_from_slice(&self.residual);
@@ -173,8 +144,8 @@ impl<const N: usize> PositionNewton<N> {
                 return Ok(iterations);
             }
             if damping.ratio() * next <= f64::EPSILON * moved {
-                for (trial, step) in self.trial.iter_mut().zip(self.next.chunks_exact(N)) {
-                    *trial += SVector::from_column_slice(step);
+                for (trial, step) in self.trial.iter_mut().zip(&self.next) {
+                    *trial += step;
                 }
                 self.evaluate(at);
                 return Ok(iterations + 1);
@@ -184,41 +155,57 @@ impl<const N: usize> PositionNewton<N> {
     }
 
     /// Evaluates the accelerations and the residual at the trial positions.
-    fn evaluate<L: Lagrangian<N>>(&mut self, at: &At<L, N>) {
-        for (i, (a, q)) in self.a.iter_mut().zip(&self.trial).enumerate() {
-            let (t, x) = (at.t + at.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 });
-            let force = at.lagrangian.force(t, &x);
-            *a = at.inverse_mass.map_or(force, |inverse| inverse * force);
+    fn evaluate(&mut self, at: &At<'_>) {
+        let stages = self.a.chunks_exact_mut(self.n).zip(self.trial.chunks_exact(self.n));
+        for ((a, q), time) in stages.zip(&at.table.times.0) {
+            let t = at.t + time;
+            match at.inverse_mass {
+                None => at.system.force(t, q, a),
+                Some(inverse) => {
+                    at.system.force(t, q, &mut self.force);
+                    product(inverse, &self.force, a);
+                }
+            }
         }
-        for (i, out) in self.residual.chunks_exact_mut(N).enumerate() {
-            let start = self.base[i] - self.trial[i];
-            let row = &at.table.b[i];
-            let lack = self.a.iter().zip(row).fold(start, |sum, (a, b)| sum + a * b.0);
-            out.copy_from_slice(lack.as_slice());
+        for ((residual, base), trial) in self.residual.iter_mut().zip(&self.base).zip(&self.trial) {
+            *residual = base - trial;
+        }
+        for (residual, row) in self.residual.chunks_exact_mut(self.n).zip(&at.table.b) {
+            add_products(residual, row, &self.a);
         }
     }
 
     /// Factorises `1 - B a'` at the last iterate.
-    fn factorise<L: Lagrangian<N>>(&mut self, at: &At<L, N>) -> Result<(), StepError> {
-        for (i, (slope, q)) in self.slopes.iter_mut().zip(&self.x).enumerate() {
-            *slope = curvature(at.lagrangian, at.t + at.table.times.0[i], q);
-            if let Some(inverse) = at.inverse_mass {
-                *slope = inverse * *slope;
+    fn factorise(&mut self, at: &At<'_>) -> Result<(), StepError> {
+        let n = self.n;
+        for ((slope, q), time) in self.slopes.iter_mut().zip(self.x.chunks_exact(n)).zip(&at.table.times.0) {
+            let t = at.t + time;
+            match at.inverse_mass {
+                None => at.system.curvature(t, q, slope),
+                Some(inverse) => {
+                    at.system.curvature(t, q, &mut self.curvature);
+                    matrix_product(inverse, &self.curvature, slope);
+                }
             }
         }
         self.lu.factorise(|row, column| {
-            let (i, j) = (row / N, column / N);
+            let (i, j) = (row / n, column / n);
             let own = if row == column { 1.0 } else { 0.0 };
-            own - at.table.b[i][j].0 * self.slopes[j][(row % N, column % N)]
+            own - at.table.b[i][j].0 * self.slopes[j][(row % n, column % n)]
         })
     }
 
     /// The largest coordinate of the trial positions, and the largest component of their distance from the start.
-    fn extents(&self, start: &SVector<f64, N>) -> (f64, f64) {
-        let of = |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| {
-            max_abs_or_nan(self.trial.iter().map(|x| max_abs_or_nan(f(x).iter().copied())))
-        };
-        (of(&|x| *x), of(&|x| x - start))
+    fn extents(&self, start: &[f64]) -> (f64, f64) {
+        let distances = self.trial.chunks_exact(self.n).flat_map(|x| x.iter().zip(start).map(|(x, start)| x - start));
+        (extent(&self.trial), max_abs_or_nan(distances))
+    }
+}
+
+/// Adds the sum of the stages of `a`, multiplied by a row of B, to a vector.
+fn add_products(to: &mut [f64], row: &DoubleDoubleStages, a: &[f64]) {
+    for (a, b) in a.chunks_exact(to.len()).zip(row) {
+        to.iter_mut().zip(a).for_each(|(to, a)| *to += a * b.0);
     }
 }
 
@@ -230,12 +217,13 @@ fn extent(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DiscreteLagrangian;
     use crate::gauss::Gauss;
-    use crate::gauss::GaussStepper;
-    use crate::gauss::stages::equations::{Given, StageEquations};
+    use crate::gauss::system::Typed;
+    use crate::gauss::stages::lifted_equations::{Given, StageEquations};
+    use crate::solve::Solver;
     use crate::test_lagrangians::{Coupled, Cubic, InPlane, OnLine};
-    use crate::{DiscreteLagrangian, Stepper, solve::Solver};
-    use crate::{Problem, Start, StepperOptions};
+    use contact_geom::nalgebra::{SMatrix, SVector};
     use contact_geom::{PhasePoint, Structure, numbers::max_or_nan};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -247,6 +235,7 @@ mod tests {
         let coupled = InPlane::from(Coupled);
         let mass: SMatrix<f64, 2, 2> = SMatrix::from(Coupled::MASS);
         let inverse = mass.try_inverse().unwrap();
+        let inverse_mass = DMatrix::from_column_slice(2, 2, inverse.as_slice());
         let (q, v) = (SVector::from([1.0, -2.0]), SVector::from([0.5, 1.0]));
         for s in [1, 2, 3, 5, 8, 16] {
             for h in [0.1, 0.4, 0.7] {
@@ -256,11 +245,13 @@ mod tests {
                 let mut work = equations.workspace(&given);
                 equations.solve(&given, &v, &(mass * v), &mut work).unwrap();
                 let table = Condensed::new(s, h, Coupled::GAMMA).unwrap();
-                let mut positions = PositionNewton::new(s);
-                let at = At { lagrangian: &coupled, table: &table, inverse_mass: Some(&inverse), t, q, v };
+                let mut positions = PositionNewton::new(s, 2);
+                let (system, inverse_mass) = (&Typed::<_, 2>(&coupled), Some(&inverse_mass));
+                let at = At { system, table: &table, inverse_mass, t, q: q.as_slice(), v: v.as_slice() };
                 positions.solve(&at).unwrap();
                 let mut off = 0.0;
                 for (i, (a, q)) in positions.stages().enumerate() {
+                    let [a, q] = [a, q].map(SVector::<f64, 2>::from_column_slice);
                     let force = inverse * work.l[i].force;
                     let differences = [q - equations.position(&given, &work.x, i), a - force];
                     off = max_or_nan(off, max_abs_or_nan(differences.iter().flatten().copied()));
@@ -283,36 +274,19 @@ mod tests {
                     _ => unreachable!("it is the cubic potential"),
                 };
                 let table = Condensed::new(s, 5.0, -0.1).unwrap();
-                let (q, v) = (SVector::from([start]), SVector::from([0.5]));
-                let at = At { lagrangian: &cubic, table: &table, inverse_mass: None, t: 0.0, q, v };
-                let outcome = PositionNewton::new(s).solve(&at);
+                let system = &Typed::<_, 1>(&cubic);
+                let at = At { system, table: &table, inverse_mass: None, t: 0.0, q: &[start], v: &[0.5] };
+                let outcome = PositionNewton::new(s, 1).solve(&at);
                 let of_positions = evaluations();
                 assert!(matches!(outcome, Err(StepError::NotConverged { .. })), "{outcome:?}");
                 let gauss = Gauss::new(&cubic, s, 5.0).unwrap();
+                let (q, v) = (SVector::from([start]), SVector::from([0.5]));
                 let state = PhasePoint { q, p: v, z: 0.2 };
                 let outcome = gauss.forward(0.0, &state, &v, &mut Solver::default());
                 let of_all = evaluations();
                 assert!(matches!(outcome, Err(StepError::NotConverged { .. })), "{outcome:?}");
                 assert!(of_positions <= 60 && of_all <= 60, "s = {s}: {of_positions}, {of_all} evaluations a stage");
             }
-        }
-    }
-
-    /// A run reports the failure of such a step and keeps the state before it.
-    #[test]
-    fn a_run_ends_before_the_step_that_has_no_solution() {
-        for claims in [
-            Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() },
-            Structure::default(),
-        ] {
-            let cubic = OnLine::from(Cubic { count: AtomicUsize::new(0), claims });
-            let start = PhasePoint::new([1.0], [0.5], 0.2);
-            let problem = Problem::new(&cubic, 0.0, Start::Momentum(start, [0.5].into())).unwrap();
-            let mut run =
-                GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, check_resolution: false }).unwrap();
-            let halt = run.advance(3).unwrap_err();
-            assert!(halt.taken == 0 && matches!(halt.cause, StepError::NotConverged { .. }), "{halt:?}");
-            assert_eq!(run.state(), start);
         }
     }
 }

@@ -1,29 +1,32 @@
 //! Steps of contact Gauss collocation for a contact Hamiltonian.
 
-// Several arrays share an index.
-#![allow(clippy::needless_range_loop)]
-
+mod finish;
 mod iteration;
+mod kernel;
 mod newton;
 mod route;
+mod rows;
+mod simplified_newton;
+mod stage;
 mod tangent;
 
-use crate::gauss::limits::{MAX_UNCHECKED_FACTOR_CHANGE, MIN_JACOBIAN_AGE, SLOW_NEWTON};
-use crate::gauss::resolution::tail::{Tail, of_sigma};
-use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
+use crate::gauss::system::{CollocationSystem, PointRef, SystemAtPoints};
+use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON};
+use crate::gauss::resolution::tail::Tail;
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
-use crate::numbers::array::from_fn;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite, values};
-use crate::numbers::lanes::{Lanes, branched};
-use crate::numbers::registers::{Stages, blocks};
-use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{
-    Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, numbers::max_or_nan, support::rounding_at_state,
-};
-use newton::{FullNewton, SimplifiedNewton};
-use pulp::Simd;
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::registers::Stages;
+use contact_geom::numbers::max_abs_or_nan;
+use finish::{Extrapolate, FinishStep};
+pub(crate) use kernel::HamiltonianKernel;
+use kernel::IterationStart;
+use newton::FullNewton;
+use rows::StageRows;
+use simplified_newton::SimplifiedNewton;
+use stage::{Evaluation, Stage};
 pub(crate) use tangent::{StepDerivatives, step_derivatives, step_jacobian};
 
 /// The number of steps for which `H_pp` is kept: its evaluation by dual numbers costs up to as much as a step.
@@ -41,28 +44,18 @@ const PP_AGE: u32 = 8;
 /// with the values of the right-hand sides at the stages as the unknowns.
 ///
 /// With an applied force f, `f - H_q` is in the place of `-H_q`.
-pub(crate) struct HamiltonianStages<'a, L, const N: usize> {
-    pub lagrangian: &'a L,
-    pub table: StageTable,
-    /// The right-hand sides, multiplied by the weights `h b`: `H_p`, `-rho H_q`, `p . H_p - H` and `-rho H_z`.
-    moved: [Stages; N],
-    force: [Stages; N],
-    l: Stages,
-    rate: Stages,
-    /// The velocities `H_p`.
-    v: [Stages; N],
-    /// The stages: positions, momenta, actions, `1 - rho`.
-    x: [Stages; N],
-    p_stages: [Stages; N],
-    z_stages: Stages,
-    one_minus_rho_stages: Stages,
-    pub q: [CompensatedSum; N],
-    pub p: [CompensatedSum; N],
-    pub z: CompensatedSum,
+pub(crate) struct HamiltonianStages {
+    table: StageTable,
+    arch: Instructions,
+    rows: StageRows,
+    q: Vec<CompensatedSum>,
+    p: Vec<CompensatedSum>,
+    z: CompensatedSum,
     /// `1 - rho` at the end of the last step.
     one_minus_rho: f64,
-    /// `H_pp` at an earlier state, by which velocities follow momenta within an iteration, and the number of steps since.
-    pp: Box<SMatrix<f64, N, N>>,
+    /// `H_pp` at an earlier state by columns, by which velocities follow momenta within an iteration, and the number of
+    /// steps since.
+    pp: Vec<f64>,
     pp_age: u32,
     /// The least values with which changes of momenta and of the action are compared: 0, and in a step whose iteration does
     /// not converge otherwise, those of which the round-off of `h H_q` and `h (p . H_p - H)` is one unit.
@@ -80,31 +73,31 @@ pub(crate) struct HamiltonianStages<'a, L, const N: usize> {
     tail: Tail,
     defect: f64,
     /// The velocity at the last stage of the last successful step, or at the start.
-    known: [f64; N],
+    known: Vec<f64>,
     evaluations: u64,
+    /// The increments of positions and momenta in a step.
+    increments: [Vec<Unevaluated>; 2],
+    /// The stage at which H is evaluated outside of the iteration, and the workspace for it.
+    stage: Stage,
+    evaluation: Evaluation,
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
-    /// The steps from a state with its velocity.
-    pub fn new(lagrangian: &'a L, table: StageTable, state: &PhasePoint<N>, v: &SVector<f64, N>) -> Self {
-        let tail = Tail::new(table.s);
+impl HamiltonianStages {
+    /// The steps from a state `(q, p, z)` with its velocity.
+    pub fn new(system: &dyn SystemAtPoints, table: StageTable, state: PointRef<'_>, v: &[f64]) -> Self {
+        let n = state.q.len();
+        let sums = |x: &[f64]| x.iter().map(|x| CompensatedSum::from(*x)).collect();
+        let increments = || vec![Unevaluated::default(); n];
         HamiltonianStages {
-            lagrangian,
+            tail: Tail::new(table.s),
             table,
-            moved: [Stages::ZERO; N],
-            force: [Stages::ZERO; N],
-            l: Stages::ZERO,
-            rate: Stages::ZERO,
-            v: [Stages::ZERO; N],
-            x: [Stages::ZERO; N],
-            p_stages: [Stages::ZERO; N],
-            z_stages: Stages::ZERO,
-            one_minus_rho_stages: Stages::ZERO,
-            q: from_fn(|d| state.q[d].into()),
-            p: from_fn(|d| state.p[d].into()),
+            arch: Instructions::new(),
+            rows: StageRows::zeros(n),
+            q: sums(state.q),
+            p: sums(state.v),
             z: state.z.into(),
             one_minus_rho: 0.0,
-            pp: Box::new(SMatrix::zeros()),
+            pp: vec![0.0; n * n],
             pp_age: PP_AGE,
             least: [0.0; 2],
             warm: false,
@@ -113,86 +106,76 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
             suspended_newton: None,
             age: 0,
             full_newton: None,
-            tail,
             defect: 0.0,
-            known: (*v).into(),
+            known: v.to_vec(),
             evaluations: 0,
+            increments: [increments(), increments()],
+            stage: Stage::zeros(n),
+            evaluation: Evaluation::of(system),
         }
     }
 
-    /// The state at the start of the next step.
-    pub fn phase_point(&self) -> PhasePoint<N> {
-        PhasePoint { q: values(&self.q).into(), p: values(&self.p).into(), z: self.z.value }
+    /// The number of components of y = (q, P, z, 1 - rho).
+    fn components(&self) -> usize {
+        2 * self.q.len() + 2
     }
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
-    #[inline(always)]
-    pub fn take_step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
+    fn take_step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
         let (solved, warm) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.warm));
         if !solved {
-            self.renew_pp(t);
+            self.renew_pp(system, t);
             if warm {
-                self.extrapolate::<S>();
+                self.arch.dispatch(Extrapolate { stages: self });
             }
-            if self.newton.is_some() {
-                self.keep_iterate(warm);
-            }
+            self.keep_iterate(warm);
         }
-        let new_iteration = || FixedPointIteration::until(1.0, 0.25);
-        let mut iteration = new_iteration();
-        let mut first = true;
         self.least = [0.0; 2];
-        // H is evaluated at one place in the code, so that it is inlined into this loop and compiled for its instruction
-        // set.
-        loop {
-            let by_newton = !first && self.newton.is_some();
-            if by_newton {
-                self.correct();
-            }
-            let change = if first && !solved && !warm {
+        let mut start = match (solved, warm) {
+            (true, _) => IterationStart::Solution,
+            (_, true) => IterationStart::Extrapolated,
+            _ => {
                 self.rest_stages();
-                f64::INFINITY
-            } else {
-                self.move_stages::<S>(!first && !by_newton)
-            };
-            self.evaluate::<S>(t);
-            if solved {
-                let outcome = self.finish::<S>();
-                self.assess_resolution::<S>(f64::INFINITY);
-                return outcome;
+                IterationStart::AtRest
             }
-            if std::mem::take(&mut first) {
-                continue;
-            }
-            match iteration.assess(change, 1.0) {
-                IterationOutcome::Continue => {}
+        };
+        loop {
+            let (outcome, iteration) = system.solve_hamiltonian_stages(self.arch, t, start, self);
+            match outcome {
+                IterationOutcome::Done if solved => return self.finish_step(f64::INFINITY),
                 IterationOutcome::Done => {
-                    let outcome = self.finish::<S>();
-                    self.assess_resolution::<S>(iteration.first());
+                    let outcome = self.finish_step(iteration.first());
                     self.age = self.age.saturating_add(1);
                     if self.newton.is_some() && iteration.count() > SLOW_NEWTON && self.age > MIN_JACOBIAN_AGE {
-                        self.renew(t);
+                        self.renew(system, t);
                     }
                     return outcome;
                 }
-                IterationOutcome::Slow { .. } if self.least == [0.0; 2] && self.admit_round_off(t) => {
-                    iteration = new_iteration();
+                // The convergence test starts again.
+                IterationOutcome::Slow { .. } if self.least == [0.0; 2] && self.admit_round_off(system, t) => {
+                    start = IterationStart::LastIterate;
                 }
                 refused => return refused,
             }
         }
     }
 
+    /// The end of the step from its stages, and its defect; `first` is the relative error of its predictor.
+    fn finish_step(&mut self, first: f64) -> IterationOutcome {
+        self.arch.dispatch(FinishStep { stages: self, first })
+    }
+
     /// Admits changes of the size of the round-off of the forces and of L at the start of the step, as at an equilibrium,
     /// where forces cancel and momenta vanish. Returns whether there is any.
     #[cold]
     #[inline(never)]
-    fn admit_round_off(&mut self, t: f64) -> bool {
-        let state = self.phase_point();
-        let x = VelocityPoint { q: state.q, v: SVector::from(self.known), z: state.z };
-        let (of_l, of_gradient) = rounding_at_state(self.lagrangian, t, &x, &state);
+    fn admit_round_off(&mut self, system: &dyn SystemAtPoints, t: f64) -> bool {
+        self.take_state(t);
+        let Stage { q, scaled_p: p, z, .. } = &self.stage;
+        let of_gradient = &mut self.evaluation.derivatives.gradient;
+        let of_l = system.rounding_at_state(t, PointRef { q, v: &self.known, z: *z }, p, of_gradient);
         let least =
-            [max_abs_or_nan(of_gradient.x.iter().copied()), of_l].map(|once| self.table.h.abs() * once / f64::EPSILON);
+            [max_abs_or_nan(of_gradient.q.iter().copied()), of_l].map(|once| self.table.h.abs() * once / f64::EPSILON);
         let is_usable = least.iter().all(|e| e.is_finite()) && least.iter().any(|e| *e > 0.0);
         if is_usable {
             self.least = least;
@@ -201,108 +184,48 @@ impl<'a, L: Lagrangian<N>, const N: usize> HamiltonianStages<'a, L, N> {
     }
 
     /// Evaluates `H_pp` at the state, where it is old.
-    #[inline(always)]
-    fn renew_pp(&mut self, t: f64) {
+    fn renew_pp(&mut self, system: &dyn SystemAtPoints, t: f64) {
         self.pp_age += 1;
         if self.pp_age > PP_AGE {
             self.pp_age = 0;
-            self.evaluate_pp(t);
+            self.evaluate_pp(system, t);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn evaluate_pp(&mut self, t: f64) {
-        let pp = self.lagrangian.hamiltonian_hessian(t, &self.phase_point()).map_or(SMatrix::zeros(), |h| h.vv);
+    fn evaluate_pp(&mut self, system: &dyn SystemAtPoints, t: f64) {
+        self.take_state(t);
+        let derivatives = &mut self.evaluation.derivatives;
+        let known = system.hamiltonian_derivatives(t, self.stage.phase_point(), derivatives);
+        let pp = derivatives.vv.as_slice();
         // Where it is not finite, velocities follow in the next evaluation.
-        *self.pp = if pp.iter().all(|e| e.is_finite()) { pp } else { SMatrix::zeros() };
+        if known && pp.iter().all(|e| e.is_finite()) {
+            self.pp.copy_from_slice(pp);
+        } else {
+            self.pp.fill(0.0);
+        }
+    }
+
+    /// Sets the stage of the workspace to the state, where rho = 1.
+    fn take_state(&mut self, t: f64) {
+        let stage = &mut self.stage;
+        copy_values(&self.q, &mut stage.q);
+        copy_values(&self.p, &mut stage.scaled_p);
+        (stage.t, stage.z, stage.one_minus_rho) = (t, self.z.value, 0.0);
+        stage.set_momentum();
     }
 
     /// The stages of a motion at rest, from which the iteration of a first step starts.
     fn rest_stages(&mut self) {
-        for d in 0..N {
-            self.x[d] = Stages([self.q[d].value; MAX_STAGES]);
-            self.p_stages[d] = Stages([self.p[d].value; MAX_STAGES]);
+        let n = self.q.len();
+        // The velocities, which come first, are those of the last evaluation.
+        let positions_and_momenta = &mut self.rows.stages_mut()[n..];
+        for (stages, start) in positions_and_momenta.iter_mut().zip(self.q.iter().chain(&self.p).chain([&self.z])) {
+            *stages = Stages([start.value; MAX_STAGES]);
         }
-        self.z_stages = Stages([self.z.value; MAX_STAGES]);
-        self.one_minus_rho_stages = Stages::ZERO;
-    }
-
-    /// The predictor of a step: extrapolates the polynomials of the last step. rho is 1 at the start of each step.
-    #[inline(always)]
-    fn extrapolate<S: Simd>(&mut self) {
-        let (s, renewed) = (self.table.s, 1.0 / (1.0 - self.one_minus_rho));
-        let map = self.table.extrapolation_weighted;
-        let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
-        for (x, factor) in scaled.chain(self.moved.iter_mut().chain([&mut self.l]).map(|x| (x, 1.0))) {
-            let before = *x;
-            map.apply(&before, s, x, Lanes::<S>::splat(0.0));
-            for r in 0..blocks::<S>(s) {
-                x.set(r, x.block::<S>(r) * factor);
-            }
-        }
-    }
-
-    /// The end of the step from its stages.
-    #[inline(always)]
-    fn finish<S: Simd>(&mut self) -> IterationOutcome {
-        let s = self.table.s;
-        let (one_minus_rho, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
-        let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
-        for r in 0..blocks::<S>(s) {
-            deepest = deepest.max(self.one_minus_rho_stages.block::<S>(r));
-        }
-        let rho = 1.0 - deepest.reduce_max();
-        if rho <= 0.0 {
-            return IterationOutcome::StageFactor { rho };
-        }
-        if one_minus_rho >= 1.0 {
-            return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
-        }
-        // sigma_d - 1: adding this to 1 would round it if the rate is small.
-        let grow = one_minus_rho / (1.0 - one_minus_rho);
-        let (mut dq, mut dp) = ([Unevaluated::default(); N], [Unevaluated::default(); N]);
-        for d in 0..N {
-            dq[d] = Unevaluated { head: self.moved[d].sum::<S>(s), tail: 0.0 };
-            let pushed = self.force[d].sum::<S>(s);
-            dp[d] = Unevaluated { head: pushed, tail: grow * (pushed + self.p[d].value) };
-        }
-        if branched() {
-            return IterationOutcome::Branched;
-        }
-        let dz = Unevaluated { head: dz, tail: 0.0 };
-        // The maximum over lanes may hide a NaN; a NaN in `one_minus_rho` shows in `dp`.
-        if !finite(&dq, &dp, dz) || !one_minus_rho.is_finite() {
-            return IterationOutcome::NonFinite;
-        }
-        add(&mut self.q, &dq);
-        add(&mut self.p, &dp);
-        self.z.add(dz);
-        self.one_minus_rho = one_minus_rho;
-        for d in 0..N {
-            self.known[d] = self.v[d].0[s - 1];
-        }
-        self.warm = true;
-        IterationOutcome::Done
-    }
-
-    /// Sets the defect of the last step, of velocities, momenta and the conformal factor. `first` is the relative error
-    /// of its predictor; the stages are checked only if it is large.
-    #[inline(always)]
-    fn assess_resolution<S: Simd>(&mut self, first: f64) {
-        self.defect = 0.0;
-        if first > MIN_CHECKED_CHANGE {
-            let of_velocities = self.tail.defect::<S>(&self.v, None, &self.x, self.table.h);
-            let of_momenta = self.tail.defect::<S>(&self.p_stages, None, &self.p_stages, 1.0);
-            self.defect = max_or_nan(of_velocities, of_momenta);
-        }
-        if first > MIN_CHECKED_CHANGE || self.one_minus_rho.abs() > MAX_UNCHECKED_FACTOR_CHANGE {
-            let one = Lanes::<S>::splat(1.0);
-            let mut integral = Lanes::<S>::splat(0.0);
-            for r in 0..blocks::<S>(self.table.s) {
-                integral += self.rate.block::<S>(r) / (one - self.one_minus_rho_stages.block(r));
-            }
-            self.defect = max_or_nan(self.defect, of_sigma(1.0 / (1.0 - self.one_minus_rho), integral.sum()));
+        if let Some(one_minus_rho) = positions_and_momenta.last_mut() {
+            *one_minus_rho = Stages::ZERO;
         }
     }
 }

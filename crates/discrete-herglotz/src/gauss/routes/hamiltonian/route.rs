@@ -1,58 +1,45 @@
 //! The steps of a contact Hamiltonian as a route.
 
 use crate::StepError;
-use crate::gauss::dense::{Solved, SolvedStep, StepStart};
-use crate::gauss::resolution::defect_sample::Curve;
+use crate::gauss::curve::Curve;
+use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
-use crate::gauss::routes::hamiltonian::newton::SimplifiedNewton;
-use crate::gauss::routes::{RouteState, StageRoute, set_compensation};
+use crate::gauss::routes::hamiltonian::simplified_newton::SimplifiedNewton;
+use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::stages::fixed_point::IterationOutcome;
-use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::work_summary::GaussRoute;
-use crate::numbers::array::from_fn;
 use crate::numbers::registers::Stages;
-use crate::numbers::state_words::{load_option, save_option, saved};
-use contact_geom::Lagrangian;
-use contact_geom::nalgebra::SVector;
-use pulp::Simd;
+use crate::numbers::state_words::{Saved, load_option, save_option};
 
-impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
-    /// Divides stage values by the weights, and pads them with 0.
-    fn unweighted(&self, x: &Stages) -> [f64; MAX_STAGES] {
-        from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
-    }
-
-    /// The stages of the last step.
-    fn solution(&self) -> Solved<N> {
-        Solved {
-            v: self.moved.each_ref().map(|x| self.unweighted(x)),
-            force: self.force.each_ref().map(|x| self.unweighted(x)),
-            rate: self.unweighted(&self.rate),
-            l: self.unweighted(&self.l),
+impl HamiltonianStages {
+    /// Copies the right-hand sides of the last step.
+    fn copy_stages(&self, [v, force]: [&mut [Stages]; 2], [rate, l]: [&mut Stages; 2]) {
+        let unweighted = |x: &Stages| Solved::unweighted(x, &self.table.weights, self.table.s);
+        for (to, x) in v.iter_mut().zip(self.rows.moved()).chain(force.iter_mut().zip(self.rows.force())) {
+            *to = unweighted(x);
         }
+        (*rate, *l) = (unweighted(self.rows.rate()), unweighted(self.rows.l()));
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for HamiltonianStages<'_, L, N> {
+impl StageRoute for HamiltonianStages {
     fn route(&self) -> GaussRoute {
         GaussRoute::Hamiltonian
     }
 
-    #[inline(always)]
-    fn state(&self) -> RouteState<'_, N> {
+    fn state(&self) -> RouteState<'_> {
         RouteState { q: &self.q, y: &self.p, z: self.z }
     }
 
-    fn set_compensation(&mut self, terms: &StepStart<N>) {
-        set_compensation((&mut self.q, &mut self.p, &mut self.z), terms);
+    fn state_mut(&mut self) -> RouteStateMut<'_> {
+        RouteStateMut { q: &mut self.q, y: &mut self.p, z: &mut self.z }
     }
 
-    #[inline(always)]
-    fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
-        self.take_step::<S>(t)
+    fn step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
+        self.take_step(system, t)
     }
 
-    #[inline(always)]
     fn defect(&self) -> f64 {
         self.defect
     }
@@ -65,49 +52,76 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for HamiltonianStages<'_, L
         self.evaluations
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        Some(SVector::from(self.known))
+    fn last_velocity(&self) -> Option<&[f64]> {
+        Some(&self.known)
     }
 
-    fn reserve_newton(&mut self) {
+    fn reserve_newton(&mut self, _system: &dyn CollocationSystem) {
         self.reserve();
     }
 
-    fn linearise_at_state(&mut self, t: f64) -> bool {
-        let x = self.phase_point();
-        self.linearise(t, &x)
+    fn linearise_at_state(&mut self, system: &dyn CollocationSystem, t: f64) -> bool {
+        self.linearise_at(system, t)
     }
 
     fn suspend_newton(&mut self) {
-        self.suspended_newton = self.newton.take();
+        if let Some(newton) = self.newton.take() {
+            self.suspended_newton = Some(newton);
+        }
     }
 
-    fn solve_stages(&mut self, t: f64) -> Result<(), StepError> {
-        self.solve(t)
+    fn solve_stages(&mut self, system: &dyn CollocationSystem, t: f64) -> Result<(), StepError> {
+        self.solve(system, t)
     }
 
-    fn solved(&self, _step: &SolvedStep<'_, N>) -> Solved<N> {
-        self.solution()
+    fn solved(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, _wants_l: bool) -> Solved {
+        let mut solved = Solved::zeros(self.q.len());
+        let Solved { v, force, rate, l, .. } = &mut solved;
+        self.copy_stages([v, force], [rate, l]);
+        solved
     }
 
-    #[inline(always)]
-    fn collect<S: Simd>(&self, _step: &SolvedStep<'_, N>, curve: &mut Curve<N>) {
-        curve.of_solved(&self.solution());
+    fn collect(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, curve: &mut Curve) {
+        self.copy_stages([&mut curve.v, &mut curve.force], [&mut curve.rate, &mut curve.l]);
     }
 }
 
-saved!([L, const N: usize] HamiltonianStages<'_, L, N> {
-    moved, force, l, rate, pp, pp_age, v, x, p_stages, z_stages, one_minus_rho_stages, q, p, z, one_minus_rho, warm, solved, age,
-    defect, known, evaluations,
-} and save_newton, load_newton);
-
-impl<L, const N: usize> HamiltonianStages<'_, L, N> {
-    fn save_newton(&self, to: &mut Vec<u64>) {
+impl Saved for HamiltonianStages {
+    fn save(&self, to: &mut Vec<u64>) {
+        self.rows.right_hand_sides().save(to);
+        self.pp.save(to);
+        self.pp_age.save(to);
+        self.rows.stages().save(to);
+        self.q.save(to);
+        self.p.save(to);
+        self.z.save(to);
+        self.one_minus_rho.save(to);
+        self.warm.save(to);
+        self.solved.save(to);
+        self.age.save(to);
+        self.defect.save(to);
+        self.known.save(to);
+        self.evaluations.save(to);
         save_option(self.newton.as_deref(), to);
     }
 
-    fn load_newton(&mut self, from: &mut &[u64]) -> Option<()> {
-        self.newton = load_option(from, || SimplifiedNewton::new(&self.table, 2 * N + 2))?.map(Box::new);
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.rows.right_hand_sides_mut().load(from)?;
+        self.pp.load(from)?;
+        self.pp_age.load(from)?;
+        self.rows.stages_mut().load(from)?;
+        self.q.load(from)?;
+        self.p.load(from)?;
+        self.z.load(from)?;
+        self.one_minus_rho.load(from)?;
+        self.warm.load(from)?;
+        self.solved.load(from)?;
+        self.age.load(from)?;
+        self.defect.load(from)?;
+        self.known.load(from)?;
+        self.evaluations.load(from)?;
+        let components = self.components();
+        self.newton = load_option(from, || SimplifiedNewton::new(&self.table, components))?.map(Box::new);
         Some(())
     }
 }

@@ -1,17 +1,21 @@
 //! The derivatives of a step in the state at its start, in parameters, in its time and in its length.
 
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
-use crate::gauss::routes::hamiltonian::newton::Stage;
+use crate::gauss::routes::hamiltonian::newton::factorise;
+use crate::gauss::routes::hamiltonian::stage::Stage;
+use crate::gauss::stages::product::dot;
+use crate::gauss::system::{CollocationSystem, Gradient, PointRef, SystemAtPoints, Typed, vector_of};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::integration::QuantityDerivatives;
-use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::solve::DenseLu;
 use crate::{Problem, StepError};
-use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::nalgebra::DMatrix;
 use contact_geom::{ChartVector, Lagrangian, PhasePoint};
-use pulp::{Simd, WithSimd};
 
 /// The derivatives of the end of a step.
 pub(crate) struct StepDerivatives<const N: usize> {
@@ -24,6 +28,22 @@ pub(crate) struct StepDerivatives<const N: usize> {
 /// The derivatives of H, of its gradient and of the force at a stage, in each parameter and in the time.
 pub(crate) type Explicit<'e, const N: usize> = &'e mut dyn FnMut(f64, &PhasePoint<N>) -> Vec<QuantityDerivatives<N>>;
 
+/// The same derivatives as [`StepDerivatives`], with the coordinates q, p, z in this order.
+struct Columns {
+    state: Vec<Vec<f64>>,
+    sources: Vec<Vec<f64>>,
+}
+
+/// The derivatives of H, of its gradient and of the force with respect to a quantity.
+struct ExplicitDerivatives {
+    value: f64,
+    gradient: Gradient,
+    force: Vec<f64>,
+}
+
+/// Those in each parameter and in the time, at a stage.
+type AtStage<'e> = &'e mut dyn FnMut(f64, PointRef<'_>) -> Vec<ExplicitDerivatives>;
+
 /// The derivative of the end of a step in (q, p, z) at its start, as a matrix with the coordinates in this order.
 ///
 /// # Errors
@@ -32,10 +52,11 @@ pub(crate) fn step_jacobian<L: Lagrangian<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
     s: usize,
     h: f64,
-    at: (f64, &PhasePoint<N>),
+    (t, start): (f64, &PhasePoint<N>),
 ) -> Result<DMatrix<f64>, StepError> {
-    let columns = step_derivatives(problem.lagrangian, s, h, at, None)?.state;
-    Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| columns[j].component(i)))
+    let system = Typed::<L, N>(problem.lagrangian);
+    let columns = derivatives(&system, StageTable::new(s, h), (t, point_of(start)), None)?.state;
+    Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| columns[j][i]))
 }
 
 /// The derivatives of a step of length h from a time and a state; in parameters, time and length if `explicit` is given.
@@ -53,136 +74,150 @@ pub(crate) fn step_derivatives<L: Lagrangian<N>, const N: usize>(
     (t, start): (f64, &PhasePoint<N>),
     explicit: Option<Explicit<'_, N>>,
 ) -> Result<StepDerivatives<N>, StepError> {
-    let v = SVector::zeros();
-    let mut stages = HamiltonianStages::new(lagrangian, StageTable::new(s, h), start, &v);
-    let outcome = Instructions::new().dispatch(OneStep { stages: &mut stages, t });
-    if outcome != IterationOutcome::Done {
-        stages = HamiltonianStages::new(lagrangian, StageTable::new(s, h), start, &v);
-        stages.solve(t)?;
-        match Instructions::new().dispatch(OneStep { stages: &mut stages, t }) {
+    let (system, table, from) = (Typed::<L, N>(lagrangian), StageTable::new(s, h), (t, point_of(start)));
+    let columns = match explicit {
+        None => derivatives(&system, table, from, None),
+        Some(explicit) => {
+            let mut at_stage = |t: f64, x: PointRef<'_>| {
+                let state = PhasePoint { q: vector_of(x.q), p: vector_of(x.v), z: x.z };
+                explicit(t, &state).iter().map(ExplicitDerivatives::of).collect()
+            };
+            derivatives(&system, table, from, Some(&mut at_stage))
+        }
+    }?;
+    let [state, sources] = [columns.state, columns.sources]
+        .map(|columns| columns.iter().map(|column| ChartVector::from_fn(|i| column[i])).collect());
+    Ok(StepDerivatives { state, sources })
+}
+
+fn point_of<const N: usize>(x: &PhasePoint<N>) -> PointRef<'_> {
+    PointRef { q: x.q.as_slice(), v: x.p.as_slice(), z: x.z }
+}
+
+/// The derivatives of a step from a time and a state.
+fn derivatives(
+    system: &dyn CollocationSystem,
+    table: StageTable,
+    (t, start): (f64, PointRef<'_>),
+    explicit: Option<AtStage<'_>>,
+) -> Result<Columns, StepError> {
+    let (s, h, v) = (table.s, table.h, vec![0.0; start.q.len()]);
+    let mut stages = HamiltonianStages::new(system, table, start, &v);
+    forget_branches();
+    if stages.take_step(system, t) != IterationOutcome::Done {
+        stages = HamiltonianStages::new(system, StageTable::new(s, h), start, &v);
+        stages.solve(system, t)?;
+        forget_branches();
+        match stages.take_step(system, t) {
             IterationOutcome::Done => {}
             refused => return Err(refused.into()),
         }
     }
-    stages.derivatives_of_last_step(t, start, explicit)
+    stages.derivatives_of_last_step(system, t, start.v, explicit)
 }
 
-/// One step, compiled for one instruction set.
-struct OneStep<'b, 'a, L, const N: usize> {
-    stages: &'b mut HamiltonianStages<'a, L, N>,
-    t: f64,
-}
-
-impl<L: Lagrangian<N>, const N: usize> WithSimd for OneStep<'_, '_, L, N> {
-    type Output = IterationOutcome;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> IterationOutcome {
-        forget_branches();
-        self.stages.take_step::<S>(self.t)
-    }
-}
-
-impl<L: Lagrangian<N>, const N: usize> HamiltonianStages<'_, L, N> {
+impl HamiltonianStages {
+    /// The derivatives of the last step, which began at the time t with the momentum p.
     fn derivatives_of_last_step(
-        &self,
+        &mut self,
+        system: &dyn SystemAtPoints,
         t: f64,
-        start: &PhasePoint<N>,
-        explicit: Option<Explicit<'_, N>>,
-    ) -> Result<StepDerivatives<N>, StepError> {
-        let (s, n) = (self.table.s, Self::COMPONENTS);
-        let weight = |i: usize| self.table.weights.0[i];
-        let stages: Vec<Stage<N>> = (0..s).map(|i| self.stage_of_last_step(t, i)).collect();
-        let mut jacobians = vec![vec![0.0; n * n]; s];
+        start_p: &[f64],
+        explicit: Option<AtStage<'_>>,
+    ) -> Result<Columns, StepError> {
+        let (s, n, components) = (self.table.s, self.q.len(), self.components());
+        let stages: Vec<Stage> = (0..s).map(|i| self.stage_of_last_step(t, i)).collect();
+        let mut jacobians = vec![vec![0.0; components * components]; s];
         for (stage, jacobian) in stages.iter().zip(&mut jacobians) {
-            self.jacobian(stage, jacobian);
+            self.evaluation.jacobian(system, stage, jacobian);
         }
-        let mut lu = DenseLu::new(s * n);
-        lu.factorise(|row, column| {
-            let ((i, c), (j, e)) = ((row / n, row % n), (column / n, column % n));
-            let own = if row == column { 1.0 } else { 0.0 };
-            own - weight(i) * self.table.m.0[j].0[i] * jacobians[i][e * n + c]
-        })?;
+        let mut lu = DenseLu::new(s * components);
+        factorise(&mut lu, &self.table, &jacobians, components)?;
+        let (weights, rows) = (&self.table.weights.0, &self.rows);
         // The momentum at the end is `P / rho`.
         let sum = |of: &dyn Fn(usize) -> f64| (0..s).map(of).sum::<f64>();
-        let rho = 1.0 - sum(&|i| self.rate.0[i]);
-        let p = SVector::<f64, N>::from_fn(|d, _| start.p[d] + sum(&|i| self.force[d].0[i])) / rho;
+        let rho = 1.0 - sum(&|i| rows.rate().0[i]);
+        let p: Vec<f64> = (0..n).map(|d| (start_p[d] + sum(&|i| rows.force()[d].0[i])) / rho).collect();
         // The change of the end from that of the start and the known terms of that of the right-hand sides.
-        let mut end = |start: &ChartVector<N>, mut change: Vec<f64>| {
+        let mut end = |start: &dyn Fn(usize) -> f64, mut change: Vec<f64>| {
             lu.solve(&mut change)?;
-            let total = |c: usize| sum(&|i| change[i * n + c]);
-            let fallen = total(2 * N + 1);
-            let end = ChartVector {
-                x: start.x + SVector::from_fn(|d, _| total(d)),
-                y: (start.y + SVector::from_fn(|d, _| total(N + d)) + p * fallen) / rho,
-                z: start.z + total(2 * N),
-            };
-            if end.is_finite() { Ok(end) } else { Err(StepError::NonFinite) }
+            let total = |c: usize| sum(&|i| change[i * components + c]);
+            let fallen = total(2 * n + 1);
+            let mut end = vec![0.0; 2 * n + 1];
+            for d in 0..n {
+                end[d] = start(d) + total(d);
+                end[n + d] = (start(n + d) + total(n + d) + p[d] * fallen) / rho;
+            }
+            end[2 * n] = start(2 * n) + total(2 * n);
+            if end.iter().all(|e| e.is_finite()) { Ok(end) } else { Err(StepError::NonFinite) }
         };
-        let mut state = Vec::with_capacity(2 * N + 1);
-        for column in 0..=2 * N {
-            let unit = ChartVector::from_fn(|i| f64::from(u8::from(i == column)));
-            let known = (0..s * n).map(|row| weight(row / n) * jacobians[row / n][column * n + row % n]);
+        let mut state = Vec::with_capacity(2 * n + 1);
+        for column in 0..=2 * n {
+            let unit = |i: usize| f64::from(u8::from(i == column));
+            let known = (0..s * components).map(|row| {
+                let (i, c) = (row / components, row % components);
+                weights[i] * jacobians[i][column * components + c]
+            });
             state.push(end(&unit, known.collect())?);
         }
         let mut sources = Vec::new();
         if let Some(explicit) = explicit {
-            let still = ChartVector::from_fn(|_| 0.0);
-            let at_stages: Vec<_> = stages.iter().map(|stage| explicit(stage.t, &stage.phase_point())).collect();
+            let still = |_: usize| 0.0;
+            let at_stages: Vec<_> = stages.iter().map(|stage| explicit(stage.t, stage.phase_point())).collect();
             let count = at_stages.first().map_or(0, Vec::len);
             let mut known = Vec::new();
             for quantity in 0..count {
-                known = vec![0.0; s * n];
+                known = vec![0.0; s * components];
                 for (i, (stage, of)) in stages.iter().zip(&at_stages).enumerate() {
-                    let out = &mut known[i * n..][..n];
+                    let out = &mut known[i * components..][..components];
                     stage.explicit_change(&of[quantity], out);
-                    out.iter_mut().for_each(|out| *out *= weight(i));
+                    out.iter_mut().for_each(|out| *out *= weights[i]);
                 }
                 sources.push(end(&still, known.clone())?);
             }
             // Those of the time are the last ones.
             let slope = |row: usize| {
-                let (i, c) = (row / n, row % n);
-                (self.right_hand_side_of_last_step(i, c) + self.table.times.0[i] * known[row]) / self.table.h
+                let (i, c) = (row / components, row % components);
+                (rows.right_hand_sides()[c].0[i] + self.table.times.0[i] * known[row]) / self.table.h
             };
-            sources.push(end(&still, (0..s * n).map(slope).collect())?);
+            sources.push(end(&still, (0..s * components).map(slope).collect())?);
         }
-        Ok(StepDerivatives { state, sources })
+        Ok(Columns { state, sources })
     }
 
-    fn stage_of_last_step(&self, t: f64, i: usize) -> Stage<N> {
-        let vector = |of: &dyn Fn(usize) -> f64| SVector::from_fn(|d, _| of(d));
-        let one_minus_rho = self.one_minus_rho_stages.0[i];
-        Stage {
-            t: t + self.table.times.0[i],
-            q: vector(&|d| self.x[d].0[i]),
-            scaled_p: vector(&|d| self.p_stages[d].0[i] * (1.0 - one_minus_rho)),
-            z: self.z_stages.0[i],
-            one_minus_rho,
+    fn stage_of_last_step(&self, t: f64, i: usize) -> Stage {
+        let (rows, mut stage) = (&self.rows, Stage::zeros(self.q.len()));
+        stage.t = t + self.table.times.0[i];
+        stage.z = rows.z().0[i];
+        stage.one_minus_rho = rows.one_minus_rho().0[i];
+        let rho = stage.rho();
+        for d in 0..self.q.len() {
+            stage.q[d] = rows.x()[d].0[i];
+            stage.scaled_p[d] = rows.p()[d].0[i] * rho;
         }
-    }
-
-    /// A component of the right-hand side at a stage, multiplied by the weight.
-    fn right_hand_side_of_last_step(&self, i: usize, c: usize) -> f64 {
-        match c {
-            c if c < N => self.moved[c].0[i],
-            c if c < 2 * N => self.force[c - N].0[i],
-            c if c == 2 * N => self.l.0[i],
-            _ => self.rate.0[i],
-        }
+        stage.set_momentum();
+        stage
     }
 }
 
-impl<const N: usize> Stage<N> {
+impl Stage {
     /// The change of the right-hand side for a fixed stage, from that of H.
-    fn explicit_change(&self, of: &QuantityDerivatives<N>, out: &mut [f64]) {
-        let QuantityDerivatives { l: of_h, gradient, force } = of;
-        let rho = self.rho();
-        for d in 0..N {
-            out[d] = gradient.y[d];
-            out[N + d] = rho * (force[d] - gradient.x[d]);
+    fn explicit_change(&self, of: &ExplicitDerivatives, out: &mut [f64]) {
+        let ExplicitDerivatives { value, gradient, force } = of;
+        let (n, rho) = (force.len(), self.rho());
+        for d in 0..n {
+            out[d] = gradient.v[d];
+            out[n + d] = rho * (force[d] - gradient.q[d]);
         }
-        out[2 * N] = self.phase_point().p.dot(&gradient.y) - of_h;
-        out[2 * N + 1] = -rho * gradient.z;
+        out[2 * n] = dot(self.phase_point().v, &gradient.v) - value;
+        out[2 * n + 1] = -rho * gradient.z;
+    }
+}
+
+impl ExplicitDerivatives {
+    fn of<const N: usize>(of: &QuantityDerivatives<N>) -> Self {
+        let QuantityDerivatives { l, gradient: ChartVector { x, y, z }, force } = of;
+        let [q, v, force] = [x, y, force].map(|part| part.as_slice().to_vec());
+        ExplicitDerivatives { value: *l, gradient: Gradient { q, v, z: *z }, force }
     }
 }

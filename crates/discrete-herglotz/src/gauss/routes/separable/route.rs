@@ -1,39 +1,35 @@
 //! The condensed step as a route.
 
 use crate::StepError;
-use crate::gauss::dense::{Solved, SolvedStep, StepStart};
-use crate::gauss::resolution::defect_sample::Curve;
-use crate::gauss::routes::separable::SeparableStages;
-use crate::gauss::routes::{RouteState, StageRoute, set_compensation};
-use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::curve::Curve;
+use crate::gauss::dense::{Solved, SolvedStep};
+use crate::gauss::routes::separable::Separable;
+use crate::gauss::routes::separable::vectors::Parts;
+use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
 use crate::gauss::stages::position_newton::{At, PositionNewton};
+use crate::gauss::system::CollocationSystem;
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::work_summary::GaussRoute;
-use crate::numbers::compensated::values;
+use crate::numbers::compensated::copy_values;
 use crate::numbers::registers::Stages;
-use contact_geom::Lagrangian;
-use contact_geom::nalgebra::SVector;
-use pulp::Simd;
 
-impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, N> {
+impl StageRoute for Separable {
     fn route(&self) -> GaussRoute {
         GaussRoute::Condensed
     }
 
-    #[inline(always)]
-    fn state(&self) -> RouteState<'_, N> {
+    fn state(&self) -> RouteState<'_> {
         RouteState { q: &self.q, y: &self.v, z: self.z }
     }
 
-    fn set_compensation(&mut self, terms: &StepStart<N>) {
-        set_compensation((&mut self.q, &mut self.v, &mut self.z), terms);
+    fn state_mut(&mut self) -> RouteStateMut<'_> {
+        RouteStateMut { q: &mut self.q, y: &mut self.v, z: &mut self.z }
     }
 
-    #[inline(always)]
-    fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
-        self.take_step::<S>(t)
+    fn step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
+        self.take_step(system, t)
     }
 
-    #[inline(always)]
     fn defect(&self) -> f64 {
         self.defect
     }
@@ -46,13 +42,15 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, 
         self.evaluations
     }
 
-    fn reserve_newton(&mut self) {
-        self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
+    fn reserve_newton(&mut self, _system: &dyn CollocationSystem) {
+        let (s, n) = (self.table.s, self.q.len());
+        self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(s, n)));
     }
 
-    fn linearise_at_state(&mut self, t: f64) -> bool {
+    fn linearise_at_state(&mut self, system: &dyn CollocationSystem, t: f64) -> bool {
         self.forget();
-        self.linearise(t, values(&self.q).into())
+        copy_values(&self.q, &mut self.point.q);
+        self.linearise(system, t)
     }
 
     fn suspend_newton(&mut self) {
@@ -61,39 +59,31 @@ impl<L: Lagrangian<N>, const N: usize> StageRoute<N> for SeparableStages<'_, L, 
     }
 
     /// The initial guess uses the forces of the step before, if they are known; otherwise it is a motion without forces.
-    fn solve_stages(&mut self, t: f64) -> Result<(), StepError> {
-        let positions = self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
-        let (q, v) = (SVector::from(values(&self.q)), SVector::from(values(&self.v)));
-        let inverse_mass = self.inverse_mass.as_deref();
-        positions.solve(&At { lagrangian: self.lagrangian, table: &self.table, inverse_mass, t, q, v })?;
-        self.rest = [Stages::ZERO; N];
+    fn solve_stages(&mut self, system: &dyn CollocationSystem, t: f64) -> Result<(), StepError> {
+        let n = self.q.len();
+        copy_values(&self.q, &mut self.point.q);
+        copy_values(&self.v, &mut self.point.v);
+        let positions = self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s, n)));
+        let (table, inverse_mass, q, v) = (&*self.table, self.inverse_mass.as_ref(), &self.point.q, &self.point.v);
+        positions.solve(&At { system, table, inverse_mass, t, q, v })?;
+        let Parts { left, rest, .. } = self.vectors.parts(n);
+        rest.fill(Stages::ZERO);
         for (i, (a, q)) in positions.stages().enumerate() {
-            for d in 0..N {
+            for ((rest, a), q) in rest.iter_mut().zip(a).zip(q) {
                 // The last stage is repeated in the padding.
-                self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
+                rest.0[i..].fill(a + left.kappa * q);
             }
         }
         self.solved = true;
         Ok(())
     }
 
-    fn solved(&self, step: &SolvedStep<'_, N>) -> Solved<N> {
-        Solved::from_accelerations(
-            self.lagrangian,
-            step,
-            &self.table,
-            [&self.a.map(|a| a.0), &self.x.map(|x| x.0)],
-            self.wants_z,
-        )
+    /// The values of L are known if z is advanced.
+    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool) -> Solved {
+        Solved::from_accelerations(system, step, &self.table, self.vectors.solved(), wants_l && self.wants_z)
     }
 
-    fn solved_without_action(&self, step: &SolvedStep<'_, N>) -> Option<Solved<N>> {
-        let stages = [&self.a.map(|a| a.0), &self.x.map(|x| x.0)];
-        Some(Solved::from_accelerations(self.lagrangian, step, &self.table, stages, false))
-    }
-
-    #[inline(always)]
-    fn collect<S: Simd>(&self, step: &SolvedStep<'_, N>, curve: &mut Curve<N>) {
-        curve.of_accelerations::<S, L>(self.lagrangian, step, &self.table, [&self.a, &self.x]);
+    fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve) {
+        curve.of_accelerations(system, step, &self.table, self.vectors.solved());
     }
 }

@@ -1,0 +1,122 @@
+//! A solved step as a curve, whose defect in Herglotz' equations is sampled between the nodes.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+mod between;
+mod comparison;
+mod sample;
+
+use crate::gauss::dense::{Solved, SolvedStep};
+use crate::gauss::system::CollocationSystem;
+use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::registers::{Scaled, Stages, blocks};
+use contact_geom::Scalar;
+use pulp::{Simd, WithSimd};
+pub(crate) use sample::SampleKernel;
+
+/// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
+/// transformation they are polynomials in tau, each multiplied by the rate dt/dtau.
+pub(crate) struct Curve {
+    pub s: usize,
+    pub t: f64,
+    pub h: f64,
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
+    pub z: f64,
+    pub v: Vec<Stages>,
+    pub force: Vec<Stages>,
+    pub rate: Stages,
+    pub l: Stages,
+    /// Whether z is part of the stage equations; if not, `l` holds L at `z = 0`.
+    pub acts: bool,
+    /// The rates of the time transformation at the start and at the end.
+    pub rates: [f64; 2],
+}
+
+impl Curve {
+    /// A curve with its start, and stages that are 0 until they are set.
+    pub fn new(s: usize, t: f64, h: f64, q: &[f64], p: &[f64], z: f64) -> Self {
+        let zero = || vec![Stages::ZERO; q.len()];
+        Curve {
+            s,
+            t,
+            h,
+            q: q.to_vec(),
+            p: p.to_vec(),
+            z,
+            v: zero(),
+            force: zero(),
+            rate: Stages::ZERO,
+            l: Stages::ZERO,
+            acts: true,
+            rates: [1.0; 2],
+        }
+    }
+
+    /// Sets the stages of a step in transformed time, and the rates of the time transformation at its ends.
+    pub fn of_transformed(&mut self, solved: &Solved, rates: [f64; 2]) {
+        self.of_solved(solved);
+        self.rates = rates;
+    }
+
+    /// Sets the stages of a step that has momenta and actions.
+    pub fn of_solved(&mut self, solved: &Solved) {
+        self.v.copy_from_slice(&solved.v);
+        self.force.copy_from_slice(&solved.force);
+        (self.rate, self.l) = (solved.rate, solved.l);
+    }
+
+    /// Sets the stages from the accelerations and positions of a condensed step.
+    pub fn of_accelerations(
+        &mut self,
+        system: &dyn CollocationSystem,
+        step: &SolvedStep<'_>,
+        table: &Condensed,
+        [a, x]: [&[Stages]; 2],
+    ) {
+        (self.acts, self.z) = (false, 0.0);
+        let arch = Instructions::new();
+        arch.dispatch(FromAccelerations { curve: self, step, table, a });
+        self.l = system.stage_values(arch, table.s, self.t, &table.times, x, &self.v);
+    }
+}
+
+/// The stages of a condensed step from its accelerations, without L.
+struct FromAccelerations<'b, 'r> {
+    curve: &'b mut Curve,
+    step: &'b SolvedStep<'r>,
+    table: &'b Condensed,
+    a: &'b [Stages],
+}
+
+impl WithSimd for FromAccelerations<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let FromAccelerations { curve, step, table, a } = self;
+        let n = a.len();
+        for d in 0..n {
+            let v0 = Lanes::<S>::splat(step.from.y[d]);
+            table.d.apply(&a[d], table.s, &mut curve.v[d], Scaled(&table.inverse_rho, v0));
+        }
+        for r in 0..blocks::<S>(table.s) {
+            let rho = table.inverse_rho.block::<S>(r).recip();
+            curve.rate.set(r, rho * table.gamma);
+            for i in 0..n {
+                let mut force = Lanes::<S>::splat(0.0);
+                for j in 0..n {
+                    let mass = match step.mass {
+                        Some(mass) => mass[(i, j)],
+                        None => f64::from(u8::from(i == j)),
+                    };
+                    force = a[j].block::<S>(r).mul_add(Lanes::splat(mass), force);
+                }
+                curve.force[i].set(r, force * rho);
+            }
+        }
+    }
+}

@@ -1,9 +1,0 @@
-//! The stages of a collocation step: their equations, and the iterations that solve them.
-
-pub(crate) mod equations;
-pub(crate) mod mass_matrix;
-pub(crate) mod position_newton;
-pub(crate) mod product;
-pub(crate) mod slope_newton;
-pub(crate) mod stage_newton;
-pub(crate) mod stage_values;

@@ -1,0 +1,237 @@
+//! The evaluation of the forces at the stages of a condensed step, compiled for each Lagrangian.
+
+use crate::gauss::routes::separable::Separable;
+use crate::gauss::routes::separable::slope::store_values;
+use crate::gauss::routes::separable::vectors::Parts;
+use crate::gauss::stages::stage_values::StageValues;
+use crate::gauss::system::Typed;
+use crate::gauss::limits::MAX_CHANGE_FOR_TAILS;
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
+use crate::gauss::tables::condensed::Preconditioned;
+use crate::numbers::compensated::CompensatedSum;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::registers::{Stages, blocks};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, vector};
+use pulp::{Simd, WithSimd};
+
+/// What is compiled for each Lagrangian.
+pub(crate) trait SeparableKernel {
+    /// Solves the stage equations of a step by fixed-point iteration, or by simplified Newton iteration.
+    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated;
+
+    /// `L(t, q, v, 0)` at the s stages of a step that begins at the time t.
+    fn stage_values(&self, arch: Instructions, s: usize, t: f64, times: &Stages, x: &[Stages], v: &[Stages]) -> Stages;
+}
+
+/// The start of an iteration; its initial guess is `rest`.
+#[derive(Clone, Copy)]
+pub(crate) struct IterationStart {
+    /// The time at the start of the step.
+    pub t: f64,
+    /// Whether `rest` is the solution.
+    pub solved: bool,
+    /// The weight of the terms with the tails of the matrices.
+    pub weight: f64,
+}
+
+/// The result of an iteration.
+pub(crate) struct Iterated {
+    /// [`Done`](IterationOutcome::Done), or the cause of failure.
+    pub outcome: IterationOutcome,
+    /// The convergence test after the last iteration.
+    pub iteration: FixedPointIteration,
+    /// The last change of the accelerations.
+    pub change: f64,
+}
+
+/// A Lagrangian that is given by a contact Hamiltonian has a route of its own, so that nothing is compiled for it here.
+impl<L: Lagrangian<N>, const N: usize> SeparableKernel for Typed<'_, L, N> {
+    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated {
+        if const { L::HINTS.hamiltonian } {
+            let (outcome, iteration) = (IterationOutcome::NonFinite, FixedPointIteration::default());
+            return Iterated { outcome, iteration, change: f64::NAN };
+        }
+        arch.dispatch(Iterate::<L, N> { lagrangian: self.0, run, start })
+    }
+
+    fn stage_values(&self, arch: Instructions, s: usize, t: f64, times: &Stages, x: &[Stages], v: &[Stages]) -> Stages {
+        if const { L::HINTS.hamiltonian } {
+            return Stages::ZERO;
+        }
+        arch.dispatch(StageValues::<L, N> { lagrangian: self.0, s, t, times, x, v })
+    }
+}
+
+/// The kernel of [`SeparableKernel::iterate`].
+struct Iterate<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    run: &'a mut Separable,
+    start: IterationStart,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
+    type Output = Iterated;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Iterated {
+        let Iterate { lagrangian, run, start: IterationStart { t, solved, weight } } = self;
+        let Separable { arch, table, vectors, inverse_mass, q, v, far, newton, before, evaluations, .. } = run;
+        let (s, m, state) = (table.s, blocks::<S>(table.s), [&q[..N], &v[..N]]);
+        let Parts { left, rest, x, a, base } = vectors.parts(N);
+        let (times, inverse_mass, kappa) = (&table.times, inverse_mass.as_ref(), left.kappa);
+        let mut stages = StageForces::<L, N> { lagrangian, times, t, kappa, inverse_mass, x, rest, a };
+        let mut newton = newton.as_deref_mut();
+        // Terms below round-off are added from the second iteration on; computed beside the forces of the first one
+        // they cost little. If the initial guess is poor, the terms with the tails of the matrices use the values of a
+        // later iteration.
+        let at_once = solved || newton.is_some();
+        let tails = !at_once && weight > 0.0;
+        let mut due = tails && *far;
+        let mut aside = !at_once && !due;
+        let (mut small, mut again) = (at_once.then_some(weight), true);
+        *far &= !tails;
+        // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
+        let mut iteration =
+            FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
+        loop {
+            if again {
+                begin::<S>(left, s, state, stages.rest, base, small);
+                // In simplified Newton iteration the terms with the tails are updated after each correction.
+                (small, again) = (Some(weight), newton.is_some());
+            }
+            left.head.b.apply_to_each::<S>(stages.rest, s, stages.x, base);
+            if aside {
+                aside = false;
+                begin::<S>(left, s, state, stages.rest, base, small);
+            }
+            let mut most = [Lanes::<S>::splat(0.0); 2];
+            let mut r = 0;
+            while r < m {
+                r = over_registers!(stages.take_forces(r, &mut most); L, S, m - r);
+            }
+            let [change, size] = most;
+            *evaluations += s as u64;
+            let (mut change, size) = (change.reduce_max(), size.reduce_max());
+            if solved {
+                return Iterated { outcome: IterationOutcome::Done, iteration, change };
+            }
+            if let Some(newton) = &mut newton {
+                (change, iteration.still) = newton.correct(*arch, stages.rest, stages.x);
+            }
+            match iteration.assess(change, size) {
+                IterationOutcome::Continue if tails && change > MAX_CHANGE_FOR_TAILS * size => {
+                    (due, *far) = (true, true)
+                }
+                IterationOutcome::Continue => (again, due) = (again || due, false),
+                outcome => return Iterated { outcome, iteration, change },
+            }
+            if const { N == 1 } && newton.is_none() {
+                let extrapolation = iteration.secant_step(change / size);
+                let iterate = [&mut stages.x[0], &mut stages.rest[0]];
+                store_values::<S>(left, s, &base[0], iterate, before, extrapolation);
+            }
+        }
+    }
+}
+
+/// The forces at the stages of a step from the time t, at the positions `x`.
+struct StageForces<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    times: &'a Stages,
+    t: f64,
+    kappa: f64,
+    inverse_mass: Option<&'a DMatrix<f64>>,
+    x: &'a mut [Stages],
+    rest: &'a mut [Stages],
+    a: &'a mut [Stages],
+}
+
+impl<L: Lagrangian<N>, const N: usize> StageForces<'_, L, N> {
+    /// Evaluates the forces at the blocks of stages that T holds, from the r-th on; returns the index of the next
+    /// block.
+    #[inline(always)]
+    fn take_forces<S: Simd, T: Registers<S>>(&mut self, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
+        let x = VelocityPoint { q: vector!(|d| T::of(&self.x[d], r)), v: vector!(|_| T::zero()), z: T::zero() };
+        let force = self.lagrangian.force(T::of(self.times, r) + self.t, &x);
+        for i in 0..T::COUNT {
+            self.take(r + i, vector!(|d| force[d].register(i)), most);
+        }
+        r + T::COUNT
+    }
+
+    /// Stores the forces of one block of stages, and updates the largest change of `rest` and the largest of its terms.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, r: usize, force: SVector<Lanes<S>, N>, [change, size]: &mut [Lanes<S>; 2]) {
+        let (a, kappa) = (self.accelerations(force), Lanes::<S>::splat(self.kappa));
+        for d in 0..N {
+            let linear = kappa * self.x[d].block(r);
+            let rest = a[d] + linear;
+            *change = change.max((rest - self.rest[d].block(r)).abs());
+            *size = size.max(a[d].abs()).max(linear.abs());
+            self.rest[d].set(r, rest);
+            self.a[d].set(r, a[d]);
+        }
+    }
+
+    /// The accelerations `M^-1` times the forces.
+    #[inline(always)]
+    fn accelerations<S: Simd>(&self, force: SVector<Lanes<S>, N>) -> SVector<Lanes<S>, N> {
+        let zero = Lanes::<S>::splat(0.0);
+        match self.inverse_mass {
+            None => force,
+            Some(inverse) => {
+                let (inverse, mut accelerations) = (&inverse.as_slice()[..N * N], vector!(|_| zero));
+                for i in 0..N {
+                    for j in 0..N {
+                        accelerations[i] += force[j] * inverse[i + N * j];
+                    }
+                }
+                accelerations
+            }
+        }
+    }
+}
+
+/// Computes `base`, the terms of the stage positions from the state. If a weight is given, terms below round-off are
+/// included: those of the compensation terms of the state, whose direction is not random, and the weight times those of
+/// the tails of the matrices.
+#[inline(always)]
+fn begin<S: Simd>(
+    left: &Preconditioned,
+    s: usize,
+    [q, v]: [&[CompensatedSum]; 2],
+    rest: &[Stages],
+    base: &mut [Stages],
+    small: Option<f64>,
+) {
+    let (head, m) = (&left.head, blocks::<S>(s));
+    for ((base, rest), (q, v)) in base.iter_mut().zip(rest).zip(q.iter().zip(v)) {
+        let (q_rest, v_rest) = (Lanes::<S>::splat(q.rest), Lanes::<S>::splat(v.rest));
+        let (q, v) = (Lanes::<S>::splat(q.value), Lanes::<S>::splat(v.value));
+        let Some(weight) = small else {
+            for r in 0..m {
+                base.set(r, head.of_state(q, v, r));
+            }
+            continue;
+        };
+        let tail = if weight > 0.0 { left.tail.as_ref() } else { None };
+        if let Some(tail) = tail {
+            for r in 0..m {
+                base.set(r, tail.of_state(q, v, r));
+            }
+            tail.b.add::<S>(rest, s, base);
+        }
+        let weight = Lanes::<S>::splat(weight);
+        for r in 0..m {
+            let mut small = head.of_state(q_rest, v_rest, r);
+            if tail.is_some() {
+                small = weight.mul_add(base.block(r), small);
+            }
+            // The small terms are added first, since they are below the round-off of the full sum.
+            base.set(r, head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small)));
+        }
+    }
+}
