@@ -2,6 +2,8 @@
 
 use crate::InputError;
 use crate::gauss::initial_mass::InitialMass;
+use crate::gauss::limits::MAX_LINEAR_DIMENSION;
+use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::routes::StageRoute;
 use crate::gauss::routes::general::{Extension, General};
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
@@ -9,8 +11,6 @@ use crate::gauss::routes::linear::Linear;
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
-use crate::gauss::limits::MAX_LINEAR_DIMENSION;
-use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
 use contact_geom::Structure;

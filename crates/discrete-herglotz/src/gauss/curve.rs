@@ -7,7 +7,7 @@ mod between;
 mod comparison;
 mod sample;
 
-use crate::gauss::dense::{Solved, SolvedStep};
+use crate::gauss::dense::SolvedStep;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::instructions::Instructions;
@@ -54,19 +54,6 @@ impl Curve {
             acts: true,
             rates: [1.0; 2],
         }
-    }
-
-    /// Sets the stages of a step in transformed time, and the rates of the time transformation at its ends.
-    pub fn of_transformed(&mut self, solved: &Solved, rates: [f64; 2]) {
-        self.of_solved(solved);
-        self.rates = rates;
-    }
-
-    /// Sets the stages of a step that has momenta and actions.
-    pub fn of_solved(&mut self, solved: &Solved) {
-        self.v.copy_from_slice(&solved.v);
-        self.force.copy_from_slice(&solved.force);
-        (self.rate, self.l) = (solved.rate, solved.l);
     }
 
     /// Sets the stages from the accelerations and positions of a condensed step.

@@ -1,7 +1,7 @@
 //! The solved stages of a step, and its collocation polynomial.
 
-use crate::gauss::system::{CollocationSystem, PointRef};
 use crate::DenseStep;
+use crate::gauss::system::{CollocationSystem, PointRef};
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::SolvedStages;
@@ -100,7 +100,8 @@ impl Solved {
             let rho = 1.0 / table.inverse_rho.0[i];
             for d in 0..n {
                 let entry = |e: usize| mass.map_or(f64::from(u8::from(d == e)), |mass| mass[(d, e)]);
-                solved.force[d].0[i] = (0..n).map(|e| entry(e) * (rho * a[e].0[i])).reduce(|sum, term| sum + term).unwrap_or(0.0);
+                solved.force[d].0[i] =
+                    (0..n).map(|e| entry(e) * (rho * a[e].0[i])).reduce(|sum, term| sum + term).unwrap_or(0.0);
             }
             solved.rate.0[i] = rho * table.gamma;
             if wants_l {

@@ -35,8 +35,8 @@ use contact_geom::{
     support::seed,
 };
 use stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
-use system::{PointRef, Typed};
 use stages::lifted_equations::{Given, StageEquations, StepEnd};
+use system::{PointRef, Typed};
 pub(crate) use tables::coefficients::MAX_STAGES;
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian. Its discrete Lagrangian is

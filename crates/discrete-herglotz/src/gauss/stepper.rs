@@ -1,12 +1,12 @@
 //! Stepper of contact Gauss collocation with equal steps in physical time.
 
 use crate::gauss::checks::check_step;
-use crate::gauss::dense::StepStart;
 use crate::gauss::choice::{Start, route_of};
+use crate::gauss::dense::StepStart;
+use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::RouteState;
 use crate::gauss::steps::{GaussSteps, Setup};
 use crate::gauss::system::{Typed, vector_of};
-use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};
 use crate::integration::{SolvedStages, SuspectInterval, depends_on_action, is_separable};

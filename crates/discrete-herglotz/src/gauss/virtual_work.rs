@@ -2,8 +2,8 @@
 
 use crate::gauss::checks::check_step;
 use crate::gauss::stages::equations::{Given as GivenValues, Products, StageEquations as Plain, Workspace};
-use crate::gauss::system::{PointRef, Typed};
 use crate::gauss::stages::lifted_equations::{Given, StageEquations};
+use crate::gauss::system::{PointRef, Typed};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{

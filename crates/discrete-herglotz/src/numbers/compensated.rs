@@ -11,16 +11,6 @@ pub(crate) struct CompensatedSum {
     pub rest: f64,
 }
 
-/// The values of compensated sums. A loop, since the closure of an array's `map` may be compiled as a separate function.
-#[inline(always)]
-pub(crate) fn values<const N: usize>(x: &[CompensatedSum; N]) -> [f64; N] {
-    let mut values = [0.0; N];
-    for d in 0..N {
-        values[d] = x[d].value;
-    }
-    values
-}
-
 /// Copies the values of compensated sums.
 #[inline(always)]
 pub(crate) fn copy_values(x: &[CompensatedSum], values: &mut [f64]) {

@@ -152,13 +152,7 @@ pub(crate) fn defect<const N: usize>(
 ///
 /// Differences that change q by less than [`MIN_RELATIVE_DISPLACEMENT`] of its size are ignored.
 #[inline(never)]
-pub(crate) fn turning(
-    changes: [&[f64]; 2],
-    velocities: [&[f64]; 3],
-    q: &[f64],
-    h: f64,
-    floor: f64,
-) -> Option<f64> {
+pub(crate) fn turning(changes: [&[f64]; 2], velocities: [&[f64]; 3], q: &[f64], h: f64, floor: f64) -> Option<f64> {
     let change = size(changes[0]) + size(changes[1]);
     let velocity = max_abs_or_nan(velocities.map(size));
     (change > velocity && change * h.abs() > max_or_nan(MIN_RELATIVE_DISPLACEMENT * size(q), floor))

@@ -205,7 +205,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             if let Some(defect) = found {
                 self.monitor.steps.note(self.taken, defect);
             }
-            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.monitor.steps.floor, *sharpest)
+            if let Some(sharpness) =
+                sharper([&change, now, &next.end.q], substep.length, self.monitor.steps.floor, *sharpest)
             {
                 *sharpest = sharpness;
             }

@@ -141,7 +141,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         }
         // The second difference is valid from the third step on.
         let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
-        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.monitor.steps.floor, self.monitor.steps.sharpest)
+        if let Some(sharpness) =
+            sharper([&turn, &latest, &next.end.q], h, self.monitor.steps.floor, self.monitor.steps.sharpest)
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // The cause of a change of the mean velocities lies in this step or the previous one.

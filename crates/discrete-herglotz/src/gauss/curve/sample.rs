@@ -6,8 +6,8 @@
 use crate::gauss::curve::Curve;
 use crate::gauss::curve::between::Between;
 use crate::gauss::curve::comparison::Compare;
-use crate::gauss::system::Typed;
 use crate::gauss::resolution::defect_sample::DefectSample;
+use crate::gauss::system::Typed;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};

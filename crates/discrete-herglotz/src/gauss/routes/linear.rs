@@ -6,12 +6,12 @@ mod step;
 use crate::StepError;
 use crate::gauss::curve::Curve;
 use crate::gauss::dense::{Solved, SolvedStep, StartValues};
+use crate::gauss::resolution::defect_sample::SAMPLE_SETS;
 use crate::gauss::routes::linear::coefficients::{LinearStages, StepMap};
 use crate::gauss::routes::linear::step::Advance;
 use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
-use crate::gauss::system::{CollocationSystem, PointRef};
-use crate::gauss::resolution::defect_sample::SAMPLE_SETS;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::system::{CollocationSystem, PointRef};
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::CompensatedSum;
@@ -175,5 +175,10 @@ impl StageRoute for Linear {
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve) {
         let [a, x] = self.stages_of(step);
         curve.of_accelerations(system, step, &self.table, [&a, &x]);
+    }
+
+    #[cfg(test)]
+    fn set_instructions(&mut self, arch: Instructions) {
+        self.arch = arch;
     }
 }

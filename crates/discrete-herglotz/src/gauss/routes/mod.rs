@@ -9,10 +9,12 @@ pub(crate) mod transformed;
 use crate::StepError;
 use crate::gauss::curve::Curve;
 use crate::gauss::dense::{Solved, SolvedStep, StartValues};
-use crate::gauss::system::CollocationSystem;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::CompensatedSum;
+#[cfg(test)]
+use crate::numbers::instructions::Instructions;
 use crate::numbers::state_words::Saved;
 
 /// The state of a motion in the variables of a route: y are velocities in the condensed routes, momenta in the others.
@@ -98,4 +100,12 @@ pub(crate) trait StageRoute: Saved {
 
     /// Collects the stages of the last step in a curve, for defect samples.
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve);
+
+    /// Takes the following steps with an instruction set.
+    #[cfg(test)]
+    fn set_instructions(&mut self, arch: Instructions);
+
+    /// Does not update the actions with the positions within an iteration.
+    #[cfg(test)]
+    fn let_actions_lag(&mut self) {}
 }

@@ -2,24 +2,24 @@
 
 use crate::gauss::checks::check_step;
 use crate::gauss::curve::Curve;
-use crate::gauss::routes::general::{Extension, General, GeneralKernel, InTransformedTime, Values};
-use crate::gauss::routes::{RouteState, StageRoute};
-use crate::gauss::stages::mass_matrix::Mass;
-use crate::gauss::system::{PointRef, SystemAtPoints, Typed, vector_of};
+use crate::gauss::curve::SampleKernel;
 use crate::gauss::initial_mass::InitialMass;
 use crate::gauss::resolution::defect_sample::DefectSample;
+use crate::gauss::routes::general::{Extension, General, GeneralKernel, InTransformedTime, Values};
+use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::mass_matrix::Mass;
+use crate::gauss::system::{PointRef, SystemAtPoints, Typed, vector_of};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
 use crate::integration::check_unforced;
 use crate::numbers::compensated::CompensatedSum;
-use crate::gauss::curve::SampleKernel;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::{InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
-use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of the

@@ -5,10 +5,10 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::gauss::system::{Gradient, PointDerivatives, PointRef, SystemAtPoints};
 use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
 use crate::gauss::stages::lifted_equations::{LiftedStages, StageUnknowns, StageValue as TypedValue};
+use crate::gauss::system::{Gradient, PointDerivatives, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::array::from_fn;
 use crate::solve::DenseLu;

@@ -3,8 +3,8 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::gauss::system::{PointRef, SystemAtPoints};
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
+use crate::gauss::system::{PointRef, SystemAtPoints};
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;

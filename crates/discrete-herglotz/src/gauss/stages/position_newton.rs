@@ -2,10 +2,10 @@
 //! derivative of the force at each stage.
 
 use crate::StepError;
-use crate::gauss::stages::product::{matrix_product, product};
-use crate::gauss::system::CollocationSystem;
 use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
+use crate::gauss::stages::product::{matrix_product, product};
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::registers::DoubleDoubleStages;
 use crate::solve::DenseLu;
@@ -219,8 +219,10 @@ mod tests {
     use super::*;
     use crate::DiscreteLagrangian;
     use crate::gauss::Gauss;
-    use crate::gauss::system::Typed;
+    use crate::gauss::stages::equations::{Given as GivenValues, StageEquations as Plain, Workspace};
     use crate::gauss::stages::lifted_equations::{Given, StageEquations};
+    use crate::gauss::system::PointRef;
+    use crate::gauss::system::Typed;
     use crate::solve::Solver;
     use crate::test_lagrangians::{Coupled, Cubic, InPlane, OnLine};
     use contact_geom::nalgebra::{SMatrix, SVector};
@@ -242,8 +244,12 @@ mod tests {
                 let (t, gauss) = (0.4, Gauss::new::<2>(&coupled, s, h).unwrap());
                 let equations: StageEquations<_, 2> = gauss.equations(t, true);
                 let given = Given::Start(PhasePoint { q, p: mass * v, z: 0.0 });
-                let mut work = equations.workspace(&given);
-                equations.solve(&given, &v, &(mass * v), &mut work).unwrap();
+                let (system, p) = (Typed(&coupled), mass * v);
+                let plain = Plain { system: &system, products: equations.products, t };
+                let mut work = Workspace::new(&system, s, false);
+                let start = PointRef { q: q.as_slice(), v: p.as_slice(), z: 0.0 };
+                plain.solve(&GivenValues::Start(start), v.as_slice(), p.as_slice(), &mut work).unwrap();
+                let (x, l) = work.solution::<2>();
                 let table = Condensed::new(s, h, Coupled::GAMMA).unwrap();
                 let mut positions = PositionNewton::new(s, 2);
                 let (system, inverse_mass) = (&Typed::<_, 2>(&coupled), Some(&inverse_mass));
@@ -252,8 +258,8 @@ mod tests {
                 let mut off = 0.0;
                 for (i, (a, q)) in positions.stages().enumerate() {
                     let [a, q] = [a, q].map(SVector::<f64, 2>::from_column_slice);
-                    let force = inverse * work.l[i].force;
-                    let differences = [q - equations.position(&given, &work.x, i), a - force];
+                    let force = inverse * l[i].force;
+                    let differences = [q - equations.position(&given, &x, i), a - force];
                     off = max_or_nan(off, max_abs_or_nan(differences.iter().flatten().copied()));
                 }
                 assert!(off <= 640.0 * f64::EPSILON * 4.0, "s = {s}, h = {h}: {off:e}");

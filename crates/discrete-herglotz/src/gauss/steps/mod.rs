@@ -5,19 +5,18 @@ mod retries;
 mod sequence;
 mod state_words;
 
-use crate::gauss::GaussRoute;
 use crate::gauss::dense::{Solved, SolvedStep, StartValues};
-use crate::gauss::routes::{RouteState, StageRoute};
-use crate::gauss::system::{CollocationSystem, Gradient};
 use crate::gauss::limits::FIRST_NEWTON_PAUSE;
-use crate::gauss::steps::sequence::Sequence;
+use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::steps::sequence::Sequence;
+use crate::gauss::system::{CollocationSystem, Gradient};
 use crate::numbers::compensated::copy_values;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::StepMonitor;
 use crate::resolution::thresholds::FEW_STAGES;
-use crate::{StepError, StepFailure, UnresolvedStep};
+use crate::{StepError, StepFailure};
 use contact_geom::nalgebra::DMatrix;
 use retries::Tried;
 
@@ -134,11 +133,6 @@ impl GaussSteps {
         }
     }
 
-    /// How the steps are computed.
-    pub fn route_name(&self) -> GaussRoute {
-        self.route.route()
-    }
-
     /// The time of the state.
     pub fn time(&self) -> f64 {
         self.t0 + self.k as f64 * self.h
@@ -251,11 +245,6 @@ impl GaussSteps {
             self.k += 1;
         }
         (steps, None)
-    }
-
-    /// The first unresolved step that was recorded in the run.
-    pub fn first_unresolved(&self) -> Option<UnresolvedStep> {
-        self.monitor.first
     }
 }
 

@@ -2,10 +2,10 @@
 
 use crate::UnresolvedStep;
 use crate::gauss::curve::Curve;
+use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::RouteState;
 use crate::gauss::steps::{GaussSteps, copy_state};
 use crate::gauss::system::{CollocationSystem, PointRef};
-use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::resolution::monitor::{sharper_of, size, turning, value_rounding};
 use crate::resolution::thresholds::{
     COLLOCATION_ROUNDINGS, FEW_STAGES, MAX_STEP_DEFECT, MAX_STEP_DEFECT_OF_FEW_STAGES,

@@ -1,8 +1,8 @@
 //! Saving and restoring the state of a motion by contact Gauss collocation.
 
 use crate::UnresolvedStep;
-use crate::gauss::steps::{GaussSteps, Solution};
 use crate::gauss::steps::sequence::Sequence;
+use crate::gauss::steps::{GaussSteps, Solution};
 use crate::numbers::state_words::{Saved, load_option, save_option};
 
 impl Saved for GaussSteps {

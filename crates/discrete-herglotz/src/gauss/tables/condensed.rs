@@ -175,28 +175,6 @@ impl Condensed {
         })
     }
 
-    /// The positions of the stages, `q0 + u v0 + B a`.
-    pub fn positions<const N: usize>(
-        &self,
-        q: &[f64; N],
-        v: &[f64; N],
-        a: &[[f64; MAX_STAGES]; N],
-    ) -> [[f64; MAX_STAGES]; N] {
-        let mut positions = [[0.0; MAX_STAGES]; N];
-        for d in 0..N {
-            for i in 0..MAX_STAGES {
-                // The last stage is repeated in the padding.
-                let i_or_last = i.min(self.s - 1);
-                let mut x = q[d] + self.u[i_or_last].0 * v[d];
-                for j in 0..self.s {
-                    x += self.b[i_or_last][j].0 * a[d][j];
-                }
-                positions[d][i] = x;
-            }
-        }
-        positions
-    }
-
     /// The stage equations with the linear force `-kappa q` on the left-hand side, solved for the positions:
     /// `Q = left q0 + left_u v0 + left_b (a + kappa Q)`.
     ///

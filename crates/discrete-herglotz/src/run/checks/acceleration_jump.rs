@@ -55,7 +55,10 @@ impl<const N: usize> Discretization<'_, N> {
         }
         let jump = max_abs_or_nan(accelerations.windows(3).map(|a| size((a[2] - a[1] * 2.0 + a[0]).as_slice())));
         // The round-off of forces is relative to the size of the motion at the start and at the current position.
-        let floor = max_or_nan(rounding(first.q.as_slice(), first.v.as_slice(), self.h), POSITION_ROUND_OFF * size(to.q.as_slice()));
+        let floor = max_or_nan(
+            rounding(first.q.as_slice(), first.v.as_slice(), self.h),
+            POSITION_ROUND_OFF * size(to.q.as_slice()),
+        );
         let rounded = jump * self.h * self.h <= floor;
         Some(if rounded { 0.0 } else { jump * self.h.abs() / (MAX_ACCELERATION_JUMP * speed) })
     }

@@ -38,8 +38,10 @@ impl<const N: usize> Discretization<'_, N> {
         // After n steps from rest, the error of a method of order one is the displacement divided by n.
         let moved =
             if self.info.order == 1 { FIRST_ORDER_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
-        let width =
-            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(start.q.as_slice(), start.v.as_slice(), self.h));
+        let width = max_or_nan(
+            max_or_nan(size([&from.q, &to.q, &fine.q]), moved),
+            rounding(start.q.as_slice(), start.v.as_slice(), self.h),
+        );
         let of_v = apart(&coarse_v, &fine_v);
         let of_v = if of_v * self.h.abs() > MIN_RELATIVE_DISPLACEMENT * width {
             relative(of_v, size([&v, &coarse_v, &fine_v]))

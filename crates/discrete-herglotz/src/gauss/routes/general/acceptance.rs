@@ -5,12 +5,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::dense::Solved;
-use crate::gauss::routes::general::General;
-use crate::gauss::routes::general::vectors::Vectors;
-use crate::gauss::system::SystemAtPoints;
 use crate::gauss::limits::MAX_UNCHECKED_FACTOR_CHANGE;
 use crate::gauss::resolution::tail::of_sigma;
+use crate::gauss::routes::general::General;
+use crate::gauss::routes::general::vectors::Vectors;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::system::SystemAtPoints;
 use crate::numbers::compensated::{Unevaluated, add, finite};
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};

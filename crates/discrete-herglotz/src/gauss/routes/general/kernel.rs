@@ -1,12 +1,12 @@
 //! The solution of the stage equations of a general step by iteration, compiled for each Lagrangian.
 
+use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::general::iteration::Iteration;
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::stage_newton::StagesInIteration;
 use crate::gauss::system::Typed;
-use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
-use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::blocks;
 use contact_geom::{Derivatives, Lagrangian};

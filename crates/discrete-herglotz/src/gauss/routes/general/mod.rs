@@ -9,13 +9,13 @@ mod start;
 mod state_words;
 mod vectors;
 
+use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON};
+use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::equations::{Products, Workspace};
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::stage_newton::StageNewton;
 use crate::gauss::system::{Gradient, PointRef, SystemAtPoints};
-use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON};
-use crate::gauss::resolution::tail::Tail;
-use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};

@@ -6,10 +6,12 @@ use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::routes::general::{General, Point};
 use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
 use crate::gauss::stages::equations::{Given, StageEquations};
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::system::{CollocationSystem, PointRef};
-use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::work_summary::GaussRoute;
+#[cfg(test)]
+use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::Stages;
 
 impl StageRoute for General {
@@ -111,5 +113,15 @@ impl StageRoute for General {
 
     fn collect(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, curve: &mut Curve) {
         self.copy_stages([&mut curve.v, &mut curve.force], [&mut curve.rate, &mut curve.l]);
+    }
+
+    #[cfg(test)]
+    fn set_instructions(&mut self, arch: Instructions) {
+        self.arch = arch;
+    }
+
+    #[cfg(test)]
+    fn let_actions_lag(&mut self) {
+        self.follows = false;
     }
 }

@@ -3,9 +3,9 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::limits::MAX_UNCHECKED_FACTOR_CHANGE;
 use crate::gauss::resolution::tail::of_sigma;
+use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::numbers::compensated::{Unevaluated, add, finite};
 use crate::numbers::lanes::{Lanes, branched};

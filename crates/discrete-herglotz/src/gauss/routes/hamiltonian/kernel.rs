@@ -2,8 +2,8 @@
 
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::hamiltonian::iteration::Iteration;
-use crate::gauss::system::Typed;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
+use crate::gauss::system::Typed;
 use crate::numbers::instructions::Instructions;
 use contact_geom::Lagrangian;
 use pulp::{Simd, WithSimd};

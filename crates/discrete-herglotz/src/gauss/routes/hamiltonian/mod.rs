@@ -10,10 +10,10 @@ mod simplified_newton;
 mod stage;
 mod tangent;
 
-use crate::gauss::system::{CollocationSystem, PointRef, SystemAtPoints};
 use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON};
 use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::system::{CollocationSystem, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};

@@ -4,12 +4,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::StepError;
+use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::hamiltonian::simplified_newton::SimplifiedNewton;
 use crate::gauss::routes::hamiltonian::stage::{Evaluation, Stage};
-use crate::gauss::system::SystemAtPoints;
-use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::stages::damping::{Damping, Verdict, chances};
+use crate::gauss::system::SystemAtPoints;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::CompensatedSum;
 use crate::solve::DenseLu;

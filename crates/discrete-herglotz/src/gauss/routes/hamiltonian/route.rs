@@ -6,9 +6,11 @@ use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::hamiltonian::simplified_newton::SimplifiedNewton;
 use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
-use crate::gauss::system::CollocationSystem;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::work_summary::GaussRoute;
+#[cfg(test)]
+use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 
@@ -83,6 +85,11 @@ impl StageRoute for HamiltonianStages {
 
     fn collect(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, curve: &mut Curve) {
         self.copy_stages([&mut curve.v, &mut curve.force], [&mut curve.rate, &mut curve.l]);
+    }
+
+    #[cfg(test)]
+    fn set_instructions(&mut self, arch: Instructions) {
+        self.arch = arch;
     }
 }
 

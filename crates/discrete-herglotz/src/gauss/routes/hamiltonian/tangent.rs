@@ -6,9 +6,9 @@
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::hamiltonian::newton::factorise;
 use crate::gauss::routes::hamiltonian::stage::Stage;
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::product::dot;
 use crate::gauss::system::{CollocationSystem, Gradient, PointRef, SystemAtPoints, Typed, vector_of};
-use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::integration::QuantityDerivatives;
 use crate::numbers::lanes::forget_branches;

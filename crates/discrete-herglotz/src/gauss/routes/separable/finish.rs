@@ -1,9 +1,9 @@
 //! The parts of a condensed step outside of its iteration, which do not depend on the Lagrangian.
 
+use crate::gauss::limits::{MAX_PREDICTOR_ERROR, PREDICTOR_PAUSE};
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::slope::{largest, store_values};
 use crate::gauss::routes::separable::vectors::Parts;
-use crate::gauss::limits::{MAX_PREDICTOR_ERROR, PREDICTOR_PAUSE};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::numbers::compensated::{Unevaluated, add, finite};
 use crate::numbers::lanes::{Lanes, branched};

@@ -1,12 +1,12 @@
 //! The evaluation of the forces at the stages of a condensed step, compiled for each Lagrangian.
 
+use crate::gauss::limits::MAX_CHANGE_FOR_TAILS;
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::slope::store_values;
 use crate::gauss::routes::separable::vectors::Parts;
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::stage_values::StageValues;
 use crate::gauss::system::Typed;
-use crate::gauss::limits::MAX_CHANGE_FOR_TAILS;
-use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::condensed::Preconditioned;
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::instructions::Instructions;

@@ -8,16 +8,16 @@ mod vectors;
 
 pub(crate) use kernel::SeparableKernel;
 
+use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON, TAIL_PERIOD};
+use crate::gauss::resolution::tail::Tail;
 use crate::gauss::routes::separable::finish::{Finish, Predict, Velocities};
 use crate::gauss::routes::separable::kernel::{Iterated, IterationStart};
 use crate::gauss::routes::separable::vectors::{Parts, Vectors};
+use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::position_newton::PositionNewton;
 use crate::gauss::stages::product::product_of_sizes;
 use crate::gauss::stages::slope_newton::SlopeNewton;
 use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
-use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON, TAIL_PERIOD};
-use crate::gauss::resolution::tail::Tail;
-use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::instructions::Instructions;

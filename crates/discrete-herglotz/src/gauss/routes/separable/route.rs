@@ -6,11 +6,13 @@ use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::vectors::Parts;
 use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
+use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::position_newton::{At, PositionNewton};
 use crate::gauss::system::CollocationSystem;
-use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::copy_values;
+#[cfg(test)]
+use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::Stages;
 
 impl StageRoute for Separable {
@@ -85,5 +87,10 @@ impl StageRoute for Separable {
 
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve) {
         curve.of_accelerations(system, step, &self.table, self.vectors.solved());
+    }
+
+    #[cfg(test)]
+    fn set_instructions(&mut self, arch: Instructions) {
+        self.arch = arch;
     }
 }

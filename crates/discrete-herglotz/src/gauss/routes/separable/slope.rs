@@ -1,8 +1,8 @@
 //! The slope of the force: its estimate in the matrix of the iteration, and secant steps between iterations.
 
+use crate::gauss::limits::LONG_RUN;
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::vectors::Parts;
-use crate::gauss::limits::LONG_RUN;
 use crate::gauss::tables::condensed::Preconditioned;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
