@@ -8,11 +8,12 @@ mod comparison;
 mod sample;
 
 use crate::gauss::dense::SolvedStep;
+use crate::gauss::stages::stage_values::SolvedStages;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
-use crate::numbers::registers::{Scaled, Stages, blocks};
+use crate::numbers::registers::{Stages, blocks};
 use contact_geom::Scalar;
 use pulp::{Simd, WithSimd};
 pub(crate) use sample::SampleKernel;
@@ -67,11 +68,12 @@ impl Curve {
         (self.acts, self.z) = (false, 0.0);
         let arch = Instructions::new();
         arch.dispatch(FromAccelerations { curve: self, step, table, a });
-        self.l = system.stage_values(arch, table.s, self.t, &table.times, x, &self.v);
+        let solved = SolvedStages { table, t: self.t, v0: &step.from.y, a, x, v: &mut self.v };
+        self.l = system.stage_values(arch, solved);
     }
 }
 
-/// The stages of a condensed step from its accelerations, without L.
+/// The forces and rates at the stages of a condensed step from its accelerations.
 struct FromAccelerations<'b, 'r> {
     curve: &'b mut Curve,
     step: &'b SolvedStep<'r>,
@@ -86,10 +88,6 @@ impl WithSimd for FromAccelerations<'_, '_> {
     fn with_simd<S: Simd>(self, _simd: S) {
         let FromAccelerations { curve, step, table, a } = self;
         let n = a.len();
-        for d in 0..n {
-            let v0 = Lanes::<S>::splat(step.from.y[d]);
-            table.d.apply(&a[d], table.s, &mut curve.v[d], Scaled(&table.inverse_rho, v0));
-        }
         for r in 0..blocks::<S>(table.s) {
             let rho = table.inverse_rho.block::<S>(r).recip();
             curve.rate.set(r, rho * table.gamma);

@@ -90,6 +90,13 @@ impl SlopeNewton {
         })
     }
 
+    /// Starts an iteration from accelerations.
+    #[cold]
+    #[inline(never)]
+    pub fn begin(&mut self, a: &[Stages]) {
+        self.a.copy_from_slice(a);
+    }
+
     /// Corrects the accelerations `found` that a fixed-point iteration at the positions x gives for `self.a`. Returns the
     /// largest change of the accelerations, and whether the positions have changed by no more than their round-off.
     #[cold]

@@ -1,18 +1,29 @@
 //! The values of a Lagrangian at the stages of a condensed step.
 
+use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, over_registers};
-use crate::numbers::registers::{Stages, blocks};
+use crate::numbers::registers::{Scaled, Stages, blocks};
 use contact_geom::{Lagrangian, vector};
 use pulp::{Simd, WithSimd};
 
-/// The kernel that evaluates `L(t, q, v, 0)` at the s stages of a step that begins at the time t.
+/// The stages of a solved condensed step.
+pub(crate) struct SolvedStages<'a> {
+    pub table: &'a Condensed,
+    /// The time and the velocity at the start of the step.
+    pub t: f64,
+    pub v0: &'a [f64],
+    /// The accelerations and the positions.
+    pub a: &'a [Stages],
+    pub x: &'a [Stages],
+    /// The velocities, which are computed.
+    pub v: &'a mut [Stages],
+}
+
+/// The kernel that computes the velocities at the stages of a step, and evaluates `L(t, q, v, 0)` there.
 pub(crate) struct StageValues<'a, L, const N: usize> {
     pub lagrangian: &'a L,
-    pub s: usize,
-    pub t: f64,
-    pub times: &'a Stages,
-    pub x: &'a [Stages],
-    pub v: &'a [Stages],
+    pub solved: SolvedStages<'a>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
@@ -20,8 +31,13 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Stages {
-        let stages = StageValues::<L, N> { x: &self.x[..N], v: &self.v[..N], ..self };
-        let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(self.s));
+        let StageValues { lagrangian, solved: SolvedStages { table, t, v0, a, x, v } } = self;
+        let (s, v) = (table.s, &mut v[..N]);
+        for ((v, a), v0) in v.iter_mut().zip(&a[..N]).zip(&v0[..N]) {
+            table.d.apply(a, s, v, Scaled(&table.inverse_rho, Lanes::<S>::splat(*v0)));
+        }
+        let stages = At::<L, N> { lagrangian, t, times: &table.times, x: &x[..N], v };
+        let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(s));
         while r < m {
             r = over_registers!(stages.take(r, &mut values); L, S, m - r);
         }
@@ -29,7 +45,16 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
+/// The points at which L is evaluated.
+struct At<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    t: f64,
+    times: &'a Stages,
+    x: &'a [Stages],
+    v: &'a [Stages],
+}
+
+impl<L: Lagrangian<N>, const N: usize> At<'_, L, N> {
     /// Evaluates the blocks of stages that T holds, from the r-th on; returns the index of the next block.
     #[inline(always)]
     fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {

@@ -5,10 +5,10 @@ use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::slope::store_values;
 use crate::gauss::routes::separable::vectors::Parts;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
-use crate::gauss::stages::stage_values::StageValues;
+use crate::gauss::stages::stage_values::{SolvedStages, StageValues};
 use crate::gauss::system::Typed;
 use crate::gauss::tables::condensed::Preconditioned;
-use crate::numbers::compensated::CompensatedSum;
+use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, over_registers};
@@ -19,20 +19,23 @@ use pulp::{Simd, WithSimd};
 
 /// What is compiled for each Lagrangian.
 pub(crate) trait SeparableKernel {
-    /// Solves the stage equations of a step by fixed-point iteration, or by simplified Newton iteration.
+    /// Solves the stage equations of a step by fixed-point iteration, or by simplified Newton iteration, and evaluates
+    /// `L - gamma z` at the solution if z is advanced.
     fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated;
 
-    /// `L(t, q, v, 0)` at the s stages of a step that begins at the time t.
-    fn stage_values(&self, arch: Instructions, s: usize, t: f64, times: &Stages, x: &[Stages], v: &[Stages]) -> Stages;
+    /// `L(t, q, v, 0)` at the stages of a solved step, and the velocities there.
+    fn stage_values(&self, arch: Instructions, solved: SolvedStages<'_>) -> Stages;
 }
 
-/// The start of an iteration; its initial guess is `rest`.
+/// The start of an iteration; its initial guess is `rest`, or is extrapolated from it.
 #[derive(Clone, Copy)]
 pub(crate) struct IterationStart {
     /// The time at the start of the step.
     pub t: f64,
     /// Whether `rest` is the solution.
     pub solved: bool,
+    /// Whether `rest` is the solution of the step before, from which it is extrapolated.
+    pub predicts: bool,
     /// The weight of the terms with the tails of the matrices.
     pub weight: f64,
 }
@@ -57,11 +60,11 @@ impl<L: Lagrangian<N>, const N: usize> SeparableKernel for Typed<'_, L, N> {
         arch.dispatch(Iterate::<L, N> { lagrangian: self.0, run, start })
     }
 
-    fn stage_values(&self, arch: Instructions, s: usize, t: f64, times: &Stages, x: &[Stages], v: &[Stages]) -> Stages {
+    fn stage_values(&self, arch: Instructions, solved: SolvedStages<'_>) -> Stages {
         if const { L::HINTS.hamiltonian } {
             return Stages::ZERO;
         }
-        arch.dispatch(StageValues::<L, N> { lagrangian: self.0, s, t, times, x, v })
+        arch.dispatch(StageValues::<L, N> { lagrangian: self.0, solved })
     }
 }
 
@@ -76,14 +79,38 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
     type Output = Iterated;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Iterated {
-        let Iterate { lagrangian, run, start: IterationStart { t, solved, weight } } = self;
-        let Separable { arch, table, vectors, inverse_mass, q, v, far, newton, before, evaluations, .. } = run;
+    fn with_simd<S: Simd>(self, simd: S) -> Iterated {
+        let Iterate { lagrangian, run, start: IterationStart { t, solved, predicts, weight } } = self;
+        let Separable {
+            arch,
+            table,
+            vectors,
+            inverse_mass,
+            wants_z,
+            q,
+            v,
+            far,
+            newton,
+            before,
+            velocities,
+            values,
+            evaluations,
+            ..
+        } = run;
         let (s, m, state) = (table.s, blocks::<S>(table.s), [&q[..N], &v[..N]]);
         let Parts { left, rest, x, a, base } = vectors.parts(N);
         let (times, inverse_mass, kappa) = (&table.times, inverse_mass.as_ref(), left.kappa);
         let mut stages = StageForces::<L, N> { lagrangian, times, t, kappa, inverse_mass, x, rest, a };
         let mut newton = newton.as_deref_mut();
+        if predicts {
+            for rest in stages.rest.iter_mut() {
+                let before = *rest;
+                table.extrapolation.apply(&before, s, rest, Lanes::<S>::splat(0.0));
+            }
+        }
+        if let Some(newton) = &mut newton {
+            newton.begin(stages.rest);
+        }
         // Terms below round-off are added from the second iteration on; computed beside the forces of the first one
         // they cost little. If the initial guess is poor, the terms with the tails of the matrices use the values of a
         // later iteration.
@@ -96,7 +123,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
         // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
         let mut iteration =
             FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
-        loop {
+        let (outcome, change) = loop {
             if again {
                 begin::<S>(left, s, state, stages.rest, base, small);
                 // In simplified Newton iteration the terms with the tails are updated after each correction.
@@ -116,7 +143,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
             *evaluations += s as u64;
             let (mut change, size) = (change.reduce_max(), size.reduce_max());
             if solved {
-                return Iterated { outcome: IterationOutcome::Done, iteration, change };
+                break (IterationOutcome::Done, change);
             }
             if let Some(newton) = &mut newton {
                 (change, iteration.still) = newton.correct(*arch, stages.rest, stages.x);
@@ -126,14 +153,36 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
                     (due, *far) = (true, true)
                 }
                 IterationOutcome::Continue => (again, due) = (again || due, false),
-                outcome => return Iterated { outcome, iteration, change },
+                outcome if const { N == 1 } && iteration.ends_with_secant() => {
+                    let iterate = [&mut stages.x[0], &mut stages.rest[0]];
+                    store_values::<S>(left, s, &base[0], iterate, before, true);
+                    let kappa = Lanes::<S>::splat(left.kappa);
+                    for r in 0..m {
+                        stages.a[0].set(r, stages.rest[0].block::<S>(r) - kappa * stages.x[0].block(r));
+                    }
+                    break (outcome, change);
+                }
+                outcome => break (outcome, change),
             }
             if const { N == 1 } && newton.is_none() {
                 let extrapolation = iteration.secant_step(change / size);
                 let iterate = [&mut stages.x[0], &mut stages.rest[0]];
                 store_values::<S>(left, s, &base[0], iterate, before, extrapolation);
             }
+        };
+        if outcome == IterationOutcome::Done && newton.is_some() {
+            // Stiff forces magnify the round-off of the positions; the corrected accelerations do not contain it.
+            for (a, rest) in stages.a.iter_mut().zip(stages.rest.iter()) {
+                *a = *rest;
+            }
         }
+        if outcome == IterationOutcome::Done && *wants_z {
+            let mut v0 = [0.0; N];
+            copy_values(&v[..N], &mut v0);
+            let solved = SolvedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: velocities };
+            *values = StageValues::<L, N> { lagrangian, solved }.with_simd(simd);
+        }
+        Iterated { outcome, iteration, change }
     }
 }
 

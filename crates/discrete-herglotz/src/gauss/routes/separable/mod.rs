@@ -10,16 +10,17 @@ pub(crate) use kernel::SeparableKernel;
 
 use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON, TAIL_PERIOD};
 use crate::gauss::resolution::tail::Tail;
-use crate::gauss::routes::separable::finish::{Finish, Predict, Velocities};
+use crate::gauss::routes::separable::finish::Finish;
 use crate::gauss::routes::separable::kernel::{Iterated, IterationStart};
 use crate::gauss::routes::separable::vectors::{Parts, Vectors};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::position_newton::PositionNewton;
 use crate::gauss::stages::product::product_of_sizes;
 use crate::gauss::stages::slope_newton::SlopeNewton;
+use crate::gauss::stages::stage_values::SolvedStages;
 use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
-use crate::numbers::compensated::{CompensatedSum, Unevaluated};
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
@@ -47,6 +48,8 @@ pub(crate) struct Separable {
     changes: [Vec<Unevaluated>; 2],
     /// The velocities at the stages, if z is advanced.
     velocities: Vec<Stages>,
+    /// `L - gamma z` at the stages, if z is advanced.
+    values: Stages,
     point: Point,
     /// Whether the initial guesses are too inaccurate for the terms with the tails of the matrices.
     far: bool,
@@ -106,6 +109,7 @@ impl Separable {
             before: [Stages::ZERO; 2],
             changes: [vec![Unevaluated::default(); n], vec![Unevaluated::default(); n]],
             velocities: vec![Stages::ZERO; n],
+            values: Stages::ZERO,
             point: Point { q: zeros(), v: zeros(), rounding: Gradient::zeros(n), of_acceleration: zeros() },
             far: false,
             warm: false,
@@ -189,6 +193,21 @@ impl Separable {
         change <= COLLOCATION_ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
     }
 
+    /// Takes the last iterate as the solution of a step.
+    #[cold]
+    fn accept(&mut self, system: &dyn CollocationSystem, t: f64) {
+        if self.newton.is_some() {
+            let Parts { rest, a, .. } = self.vectors.parts(self.q.len());
+            a.copy_from_slice(rest);
+        }
+        if self.wants_z {
+            copy_values(&self.v, &mut self.point.v);
+            let ([a, x], v) = (self.vectors.solved(), &mut self.velocities);
+            let solved = SolvedStages { table: &self.table, t, v0: &self.point.v, a, x, v };
+            self.values = system.stage_values(self.arch, solved);
+        }
+    }
+
     /// Takes one step from the time `t`; on failure the state is unchanged.
     fn take_step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
         if self.warm && self.newton.is_none() && self.taken >= self.review {
@@ -203,13 +222,14 @@ impl Separable {
             _ => 0.0,
         };
         let Iterated { mut outcome, iteration, change } =
-            system.iterate(self.arch, self, IterationStart { t, solved, weight });
+            system.iterate(self.arch, self, IterationStart { t, solved, predicts, weight });
         if matches!(outcome, IterationOutcome::Slow { .. }) && self.is_rounding(system, t, change) {
+            self.accept(system, t);
             outcome = IterationOutcome::Done;
         }
         if outcome == IterationOutcome::Done {
             let predicted_well = iteration.first() <= MIN_CHECKED_CHANGE && !solved;
-            outcome = self.finish(system, t, &iteration, [predicts, predicted_well]);
+            outcome = self.finish(&iteration, [predicts, predicted_well]);
         }
         self.warm = outcome == IterationOutcome::Done;
         if !self.warm {
@@ -228,46 +248,22 @@ impl Separable {
         IterationOutcome::Done
     }
 
-    /// Sets the initial guess of a step; returns whether it is extrapolated from the step before.
+    /// Whether the initial guess of a step is extrapolated from the step before; if not, sets it.
     fn predict(&mut self, solved: bool) -> bool {
         let n = self.q.len();
         let predicts = self.warm && !solved && (self.steps_without_predictor == 0 || self.newton.is_some());
-        if predicts {
-            self.arch.dispatch(Predict(self));
-        } else if !solved {
+        if !predicts && !solved {
             self.vectors.parts(n).rest.fill(Stages::ZERO);
             self.steps_without_predictor = self.steps_without_predictor.saturating_sub(1);
-        }
-        if let Some(newton) = &mut self.newton {
-            newton.a.copy_from_slice(self.vectors.parts(n).rest);
         }
         predicts
     }
 
     /// The end of the step from its accelerations: `predicts` if the initial guess was extrapolated, `predicted_well` if
     /// it was so accurate that the step resolves the motion.
-    fn finish(
-        &mut self,
-        system: &dyn CollocationSystem,
-        t: f64,
-        iteration: &FixedPointIteration,
-        [predicts, predicted_well]: [bool; 2],
-    ) -> IterationOutcome {
-        let (arch, n) = (self.arch, self.q.len());
-        if self.newton.is_some() {
-            // Stiff forces magnify the round-off of the positions; the corrected accelerations do not contain it.
-            let Parts { rest, a, .. } = self.vectors.parts(n);
-            a.copy_from_slice(rest);
-        }
-        let (mut secant, mut values) = (n == 1 && iteration.ends_with_secant(), None);
-        if self.wants_z {
-            arch.dispatch(Velocities { run: self, secant });
-            secant = false;
-            let (table, [_, x]) = (&self.table, self.vectors.solved());
-            values = Some(system.stage_values(arch, table.s, t, &table.times, x, &self.velocities));
-        }
-        let predictor_error = (predicts && n == 1).then_some(iteration.first_change());
-        arch.dispatch(Finish { run: self, secant, values: values.as_ref(), predictor_error, predicted_well })
+    fn finish(&mut self, iteration: &FixedPointIteration, [predicts, predicted_well]: [bool; 2]) -> IterationOutcome {
+        let predictor_error = (predicts && self.q.len() == 1).then_some(iteration.first_change());
+        self.arch.dispatch(Finish { run: self, predictor_error, predicted_well })
     }
 
     /// Saves kappa and whether the tail is present, which determine the matrices, and the simplified Newton iteration.
