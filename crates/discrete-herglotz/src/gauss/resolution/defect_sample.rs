@@ -99,8 +99,8 @@ pub(crate) fn tail(g: &Coefficients, y: &Stages) -> f64 {
 #[inline(always)]
 pub(crate) fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     let mut sum = 0.0;
-    for i in 0..MAX_STAGES {
-        sum += weights[i] * y.0[i];
+    for (weight, y) in weights.iter().zip(&y.0) {
+        sum += weight * y;
     }
     sum
 }

@@ -31,6 +31,9 @@ pub(crate) struct RouteStateMut<'r> {
     pub z: &'r mut CompensatedSum,
 }
 
+/// Writes the velocity of a stage, and returns its value of L and its integrating factor.
+pub(crate) type GuessedStage<'r> = &'r mut dyn FnMut(usize, &mut [f64]) -> (f64, f64);
+
 /// A route: the state of the motion, with the workspace and the solution of the stage equations of its steps. The system is
 /// the same in all calls.
 ///
@@ -73,9 +76,8 @@ pub(crate) trait StageRoute: Saved {
         None
     }
 
-    /// Sets the initial guess of the next step, if the route uses one that it does not extrapolate: `stage` writes the
-    /// velocity of a stage and returns its value of L and its integrating factor.
-    fn predict_stages(&mut self, _stage: &mut dyn FnMut(usize, &mut [f64]) -> (f64, f64)) {}
+    /// Sets the initial guess of the next step, if the route uses one that it does not extrapolate.
+    fn predict_stages(&mut self, _stage: GuessedStage<'_>) {}
 
     /// Allocates the workspace of the Newton methods, so that later steps do not allocate.
     fn reserve_newton(&mut self, system: &dyn CollocationSystem);

@@ -4,7 +4,7 @@ use crate::StepError;
 use crate::gauss::curve::Curve;
 use crate::gauss::dense::{Solved, SolvedStep};
 use crate::gauss::routes::general::{General, Point};
-use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
+use crate::gauss::routes::{GuessedStage, RouteState, RouteStateMut, StageRoute};
 use crate::gauss::stages::equations::{Given, StageEquations};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
@@ -48,7 +48,7 @@ impl StageRoute for General {
         Some(&self.known)
     }
 
-    fn predict_stages(&mut self, stage: &mut dyn FnMut(usize, &mut [f64]) -> (f64, f64)) {
+    fn predict_stages(&mut self, stage: GuessedStage<'_>) {
         let v = self.vectors.split().v;
         self.l = Stages::ZERO;
         for i in 0..self.table.s {
