@@ -5,7 +5,7 @@ use crate::gauss::Gauss;
 use crate::numbers::instructions::Instructions;
 use crate::test_lagrangians::{How, OnLine, OneSided};
 use crate::{DiscreteLagrangian, DiscreteStep, StepError, solve::Solver};
-use contact_examples::systems::QuadraticInZ;
+use contact_examples::systems::{QuadraticInZ, SphericalPendulum, System};
 use contact_geom::Structure;
 use pulp::Arch;
 
@@ -111,4 +111,26 @@ fn lanes_have_no_value_to_branch_on() {
         }
     }
     assert!(StepError::Branched.to_string().contains("if_less"));
+}
+
+/// A state that is saved while steps are solved by simplified Newton iteration is restored, with the matrices of the
+/// iteration: the motion goes on bitwise as if it had not been interrupted.
+#[test]
+fn a_state_saved_during_simplified_newton_iteration_is_restored() {
+    let system = SphericalPendulum::default();
+    let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
+    for (stages, h) in [(1, 0.4), (2, 1.5), (8, 1.5)] {
+        let options = StepperOptions { action: true, check_resolution: true };
+        let new = || GaussStepper::new(&problem, stages, h, options).unwrap();
+        let (mut run, mut by_newton) = (new(), 0);
+        for _ in 0..30 {
+            let mut resumed = new();
+            assert!(resumed.restore(&run.save().unwrap()), "{stages} stages, h = {h}");
+            let before = run.newton_steps();
+            assert_eq!(run.advance(1), resumed.advance(1));
+            by_newton += run.newton_steps() - before;
+            assert_eq!((run.save(), run.state()), (resumed.save(), resumed.state()), "{stages} stages, h = {h}");
+        }
+        assert!(by_newton > 3, "{stages} stages, h = {h}: {by_newton} steps by Newton methods");
+    }
 }

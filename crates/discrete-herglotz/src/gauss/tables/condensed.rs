@@ -314,7 +314,7 @@ impl WithSimd for Multiply<'_> {
 type LeftRows = [[f64; MAX_STAGES + 2]; MAX_STAGES];
 
 /// The matrices of [`Condensed::preconditioned`], or their round-off.
-#[repr(C)] // The matrix comes last, see `SeparableStages`.
+#[repr(C)] // The matrix comes last, see `Vectors` of the separable route.
 pub(crate) struct Left {
     pub q: Stages,
     pub u: Stages,
@@ -335,7 +335,7 @@ impl Left {
 }
 
 /// See [`Condensed::preconditioned`].
-#[repr(C)] // The head comes last, see `SeparableStages`.
+#[repr(C)] // The head comes last, see `Vectors` of the separable route.
 pub(crate) struct Preconditioned {
     pub kappa: f64,
     /// The round-off of the head, if it was computed by [`refine`](Self::refine).
