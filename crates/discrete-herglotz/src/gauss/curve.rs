@@ -8,7 +8,7 @@ mod comparison;
 mod sample;
 
 use crate::gauss::dense::SolvedStep;
-use crate::gauss::stages::stage_values::SolvedStages;
+use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::instructions::Instructions;
@@ -68,7 +68,7 @@ impl Curve {
         (self.acts, self.z) = (false, 0.0);
         let arch = Instructions::new();
         arch.dispatch(FromAccelerations { curve: self, step, table, a });
-        let solved = SolvedStages { table, t: self.t, v0: &step.from.y, a, x, v: &mut self.v };
+        let solved = CondensedStages { table, t: self.t, v0: &step.from.y, a, x, v: &mut self.v };
         self.l = system.stage_values(arch, solved);
     }
 }

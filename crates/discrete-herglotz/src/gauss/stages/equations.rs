@@ -5,16 +5,15 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
-use crate::gauss::stages::damping::{Damping, Verdict, chances};
-use crate::gauss::stages::lifted_equations::{LiftedStages, StageUnknowns, StageValue as TypedValue};
+use crate::gauss::stages::damped_newton::{DampedNewton, StageUnknowns};
+use crate::gauss::stages::lifted_equations::{LiftedStages, StageUnknowns as TypedUnknowns, StageValue as TypedValue};
 use crate::gauss::system::{Gradient, PointDerivatives, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::array::from_fn;
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::{StepError, gauss::system::vector_of};
-use contact_geom::nalgebra::DMatrix;
+use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, Dual, Scalar, numbers::max_or_nan};
 
 /// The coefficients of the method multiplied by the step size, which may be negative.
@@ -60,25 +59,28 @@ impl Given<'_> {
     }
 }
 
-/// The unknowns: velocity, action and integrating factor of each stage, and the momentum at the start.
-#[derive(Clone)]
-pub(crate) struct Unknowns {
+/// The unknowns: velocity, action and integrating factor of each stage, and between given ends the momentum at the start.
+pub(crate) struct Unknowns<'x> {
     /// The velocities, one stage after another.
-    v: Vec<f64>,
-    z: Vec<f64>,
-    rho: Vec<f64>,
-    p0: Vec<f64>,
+    v: &'x [f64],
+    z: &'x [f64],
+    rho: &'x [f64],
+    p0: &'x [f64],
+    n: usize,
 }
 
-impl Unknowns {
-    fn zeros(n: usize, s: usize) -> Self {
-        Unknowns { v: vec![0.0; s * n], z: vec![0.0; s], rho: vec![1.0; s], p0: vec![0.0; n] }
+impl<'x> Unknowns<'x> {
+    /// The unknowns of s stages and n coordinates, from one vector.
+    fn of(x: &'x [f64], s: usize, n: usize) -> Self {
+        let (v, x) = x.split_at(s * n);
+        let (z, x) = x.split_at(s);
+        let (rho, p0) = x.split_at(s);
+        Unknowns { v, z, rho, p0, n }
     }
 
     /// The velocity of a stage.
-    pub fn velocity(&self, i: usize) -> &[f64] {
-        let n = self.p0.len();
-        &self.v[i * n..][..n]
+    pub fn velocity(&self, i: usize) -> &'x [f64] {
+        &self.v[i * self.n..][..self.n]
     }
 
     /// The integrating factor of a stage.
@@ -86,36 +88,11 @@ impl Unknowns {
         self.rho[i]
     }
 
-    /// Sets the unknowns to a motion of constant velocity.
-    fn make_uniform(&mut self, v: &[f64], p0: &[f64], z0: f64) {
-        for i in 0..self.z.len() {
-            self.v[i * v.len()..][..v.len()].copy_from_slice(v);
-        }
-        self.z.fill(z0);
-        self.rho.fill(1.0);
-        self.p0.copy_from_slice(p0);
-    }
-
     /// The largest integrating factor divided by the smallest, including the value 1 at the start. Momenta are sums of
     /// terms with all factors, divided by one of them; their round-off grows with this ratio.
     fn spread(&self) -> f64 {
         let over = |f: &dyn Fn(f64) -> f64| self.rho.iter().fold(1.0, |m, r| max_or_nan(m, f(*r)));
         over(&|r| r.abs()) * over(&|r| 1.0 / r.abs())
-    }
-
-    fn copy_from(&mut self, x: &Self) {
-        self.v.copy_from_slice(&x.v);
-        self.z.copy_from_slice(&x.z);
-        self.rho.copy_from_slice(&x.rho);
-        self.p0.copy_from_slice(&x.p0);
-    }
-
-    /// Subtracts `part` times a Newton correction.
-    fn subtract(&mut self, change: &[f64], part: f64) {
-        let unknowns = self.v.iter_mut().chain(&mut self.z).chain(&mut self.rho).chain(&mut self.p0);
-        for (x, change) in unknowns.zip(change) {
-            *x -= change * part;
-        }
     }
 }
 
@@ -128,14 +105,18 @@ pub(crate) struct StageValue {
 
 /// The workspace of Newton's method; made once for a run, so that steps do not allocate.
 pub(crate) struct Workspace {
-    /// The guess, then the solution.
-    pub x: Unknowns,
-    /// L and its gradient at the stages of the solution.
-    pub l: Vec<StageValue>,
+    newton: DampedNewton,
+    evaluated: Evaluated,
+}
+
+/// L with its derivatives at the stages.
+pub(crate) struct Evaluated {
+    s: usize,
+    n: usize,
+    /// L and its gradient at the stages.
+    l: Vec<StageValue>,
     /// The derivatives at one point.
-    pub derivatives: PointDerivatives,
-    /// The last accepted iterate.
-    from: Unknowns,
+    derivatives: PointDerivatives,
     /// The position of a stage.
     q: Vec<f64>,
     /// The derivatives of `L_q + f` at a stage in q, v and z, and one column of the first times a factor.
@@ -144,11 +125,6 @@ pub(crate) struct Workspace {
     force_z: Vec<f64>,
     pushed: Vec<f64>,
     jacobian: DMatrix<f64>,
-    /// The LU factors of the Jacobian in use, at the last accepted iterate or at an earlier one.
-    lu: DenseLu,
-    residual: Vec<f64>,
-    correction: Vec<f64>,
-    next: Vec<f64>,
 }
 
 impl Workspace {
@@ -157,39 +133,50 @@ impl Workspace {
         let n = system.dimension();
         let unknowns = s * (n + 2) + if between_ends { n } else { 0 };
         let value = |_| StageValue { l: 0.0, gradient: Gradient::zeros(n), force: vec![0.0; n] };
-        let numbers = || vec![0.0; unknowns];
-        Workspace {
-            x: Unknowns::zeros(n, s),
+        let evaluated = Evaluated {
+            s,
+            n,
             l: (0..s).map(value).collect(),
             derivatives: PointDerivatives::of(system),
-            from: Unknowns::zeros(n, s),
             q: vec![0.0; n],
             force_q: DMatrix::zeros(n, n),
             force_v: DMatrix::zeros(n, n),
             force_z: vec![0.0; n],
             pushed: vec![0.0; n],
             jacobian: DMatrix::zeros(unknowns, unknowns),
-            lu: DenseLu::new(unknowns),
-            residual: numbers(),
-            correction: numbers(),
-            next: numbers(),
-        }
+        };
+        Workspace { newton: DampedNewton::new(unknowns), evaluated }
+    }
+
+    /// The guess, then the solution.
+    pub fn unknowns(&self) -> Unknowns<'_> {
+        Unknowns::of(&self.newton.x, self.evaluated.s, self.evaluated.n)
+    }
+
+    /// The value of L at a stage of the solution.
+    pub fn value(&self, i: usize) -> f64 {
+        self.evaluated.l[i].l
+    }
+
+    /// The workspace for derivatives at one point.
+    pub fn derivatives(&mut self) -> &mut PointDerivatives {
+        &mut self.evaluated.derivatives
     }
 
     /// The solution, with L and its gradient there, for code that is compiled for N coordinates.
     pub fn solution<const N: usize>(&self) -> LiftedStages<N, f64> {
-        let x = &self.x;
-        let unknowns = StageUnknowns {
+        let x = self.unknowns();
+        let unknowns = TypedUnknowns {
             v: (0..x.z.len()).map(|i| vector_of(x.velocity(i))).collect(),
-            z: x.z.clone(),
-            rho: x.rho.clone(),
-            p0: vector_of(&x.p0),
+            z: x.z.to_vec(),
+            rho: x.rho.to_vec(),
+            p0: if x.p0.is_empty() { SVector::zeros() } else { vector_of(x.p0) },
         };
         let value = |StageValue { l, gradient: Gradient { q, v, z }, force }: &StageValue| TypedValue {
             l: Dual { re: *l, d: ChartVector { x: vector_of(q), y: vector_of(v), z: *z } },
             force: vector_of(force),
         };
-        (unknowns, self.l.iter().map(value).collect())
+        (unknowns, self.evaluated.l.iter().map(value).collect())
     }
 }
 
@@ -203,7 +190,7 @@ pub(crate) struct StageEquations<'a> {
 
 impl StageEquations<'_> {
     /// `q0 + hA V` at a stage.
-    fn position(&self, given: &Given<'_>, x: &Unknowns, i: usize, q: &mut [f64]) {
+    fn position(&self, given: &Given<'_>, x: &Unknowns<'_>, i: usize, q: &mut [f64]) {
         let (Given::Start(PointRef { q: q0, .. }) | Given::Ends { q0, .. }) = given;
         q.copy_from_slice(q0);
         for j in 0..self.products.s {
@@ -214,7 +201,7 @@ impl StageEquations<'_> {
     }
 
     /// Evaluates L and its gradient at the stages.
-    fn stages(&self, given: &Given<'_>, x: &Unknowns, q: &mut [f64], l: &mut [StageValue]) {
+    fn stages(&self, given: &Given<'_>, x: &Unknowns<'_>, q: &mut [f64], l: &mut [StageValue]) {
         for (i, StageValue { l, gradient, force }) in l.iter_mut().enumerate() {
             self.position(given, x, i, q);
             let at = PointRef { q, v: x.velocity(i), z: x.z[i] };
@@ -223,12 +210,12 @@ impl StageEquations<'_> {
     }
 
     /// The residuals, in the order: momenta, actions, integrating factors, end position.
-    fn residual(&self, given: &Given<'_>, x: &Unknowns, l: &[StageValue], out: &mut [f64]) {
+    fn residual(&self, given: &Given<'_>, x: &Unknowns<'_>, l: &[StageValue], out: &mut [f64]) {
         let Products { s, a, b, .. } = self.products;
-        let (s, n, z0) = (*s, x.p0.len(), given.z0());
+        let (s, n, z0) = (*s, x.n, given.z0());
         let p0 = match given {
             Given::Start(state) => state.v,
-            Given::Ends { .. } => &x.p0,
+            Given::Ends { .. } => x.p0,
         };
         for i in 0..s {
             let momentum = &mut out[i * n..][..n];
@@ -254,11 +241,11 @@ impl StageEquations<'_> {
         }
     }
 
-    /// Computes the Jacobian of the residuals at the unknowns `x` with the values `l`.
-    fn jacobian(&self, given: &Given<'_>, work: &mut Workspace) {
-        let Workspace { x, l, derivatives, q, force_q, force_v, force_z, pushed, jacobian: out, .. } = work;
+    /// Computes the Jacobian of the residuals at the unknowns `x`, at which L is evaluated.
+    fn jacobian(&self, given: &Given<'_>, x: &Unknowns<'_>, at: &mut Evaluated) {
+        let Evaluated { l, derivatives, q, force_q, force_v, force_z, pushed, jacobian: out, .. } = at;
         let Products { s, a, b, c, .. } = self.products;
-        let (s, n) = (*s, x.p0.len());
+        let (s, n) = (*s, x.n);
         out.fill(0.0);
         let (row_z, row_r, rows) = (s * n, s * (n + 1), out.nrows());
         for k in 0..s {
@@ -329,8 +316,9 @@ impl StageEquations<'_> {
 
     /// The inverse of the Jacobian at the solution; `None` if it is singular.
     pub fn inverse_jacobian(&self, given: &Given<'_>, work: &mut Workspace) -> Option<DMatrix<f64>> {
-        self.jacobian(given, work);
-        inverse(&work.jacobian)
+        let Workspace { newton, evaluated } = work;
+        self.jacobian(given, &Unknowns::of(&newton.x, evaluated.s, evaluated.n), evaluated);
+        inverse(&evaluated.jacobian)
     }
 
     /// Solves the stage equations by damped Newton iteration from a motion of constant velocity `v`, with the momentum
@@ -339,78 +327,66 @@ impl StageEquations<'_> {
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
     pub fn solve(&self, given: &Given<'_>, v: &[f64], p0: &[f64], work: &mut Workspace) -> Result<u32, StepError> {
-        work.x.make_uniform(v, p0, given.z0());
-        work.from.copy_from(&work.x);
-        self.evaluate(given, work);
-        if !work.residual.iter().all(|r| r.is_finite()) {
-            return Err(StepError::NonFinite);
-        }
-        let unknowns = work.residual.len();
-        let (mut damping, mut change) = (Damping::new(chances(unknowns)), f64::INFINITY);
-        for iterations in 1..=MAX_NEWTON_ITERATIONS {
-            if damping.renews() {
-                self.jacobian(given, work);
-                let Workspace { jacobian, lu, residual, correction, .. } = &mut *work;
-                lu.factorise(|i, j| jacobian[(i, j)])?;
-                correction.copy_from_slice(residual);
-                lu.solve(correction)?;
-            } else {
-                std::mem::swap(&mut work.correction, &mut work.next);
-            }
-            let after = loop {
-                work.x.copy_from(&work.from);
-                work.x.subtract(&work.correction, damping.part());
-                self.evaluate(given, work);
-                let Workspace { x, l, lu, residual, correction, next, .. } = &mut *work;
-                next.copy_from_slice(residual);
-                let after = if lu.solve(next).is_ok() { size(x, l, next) } else { f64::NAN };
-                change = size(x, l, correction);
-                // No damping once half of the digits are correct.
-                match damping.judge(change, after, f64::EPSILON.sqrt()) {
-                    Verdict::Taken => break after,
-                    Verdict::Again => {}
-                    Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
-                }
-            };
-            // The round-off of a solution, which grows with the number of unknowns; at most half of the digits.
-            let round_off = f64::EPSILON * max_or_nan(1e3, 8.0 * unknowns as f64);
-            let near = (round_off * work.x.spread()).min(f64::EPSILON.sqrt());
-            if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
-                return Ok(iterations);
-            }
-            if damping.ratio() * after <= f64::EPSILON {
-                work.x.subtract(&work.next, 1.0);
-                let Workspace { x, l, q, .. } = work;
-                self.stages(given, x, q, l);
-                return Ok(iterations + 1);
-            }
-            work.from.copy_from(&work.x);
-        }
-        Err(StepError::NotConverged { residual: change, iterations: MAX_NEWTON_ITERATIONS })
+        let Workspace { newton, evaluated } = work;
+        let (of_v, x) = newton.x.split_at_mut(evaluated.s * evaluated.n);
+        let (of_z, x) = x.split_at_mut(evaluated.s);
+        let (of_rho, of_p0) = x.split_at_mut(evaluated.s);
+        of_v.chunks_exact_mut(v.len()).for_each(|of_v| of_v.copy_from_slice(v));
+        of_z.fill(given.z0());
+        of_rho.fill(1.0);
+        of_p0.iter_mut().zip(p0).for_each(|(of_p0, p0)| *of_p0 = *p0);
+        let chances = newton.chances();
+        newton.solve(&mut Stated { equations: self, given, evaluated }, chances)
+    }
+}
+
+/// The stage equations of a step with its given data.
+struct Stated<'r> {
+    equations: &'r StageEquations<'r>,
+    given: &'r Given<'r>,
+    evaluated: &'r mut Evaluated,
+}
+
+impl StageUnknowns for Stated<'_> {
+    fn residuals(&mut self, x: &[f64], out: &mut [f64]) {
+        let Evaluated { s, n, l, q, .. } = &mut *self.evaluated;
+        let x = Unknowns::of(x, *s, *n);
+        self.equations.stages(self.given, &x, q, l);
+        self.equations.residual(self.given, &x, l, out);
+        out.iter_mut().for_each(|out| *out = -*out);
     }
 
-    /// Evaluates L at the stages, and the residuals.
-    fn evaluate(&self, given: &Given<'_>, work: &mut Workspace) {
-        let Workspace { x, l, q, residual, .. } = work;
-        self.stages(given, x, q, l);
-        self.residual(given, x, l, residual);
+    fn factorise(&mut self, x: &[f64], lu: &mut DenseLu) -> Result<(), StepError> {
+        let x = Unknowns::of(x, self.evaluated.s, self.evaluated.n);
+        self.equations.jacobian(self.given, &x, self.evaluated);
+        lu.factorise(|i, j| self.evaluated.jacobian[(i, j)])
+    }
+
+    fn size(&mut self, x: &[f64], correction: &[f64]) -> f64 {
+        size(&Unknowns::of(x, self.evaluated.s, self.evaluated.n), &self.evaluated.l, correction)
+    }
+
+    /// It grows with the number of unknowns; at most half of the digits.
+    fn round_off(&self, x: &[f64]) -> f64 {
+        let of_sums = f64::EPSILON * max_or_nan(1e3, 8.0 * x.len() as f64);
+        (of_sums * Unknowns::of(x, self.evaluated.s, self.evaluated.n).spread()).min(f64::EPSILON.sqrt())
     }
 }
 
 /// The size of a correction: the largest component, each kind relative to the largest unknown of that kind. The
 /// momentum at the start is compared with the momenta `L_v` of the stages too, since it vanishes if the motion starts at
 /// rest.
-fn size(x: &Unknowns, l: &[StageValue], change: &[f64]) -> f64 {
+fn size(x: &Unknowns<'_>, l: &[StageValue], change: &[f64]) -> f64 {
     let (of_v, rest) = change.split_at(x.v.len());
     let (of_z, rest) = rest.split_at(x.z.len());
     let (of_rho, of_p0) = rest.split_at(x.rho.len());
     let largest = |from: f64, x: &[f64]| x.iter().fold(from, |m, x| max_or_nan(m, x.extent()));
     let of_momenta = l.iter().fold(0.0, |m, l| largest(m, &l.gradient.v));
     let kinds = [
-        (of_v, largest(0.0, &x.v)),
-        (of_z, largest(0.0, &x.z)),
-        (of_rho, largest(1.0, &x.rho)),
-        (of_p0, largest(of_momenta, &x.p0)),
+        (of_v, largest(0.0, x.v)),
+        (of_z, largest(0.0, x.z)),
+        (of_rho, largest(1.0, x.rho)),
+        (of_p0, largest(of_momenta, x.p0)),
     ];
     let mut worst = 0.0f64;
     for (change, size) in kinds {

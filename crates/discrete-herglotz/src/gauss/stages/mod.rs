@@ -2,6 +2,7 @@
 
 pub(crate) mod applied_force;
 pub(crate) mod curvature;
+pub(crate) mod damped_newton;
 pub(crate) mod damping;
 pub(crate) mod equations;
 pub(crate) mod fixed_point;

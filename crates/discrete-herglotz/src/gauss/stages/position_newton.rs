@@ -2,8 +2,7 @@
 //! derivative of the force at each stage.
 
 use crate::StepError;
-use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
-use crate::gauss::stages::damping::{Damping, Verdict, chances};
+use crate::gauss::stages::damped_newton::{DampedNewton, StageUnknowns};
 use crate::gauss::stages::product::{matrix_product, product};
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
@@ -18,12 +17,11 @@ use contact_geom::numbers::max_abs_or_nan;
 /// Vectors have the n components of one stage after those of another.
 pub(crate) struct PositionNewton {
     n: usize,
+    /// The unknowns are the positions.
+    newton: DampedNewton,
     /// `q0 + u v0`.
     base: Vec<f64>,
-    /// The positions of the last accepted iterate and of the trial.
-    x: Vec<f64>,
-    trial: Vec<f64>,
-    /// The accelerations at the trial positions, and the start time of the last step that was solved.
+    /// The accelerations at the positions, and the start time of the last step that was solved.
     a: Vec<f64>,
     solved: f64,
     /// The force at one stage, and its derivative.
@@ -31,10 +29,6 @@ pub(crate) struct PositionNewton {
     curvature: DMatrix<f64>,
     /// `a'` at the stages.
     slopes: Vec<DMatrix<f64>>,
-    lu: DenseLu,
-    residual: Vec<f64>,
-    correction: Vec<f64>,
-    next: Vec<f64>,
 }
 
 /// The system and the start of a step.
@@ -54,24 +48,19 @@ impl PositionNewton {
         let numbers = || vec![0.0; s * n];
         PositionNewton {
             n,
+            newton: DampedNewton::new(s * n),
             base: numbers(),
-            x: numbers(),
-            trial: numbers(),
             a: numbers(),
             solved: f64::NEG_INFINITY,
             force: vec![0.0; n],
             curvature: DMatrix::zeros(n, n),
             slopes: vec![DMatrix::zeros(n, n); s],
-            lu: DenseLu::new(s * n),
-            residual: numbers(),
-            correction: numbers(),
-            next: numbers(),
         }
     }
 
     /// The accelerations and the positions of the solved stages.
     pub fn stages(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
-        self.a.chunks_exact(self.n).zip(self.trial.chunks_exact(self.n))
+        self.a.chunks_exact(self.n).zip(self.newton.x.chunks_exact(self.n))
     }
 
     /// Solves the stage equations; returns the number of iterations. The initial guess uses the forces of the step
@@ -80,125 +69,108 @@ impl PositionNewton {
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
     pub fn solve(&mut self, at: &At<'_>) -> Result<u32, StepError> {
-        for (base, u) in self.base.chunks_exact_mut(self.n).zip(&at.table.u) {
+        let PositionNewton { n, newton, base, a, solved, force, curvature, slopes } = self;
+        let n = *n;
+        for (base, u) in base.chunks_exact_mut(n).zip(&at.table.u) {
             for (base, (q, v)) in base.iter_mut().zip(at.q.iter().zip(at.v)) {
                 *base = q + v * u.0;
             }
         }
-        let follows = at.t - self.solved <= 1.5 * at.table.h;
-        self.solved = f64::NEG_INFINITY;
-        self.x.copy_from_slice(&self.base);
+        let follows = at.t - *solved <= 1.5 * at.table.h;
+        *solved = f64::NEG_INFINITY;
+        newton.x.copy_from_slice(base);
         if follows {
-            for (x, row) in self.x.chunks_exact_mut(self.n).zip(&at.table.b) {
-                add_products(x, row, &self.a);
+            for (x, row) in newton.x.chunks_exact_mut(n).zip(&at.table.b) {
+                add_products(x, row, a);
             }
         }
-        let mut outcome = self.iterate(at, if follows { 0 } else { chances(self.residual.len()) });
+        let chances = newton.chances();
+        let mut positions = Positions { at, n, base, a, force, curvature, slopes };
+        let mut outcome = newton.solve(&mut positions, if follows { 0 } else { chances });
         if follows && outcome.is_err() {
-            self.x.copy_from_slice(&self.base);
-            outcome = self.iterate(at, chances(self.residual.len()));
+            newton.x.copy_from_slice(positions.base);
+            outcome = newton.solve(&mut positions, chances);
         }
         if outcome.is_ok() {
-            self.solved = at.t;
+            *solved = at.t;
         }
         outcome
     }
+}
 
-    /// Damped Newton iteration from the positions `x`.
-    fn iterate(&mut self, at: &At<'_>, chances: u32) -> Result<u32, StepError> {
-        self.trial.copy_from_slice(&self.x);
-        self.evaluate(at);
-        if !self.residual.iter().all(|r| r.is_finite()) {
-            return Err(StepError::NonFinite);
-        }
-        let mut damping = Damping::new(chances);
-        let mut change = f64::INFINITY;
-        for iterations in 1..=MAX_NEWTON_ITERATIONS {
-            if damping.renews() {
-                self.factorise(at)?;
-                self.correction.copy_from_slice(&self.residual);
-                self.lu.solve(&mut self.correction)?;
-            } else {
-                std::mem::swap(&mut self.correction, &mut self.next);
-            }
-            let correction = extent(&self.correction);
-            let (position, moved) = self.extents(at.q);
-            change = correction / position;
-            let next = loop {
-                for ((trial, x), step) in self.trial.iter_mut().zip(&self.x).zip(&self.correction) {
-                    *trial = x + step * damping.part();
-                }
-                self.evaluate(at);
-                self.next.copy_from_slice(&self.residual);
-                let next = if self.lu.solve(&mut self.next).is_ok() { extent(&self.next) } else { f64::NAN };
-                // No damping once half of the digits are correct.
-                match damping.judge(correction, next, f64::EPSILON.sqrt() * position) {
-                    Verdict::Taken => break next,
-                    Verdict::Again => {}
-                    Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
-                }
-            };
-            self.x.copy_from_slice(&self.trial);
-            let stagnant = damping.ratio() >= 0.5 && next <= 1e3 * f64::EPSILON * position;
-            if next <= f64::EPSILON * moved || stagnant {
-                return Ok(iterations);
-            }
-            if damping.ratio() * next <= f64::EPSILON * moved {
-                for (trial, step) in self.trial.iter_mut().zip(&self.next) {
-                    *trial += step;
-                }
-                self.evaluate(at);
-                return Ok(iterations + 1);
-            }
-        }
-        Err(StepError::NotConverged { residual: change, iterations: MAX_NEWTON_ITERATIONS })
+/// The equations for the positions.
+struct Positions<'r> {
+    at: &'r At<'r>,
+    n: usize,
+    base: &'r [f64],
+    a: &'r mut [f64],
+    force: &'r mut [f64],
+    curvature: &'r mut DMatrix<f64>,
+    slopes: &'r mut [DMatrix<f64>],
+}
+
+impl Positions<'_> {
+    /// The largest coordinate of the positions, and the largest component of their distance from the start.
+    fn extents(&self, x: &[f64]) -> (f64, f64) {
+        let distances = x.chunks_exact(self.n).flat_map(|x| x.iter().zip(self.at.q).map(|(x, start)| x - start));
+        (extent(x), max_abs_or_nan(distances))
     }
+}
 
-    /// Evaluates the accelerations and the residual at the trial positions.
-    fn evaluate(&mut self, at: &At<'_>) {
-        let stages = self.a.chunks_exact_mut(self.n).zip(self.trial.chunks_exact(self.n));
+impl StageUnknowns for Positions<'_> {
+    fn residuals(&mut self, x: &[f64], out: &mut [f64]) {
+        let at = self.at;
+        let stages = self.a.chunks_exact_mut(self.n).zip(x.chunks_exact(self.n));
         for ((a, q), time) in stages.zip(&at.table.times.0) {
             let t = at.t + time;
             match at.inverse_mass {
                 None => at.system.force(t, q, a),
                 Some(inverse) => {
-                    at.system.force(t, q, &mut self.force);
-                    product(inverse, &self.force, a);
+                    at.system.force(t, q, self.force);
+                    product(inverse, self.force, a);
                 }
             }
         }
-        for ((residual, base), trial) in self.residual.iter_mut().zip(&self.base).zip(&self.trial) {
-            *residual = base - trial;
+        for ((residual, base), x) in out.iter_mut().zip(self.base).zip(x) {
+            *residual = base - x;
         }
-        for (residual, row) in self.residual.chunks_exact_mut(self.n).zip(&at.table.b) {
-            add_products(residual, row, &self.a);
+        for (residual, row) in out.chunks_exact_mut(self.n).zip(&at.table.b) {
+            add_products(residual, row, self.a);
         }
     }
 
-    /// Factorises `1 - B a'` at the last iterate.
-    fn factorise(&mut self, at: &At<'_>) -> Result<(), StepError> {
-        let n = self.n;
-        for ((slope, q), time) in self.slopes.iter_mut().zip(self.x.chunks_exact(n)).zip(&at.table.times.0) {
+    /// The Jacobian is `1 - B a'`.
+    fn factorise(&mut self, x: &[f64], lu: &mut DenseLu) -> Result<(), StepError> {
+        let (n, at) = (self.n, self.at);
+        for ((slope, q), time) in self.slopes.iter_mut().zip(x.chunks_exact(n)).zip(&at.table.times.0) {
             let t = at.t + time;
             match at.inverse_mass {
                 None => at.system.curvature(t, q, slope),
                 Some(inverse) => {
-                    at.system.curvature(t, q, &mut self.curvature);
-                    matrix_product(inverse, &self.curvature, slope);
+                    at.system.curvature(t, q, self.curvature);
+                    matrix_product(inverse, self.curvature, slope);
                 }
             }
         }
-        self.lu.factorise(|row, column| {
+        lu.factorise(|row, column| {
             let (i, j) = (row / n, column / n);
             let own = if row == column { 1.0 } else { 0.0 };
             own - at.table.b[i][j].0 * self.slopes[j][(row % n, column % n)]
         })
     }
 
-    /// The largest coordinate of the trial positions, and the largest component of their distance from the start.
-    fn extents(&self, start: &[f64]) -> (f64, f64) {
-        let distances = self.trial.chunks_exact(self.n).flat_map(|x| x.iter().zip(start).map(|(x, start)| x - start));
-        (extent(&self.trial), max_abs_or_nan(distances))
+    fn size(&mut self, x: &[f64], correction: &[f64]) -> f64 {
+        relative(extent(correction), self.extents(x).0)
+    }
+
+    /// Round-off of the distance from the start, which determines the accelerations.
+    fn exact(&mut self, x: &[f64]) -> f64 {
+        let (position, moved) = self.extents(x);
+        f64::EPSILON * relative(moved, position)
+    }
+
+    fn round_off(&self, _x: &[f64]) -> f64 {
+        1e3 * f64::EPSILON
     }
 }
 
@@ -207,6 +179,11 @@ fn add_products(to: &mut [f64], row: &DoubleDoubleStages, a: &[f64]) {
     for (a, b) in a.chunks_exact(to.len()).zip(row) {
         to.iter_mut().zip(a).for_each(|(to, a)| *to += a * b.0);
     }
+}
+
+/// A size divided by another one; 0 for a size of 0.
+fn relative(size: f64, other: f64) -> f64 {
+    if size == 0.0 { 0.0 } else { size / other }
 }
 
 /// The largest absolute component.

@@ -8,7 +8,7 @@ use contact_geom::{Lagrangian, vector};
 use pulp::{Simd, WithSimd};
 
 /// The stages of a solved condensed step.
-pub(crate) struct SolvedStages<'a> {
+pub(crate) struct CondensedStages<'a> {
     pub table: &'a Condensed,
     /// The time and the velocity at the start of the step.
     pub t: f64,
@@ -23,7 +23,7 @@ pub(crate) struct SolvedStages<'a> {
 /// The kernel that computes the velocities at the stages of a step, and evaluates `L(t, q, v, 0)` there.
 pub(crate) struct StageValues<'a, L, const N: usize> {
     pub lagrangian: &'a L,
-    pub solved: SolvedStages<'a>,
+    pub solved: CondensedStages<'a>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
@@ -31,7 +31,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Stages {
-        let StageValues { lagrangian, solved: SolvedStages { table, t, v0, a, x, v } } = self;
+        let StageValues { lagrangian, solved: CondensedStages { table, t, v0, a, x, v } } = self;
         let (s, v) = (table.s, &mut v[..N]);
         for ((v, a), v0) in v.iter_mut().zip(&a[..N]).zip(&v0[..N]) {
             table.d.apply(a, s, v, Scaled(&table.inverse_rho, Lanes::<S>::splat(*v0)));

@@ -14,8 +14,9 @@ use crate::gauss::system::SystemAtPoints;
 use crate::numbers::compensated::{Unevaluated, add, finite};
 use crate::numbers::lanes::{Lanes, branched};
 use crate::numbers::registers::{Stages, blocks};
+use crate::resolution::monitor::value_rounding;
 use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
-use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
+use contact_geom::numbers::max_or_nan;
 use pulp::{Simd, WithSimd};
 
 /// The end of a step from its stages, and its defect if the relative error of its predictor is given.
@@ -160,9 +161,7 @@ impl General {
         let i = self.table.s / 2;
         self.take_stage(i);
         let of_value = system.rounding(t + self.table.times.0[i], self.point.at(), &mut self.rounding);
-        let size = |x: &[f64]| max_abs_or_nan(x.iter().copied());
-        // As in `value_rounding` of the resolution monitor: the round-off of the terms of L and that of its forces.
-        let of_action = (of_value + size(&self.rounding.q) * size(&self.point.q)) * self.table.h.abs();
+        let of_action = value_rounding(of_value, &self.rounding.q, &self.point.q) * self.table.h.abs();
         self.arch.dispatch(CheckStages { general: self, of_action })
     }
 

@@ -207,7 +207,7 @@ impl General {
             self.newton = self.suspended_newton.take().or_else(new);
         }
         let (Some(newton), Some(by_newton)) = (&mut self.newton, &mut self.by_newton) else { return false };
-        let derivatives = &mut by_newton.1.derivatives;
+        let derivatives = by_newton.1.derivatives();
         system.derivatives(t, self.point.at(), derivatives);
         newton.factorise(derivatives)
     }

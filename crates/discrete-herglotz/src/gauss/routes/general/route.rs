@@ -95,8 +95,8 @@ impl StageRoute for General {
             .and_then(|()| equations.solve(&Given::Start(from), v, from.v, work));
         if solved.is_ok() {
             self.predict_stages(&mut |i, v| {
-                v.copy_from_slice(work.x.velocity(i));
-                (work.l[i].l, work.x.factor(i))
+                v.copy_from_slice(work.unknowns().velocity(i));
+                (work.value(i), work.unknowns().factor(i))
             });
             (self.predicted, self.solved) = (false, true);
         }

@@ -4,11 +4,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::StepError;
-use crate::gauss::limits::MAX_NEWTON_ITERATIONS;
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::hamiltonian::simplified_newton::SimplifiedNewton;
 use crate::gauss::routes::hamiltonian::stage::{Evaluation, Stage};
-use crate::gauss::stages::damping::{Damping, Verdict, chances};
+use crate::gauss::stages::damped_newton::{DampedNewton, StageUnknowns};
 use crate::gauss::system::SystemAtPoints;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::CompensatedSum;
@@ -17,13 +16,8 @@ use contact_geom::numbers::max_or_nan;
 
 /// The workspace of Newton's method with the derivatives at each stage.
 pub(super) struct FullNewton {
-    lu: DenseLu,
-    /// The right-hand sides, multiplied by the weights, stage by stage: the last accepted ones, and those on trial.
-    from: Vec<f64>,
-    k: Vec<f64>,
-    residual: Vec<f64>,
-    correction: Vec<f64>,
-    next: Vec<f64>,
+    /// The unknowns are the right-hand sides, multiplied by the weights, stage by stage.
+    newton: DampedNewton,
     /// The Jacobians of the stages, by columns.
     jacobians: Vec<Vec<f64>>,
 }
@@ -39,6 +33,7 @@ struct Equations<'r> {
     least: [f64; 2],
     stage: &'r mut Stage,
     evaluation: &'r mut Evaluation,
+    jacobians: &'r mut [Vec<f64>],
 }
 
 impl Equations<'_> {
@@ -67,7 +62,9 @@ impl Equations<'_> {
     fn right_hand_side(&mut self, i: usize, out: &mut [f64]) {
         self.evaluation.right_hand_side(self.system, self.stage, self.table.weights.0[i], out);
     }
+}
 
+impl StageUnknowns for Equations<'_> {
     /// The residuals `w f(y) - w K`.
     fn residuals(&mut self, k: &[f64], out: &mut [f64]) {
         let components = self.components();
@@ -76,6 +73,14 @@ impl Equations<'_> {
             self.right_hand_side(i, out);
             out.iter_mut().zip(k_i).for_each(|(out, k)| *out -= k);
         }
+    }
+
+    fn factorise(&mut self, k: &[f64], lu: &mut DenseLu) -> Result<(), StepError> {
+        for i in 0..self.jacobians.len() {
+            self.take_stage(k, i);
+            self.evaluation.jacobian(self.system, self.stage, &mut self.jacobians[i]);
+        }
+        factorise(lu, self.table, self.jacobians, self.components())
     }
 
     /// The size of a correction: the largest component, each kind relative to the largest stage value of that kind.
@@ -105,78 +110,17 @@ impl Equations<'_> {
         let relative = |[change, size]: [f64; 2]| if change == 0.0 { 0.0 } else { change / size };
         largest.into_iter().map(relative).fold(0.0, max_or_nan)
     }
+
+    /// It grows with the number of unknowns.
+    fn round_off(&self, k: &[f64]) -> f64 {
+        f64::EPSILON * max_or_nan(1e3, 8.0 * k.len() as f64)
+    }
 }
 
 impl FullNewton {
     /// The workspace for s stages with n components.
     fn new(s: usize, n: usize) -> Self {
-        let numbers = || vec![0.0; s * n];
-        FullNewton {
-            lu: DenseLu::new(s * n),
-            from: numbers(),
-            k: numbers(),
-            residual: numbers(),
-            correction: numbers(),
-            next: numbers(),
-            jacobians: vec![vec![0.0; n * n]; s],
-        }
-    }
-
-    /// Solves the stage equations from the right-hand side at the start of the step.
-    fn solve(&mut self, equations: &mut Equations<'_>) -> Result<(), StepError> {
-        let table = equations.table;
-        let (s, n) = (table.s, equations.components());
-        let FullNewton { lu, from, k, residual, correction, next, jacobians } = self;
-        from.fill(0.0);
-        equations.take_stage(from, 0);
-        equations.stage.t = equations.t;
-        for (i, k) in from.chunks_exact_mut(n).enumerate() {
-            equations.right_hand_side(i, k);
-        }
-        equations.residuals(from, residual);
-        if !residual.iter().all(|r| r.is_finite()) {
-            return Err(StepError::NonFinite);
-        }
-        let (mut damping, mut change) = (Damping::new(chances(s * n)), f64::INFINITY);
-        for iterations in 1..=MAX_NEWTON_ITERATIONS {
-            if damping.renews() {
-                for (i, jacobian) in jacobians.iter_mut().enumerate() {
-                    equations.take_stage(from, i);
-                    equations.evaluation.jacobian(equations.system, equations.stage, jacobian);
-                }
-                factorise(lu, table, jacobians, n)?;
-                correction.copy_from_slice(residual);
-                lu.solve(correction)?;
-            } else {
-                std::mem::swap(correction, next);
-            }
-            let after = loop {
-                for ((k, from), correction) in k.iter_mut().zip(from.iter()).zip(correction.iter()) {
-                    *k = from + damping.part() * correction;
-                }
-                equations.residuals(k, residual);
-                next.copy_from_slice(residual);
-                let after = if lu.solve(next).is_ok() { equations.size(k, next) } else { f64::NAN };
-                change = equations.size(k, correction);
-                // No damping once half of the digits are correct.
-                match damping.judge(change, after, f64::EPSILON.sqrt()) {
-                    Verdict::Taken => break after,
-                    Verdict::Again => {}
-                    Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
-                }
-            };
-            from.copy_from_slice(k);
-            // The round-off of a solution, which grows with the number of unknowns.
-            let near = f64::EPSILON * max_or_nan(1e3, 8.0 * (s * n) as f64);
-            if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
-                return Ok(());
-            }
-            if damping.ratio() * after <= f64::EPSILON {
-                from.iter_mut().zip(next.iter()).for_each(|(from, next)| *from += next);
-                return Ok(());
-            }
-        }
-        Err(StepError::NotConverged { residual: change, iterations: MAX_NEWTON_ITERATIONS })
+        FullNewton { newton: DampedNewton::new(s * n), jacobians: vec![vec![0.0; n * n]; s] }
     }
 }
 
@@ -217,10 +161,18 @@ impl HamiltonianStages {
         self.admit_round_off(system, t);
         let n = self.components();
         let HamiltonianStages { table, q, p, z, least, stage, evaluation, full_newton, rows, .. } = self;
-        let Some(work) = full_newton.as_deref_mut() else { return Ok(()) };
-        work.solve(&mut Equations { system, table, t, q, p, z: z.value, least: *least, stage, evaluation })?;
+        let Some(FullNewton { newton, jacobians }) = full_newton.as_deref_mut() else { return Ok(()) };
+        let mut equations =
+            Equations { system, table, t, q, p, z: z.value, least: *least, stage, evaluation, jacobians };
+        newton.x.fill(0.0);
+        equations.take_stage(&newton.x, 0);
+        equations.stage.t = t;
+        for (i, k) in newton.x.chunks_exact_mut(n).enumerate() {
+            equations.right_hand_side(i, k);
+        }
+        newton.solve(&mut equations, newton.chances())?;
         for (c, to) in rows.right_hand_sides_mut().iter_mut().enumerate() {
-            for (to, k) in to.0.iter_mut().zip(work.from.chunks_exact(n)) {
+            for (to, k) in to.0.iter_mut().zip(newton.x.chunks_exact(n)) {
                 *to = k[c];
             }
         }

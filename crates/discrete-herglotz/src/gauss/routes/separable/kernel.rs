@@ -5,7 +5,7 @@ use crate::gauss::routes::separable::Separable;
 use crate::gauss::routes::separable::slope::store_values;
 use crate::gauss::routes::separable::vectors::Parts;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
-use crate::gauss::stages::stage_values::{SolvedStages, StageValues};
+use crate::gauss::stages::stage_values::{CondensedStages, StageValues};
 use crate::gauss::system::Typed;
 use crate::gauss::tables::condensed::Preconditioned;
 use crate::numbers::compensated::{CompensatedSum, copy_values};
@@ -24,7 +24,7 @@ pub(crate) trait SeparableKernel {
     fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated;
 
     /// `L(t, q, v, 0)` at the stages of a solved step, and the velocities there.
-    fn stage_values(&self, arch: Instructions, solved: SolvedStages<'_>) -> Stages;
+    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages;
 }
 
 /// The start of an iteration; its initial guess is `rest`, or is extrapolated from it.
@@ -60,7 +60,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableKernel for Typed<'_, L, N> {
         arch.dispatch(Iterate::<L, N> { lagrangian: self.0, run, start })
     }
 
-    fn stage_values(&self, arch: Instructions, solved: SolvedStages<'_>) -> Stages {
+    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages {
         if const { L::HINTS.hamiltonian } {
             return Stages::ZERO;
         }
@@ -179,7 +179,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
         if outcome == IterationOutcome::Done && *wants_z {
             let mut v0 = [0.0; N];
             copy_values(&v[..N], &mut v0);
-            let solved = SolvedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: velocities };
+            let solved = CondensedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: velocities };
             *values = StageValues::<L, N> { lagrangian, solved }.with_simd(simd);
         }
         Iterated { outcome, iteration, change }

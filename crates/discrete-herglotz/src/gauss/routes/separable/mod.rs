@@ -17,7 +17,7 @@ use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::position_newton::PositionNewton;
 use crate::gauss::stages::product::product_of_sizes;
 use crate::gauss::stages::slope_newton::SlopeNewton;
-use crate::gauss::stages::stage_values::SolvedStages;
+use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
@@ -203,7 +203,7 @@ impl Separable {
         if self.wants_z {
             copy_values(&self.v, &mut self.point.v);
             let ([a, x], v) = (self.vectors.solved(), &mut self.velocities);
-            let solved = SolvedStages { table: &self.table, t, v0: &self.point.v, a, x, v };
+            let solved = CondensedStages { table: &self.table, t, v0: &self.point.v, a, x, v };
             self.values = system.stage_values(self.arch, solved);
         }
     }
