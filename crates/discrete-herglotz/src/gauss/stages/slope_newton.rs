@@ -172,7 +172,7 @@ impl WithSimd for CorrectSlope<'_> {
 
 /// Inverts a matrix of n rows, by columns, in place; `false` if it is singular or not finite. Uses the heap for more than
 /// eight rows.
-fn invert(m: &mut [Complex<f64>], n: usize) -> bool {
+pub(crate) fn invert(m: &mut [Complex<f64>], n: usize) -> bool {
     if !m.iter().all(|e| e.is_finite()) {
         return false;
     }

@@ -7,6 +7,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use crate::gauss::stages::slope_newton::invert;
 use crate::gauss::system::PointDerivatives;
 use crate::gauss::tables::modes::Modes;
 use crate::gauss::tables::stage_table::StageTable;
@@ -15,9 +16,7 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
 use crate::numbers::state_words::saved;
-use crate::solve::inverse::invert_complex;
-use contact_geom::nalgebra::linalg::try_invert_to;
-use contact_geom::nalgebra::{Complex, SMatrixViewMut};
+use contact_geom::nalgebra::Complex;
 use contact_geom::{Scalar, numbers::max_or_nan};
 use pulp::{Simd, WithSimd};
 
@@ -287,28 +286,6 @@ impl WithSimd for CorrectStages<'_> {
         }
         (change, far.reduce_max() / position.reduce_max())
     }
-}
-
-/// Inverts a matrix of `n` rows in place; `false` if it is singular or not finite. Uses the heap for more than eight
-/// rows.
-fn invert(m: &mut [Complex<f64>], n: usize) -> bool {
-    if !m.iter().all(|e| e.is_finite()) {
-        return false;
-    }
-    let inverted = match n {
-        5 => invert_on_stack::<5>(m),
-        6 => invert_on_stack::<6>(m),
-        7 => invert_on_stack::<7>(m),
-        8 => invert_on_stack::<8>(m),
-        _ => invert_complex(m, n),
-    };
-    inverted && m.iter().all(|e| e.is_finite())
-}
-
-/// Inverts a matrix in place, with a copy of it on the stack.
-fn invert_on_stack<const N: usize>(m: &mut [Complex<f64>]) -> bool {
-    let mut m = SMatrixViewMut::<Complex<f64>, N, N>::from_slice(m);
-    try_invert_to(m.clone_owned(), &mut m)
 }
 
 saved!([] StageNewton { blocks });

@@ -10,9 +10,10 @@ use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::general::vectors::Vectors;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::increments::RightHandSides;
 use crate::gauss::system::SystemAtPoints;
-use crate::numbers::compensated::{Unevaluated, add, finite};
-use crate::numbers::lanes::{Lanes, branched};
+use crate::numbers::compensated::Unevaluated;
+use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::monitor::value_rounding;
 use crate::resolution::thresholds::{COLLOCATION_ROUNDINGS, MIN_CHECKED_CHANGE};
@@ -80,34 +81,12 @@ impl General {
             self.weighted_velocities::<S>();
         }
         let s = self.table.s;
-        let (one_minus_rho, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
-        let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
-        for r in 0..blocks::<S>(s) {
-            deepest = deepest.max(self.one_minus_rho_stages.block::<S>(r));
-        }
-        let rho = 1.0 - deepest.reduce_max();
-        if rho <= 0.0 {
-            return IterationOutcome::StageFactor { rho };
-        }
-        if one_minus_rho >= 1.0 {
-            return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
-        }
-        // sigma_d - 1: adding this to 1 would round it if the rate is small.
-        let grow = one_minus_rho / (1.0 - one_minus_rho);
-        let single = |head| Unevaluated { head, tail: 0.0 };
         let Vectors { v, moved, force, .. } = self.vectors.split();
-        let [dq, dp] = &mut self.increments;
-        for d in 0..self.q.len() {
-            dq[d] = single(moved[d].sum::<S>(s));
-            let pushed = force[d].sum::<S>(s);
-            dp[d] = Unevaluated { head: pushed, tail: grow * (pushed + self.p[d].value) };
-        }
-        if branched() {
-            return IterationOutcome::Branched;
-        }
-        // The maximum over lanes may hide a NaN; a NaN in `one_minus_rho` shows in `dp`.
-        if !finite(dq, dp, single(dz)) {
-            return IterationOutcome::NonFinite;
+        let of =
+            RightHandSides { moved, force, l: &self.l, rate: &self.rate, one_minus_rho: &self.one_minus_rho_stages };
+        let outcome = self.increments.sum::<S>(&of, s, &self.p);
+        if outcome != IterationOutcome::Done {
+            return outcome;
         }
         if self.transformed {
             let mut dt = Stages::ZERO;
@@ -119,13 +98,12 @@ impl General {
             if !(runs && dt.is_finite()) {
                 return IterationOutcome::NonFinite;
             }
+            let single = |head| Unevaluated { head, tail: 0.0 };
             self.extension.t.add(single(dt));
-            self.extension.p_t.add(single(grow * self.extension.p_t.value));
+            self.extension.p_t.add(single(self.increments.grow * self.extension.p_t.value));
         }
-        add(&mut self.q, dq);
-        add(&mut self.p, dp);
-        self.z.add(single(dz));
-        self.one_minus_rho = one_minus_rho;
+        self.increments.add_to(&mut self.q, &mut self.p, &mut self.z);
+        self.one_minus_rho = self.increments.one_minus_rho;
         for (known, v) in self.known.iter_mut().zip(v) {
             *known = v.0[s - 1];
         }

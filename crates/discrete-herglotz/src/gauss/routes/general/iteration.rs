@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::routes::general::vectors::Vectors;
+use crate::gauss::stages::changes::Changes;
 use crate::gauss::stages::mass_matrix::InverseMass;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::CompensatedSum;
@@ -12,6 +13,9 @@ use crate::numbers::registers::{StageMap, Stages, blocks, over_groups};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Scalar, vector};
 use pulp::Simd;
+
+/// The kinds of variables whose changes are compared: velocities, integrating factors and actions.
+const KINDS: usize = 3;
 
 /// The iteration of a step for N coordinates: the fields of [`General`](super::General) of the same names.
 pub(crate) struct Iteration<'k, const N: usize, const TRANSFORMED: bool> {
@@ -31,27 +35,6 @@ pub(crate) struct Iteration<'k, const N: usize, const TRANSFORMED: bool> {
     pub z: f64,
 }
 
-/// The largest changes in an iteration, and the largest values: of velocities, integrating factors and actions.
-struct Changes<S: Simd> {
-    change: [Lanes<S>; 3],
-    size: [Lanes<S>; 3],
-}
-
-impl<S: Simd> Changes<S> {
-    #[inline(always)]
-    fn see(&mut self, kind: usize, change: Lanes<S>, value: Lanes<S>) {
-        self.change[kind] = self.change[kind].max(change.abs());
-        self.size[kind] = self.size[kind].max(value.abs());
-    }
-
-    /// The largest change of one kind of variable, relative to its largest value.
-    #[inline(always)]
-    fn relative(&self, kind: usize) -> f64 {
-        let change = self.change[kind].reduce_max();
-        if change > 0.0 { change / self.size[kind].reduce_max() } else { change }
-    }
-}
-
 impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
     /// One fixed-point iteration: computes new velocities, positions, actions and factors of the stages. Returns the
     /// largest change of velocities, factors and actions, each kind relative to its largest value.
@@ -61,7 +44,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
     #[inline(always)]
     pub(crate) fn iterate<S: Simd>(&mut self) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
-        let mut seen = Changes { change: [zero; 3], size: [zero, one, zero] };
+        let mut seen = Changes::compared_with([zero, one, zero]);
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, &mut seen));
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_stages::<S, K>(r, &mut seen));
         let change = seen.relative(0).max(seen.relative(1));
@@ -72,7 +55,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
 
     /// Computes the factors and velocities of the stages in K registers from the r-th on.
     #[inline(always)]
-    fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+    fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S, KINDS>) {
         let Vectors { v, l_v, moved, force, .. } = &mut self.vectors;
         let (s, zero, one) = (self.table.s, Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
         let (mut one_minus_rho_stages, mut pushed) = ([zero; K], [[zero; K]; N]);
@@ -114,7 +97,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
 
     /// Computes the positions and actions of the stages in K registers from the r-th on.
     #[inline(always)]
-    fn move_stages<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+    fn move_stages<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S, KINDS>) {
         let Vectors { l_v, moved, x, .. } = &mut self.vectors;
         let s = self.table.s;
         let mut z = [Lanes::<S>::splat(self.z); K];

@@ -13,12 +13,13 @@ use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON
 use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::equations::{Products, Workspace};
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::increments::Increments;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::stage_newton::StageNewton;
 use crate::gauss::system::{Gradient, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
+use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use acceptance::FinishStep;
@@ -96,8 +97,7 @@ pub(crate) struct General {
     point: Point,
     /// Bounds of the round-off of the gradient there.
     rounding: Gradient,
-    /// The increments of positions and momenta in a step.
-    increments: [Vec<Unevaluated>; 2],
+    increments: Increments,
 }
 
 /// The additional variables of a step in transformed time.
@@ -184,7 +184,7 @@ impl General {
             evaluations: 0,
             point: Point { q: line(), v: v.to_vec(), p: line(), z: 0.0 },
             rounding: Gradient::zeros(n),
-            increments: [vec![Unevaluated::default(); n], vec![Unevaluated::default(); n]],
+            increments: Increments::zeros(n),
         };
         general.guess();
         general

@@ -7,8 +7,8 @@ use crate::gauss::limits::MAX_UNCHECKED_FACTOR_CHANGE;
 use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::stages::fixed_point::IterationOutcome;
-use crate::numbers::compensated::{Unevaluated, add, finite};
-use crate::numbers::lanes::{Lanes, branched};
+use crate::gauss::stages::increments::RightHandSides;
+use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::blocks;
 use crate::resolution::thresholds::MIN_CHECKED_CHANGE;
 use contact_geom::numbers::max_or_nan;
@@ -65,39 +65,20 @@ impl HamiltonianStages {
     /// The end of the step from its stages.
     #[inline(always)]
     fn finish<S: Simd>(&mut self) -> IterationOutcome {
-        let (s, n) = (self.table.s, self.q.len());
-        let (one_minus_rho, dz) = (self.rows.rate().sum::<S>(s), self.rows.l().sum::<S>(s));
-        let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
-        for r in 0..blocks::<S>(s) {
-            deepest = deepest.max(self.rows.one_minus_rho().block::<S>(r));
+        let (s, rows) = (self.table.s, &self.rows);
+        let of = RightHandSides {
+            moved: rows.moved(),
+            force: rows.force(),
+            l: rows.l(),
+            rate: rows.rate(),
+            one_minus_rho: rows.one_minus_rho(),
+        };
+        let outcome = self.increments.sum::<S>(&of, s, &self.p);
+        if outcome != IterationOutcome::Done {
+            return outcome;
         }
-        let rho = 1.0 - deepest.reduce_max();
-        if rho <= 0.0 {
-            return IterationOutcome::StageFactor { rho };
-        }
-        if one_minus_rho >= 1.0 {
-            return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
-        }
-        // sigma_d - 1: adding this to 1 would round it if the rate is small.
-        let grow = one_minus_rho / (1.0 - one_minus_rho);
-        let [dq, dp] = &mut self.increments;
-        for d in 0..n {
-            dq[d] = Unevaluated { head: self.rows.moved()[d].sum::<S>(s), tail: 0.0 };
-            let pushed = self.rows.force()[d].sum::<S>(s);
-            dp[d] = Unevaluated { head: pushed, tail: grow * (pushed + self.p[d].value) };
-        }
-        if branched() {
-            return IterationOutcome::Branched;
-        }
-        let dz = Unevaluated { head: dz, tail: 0.0 };
-        // The maximum over lanes may hide a NaN; a NaN in `one_minus_rho` shows in `dp`.
-        if !finite(dq, dp, dz) || !one_minus_rho.is_finite() {
-            return IterationOutcome::NonFinite;
-        }
-        add(&mut self.q, dq);
-        add(&mut self.p, dp);
-        self.z.add(dz);
-        self.one_minus_rho = one_minus_rho;
+        self.increments.add_to(&mut self.q, &mut self.p, &mut self.z);
+        self.one_minus_rho = self.increments.one_minus_rho;
         for (known, v) in self.known.iter_mut().zip(self.rows.v()) {
             *known = v.0[s - 1];
         }

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::routes::hamiltonian::rows::Rows;
+use crate::gauss::stages::changes::Changes;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::lanes::Lanes;
@@ -29,35 +30,6 @@ pub(super) struct Iteration<'k, L, const N: usize> {
 /// The kinds of variables whose changes are compared with their largest values.
 const KINDS: usize = 4;
 
-/// The largest changes in an iteration, and the largest values: of positions, momenta, actions and integrating factors.
-struct Changes<S: Simd> {
-    change: [Lanes<S>; KINDS],
-    size: [Lanes<S>; KINDS],
-}
-
-impl<S: Simd> Changes<S> {
-    #[inline(always)]
-    fn see(&mut self, kind: usize, change: Lanes<S>, value: Lanes<S>) {
-        self.change[kind] = self.change[kind].max(change.abs());
-        self.size[kind] = self.size[kind].max(value.abs());
-    }
-
-    /// The largest change of a kind relative to its largest value, over all kinds; NaN if one of them is.
-    #[inline(always)]
-    fn largest(&self) -> f64 {
-        let mut largest = 0.0;
-        for kind in 0..KINDS {
-            let change = self.change[kind].reduce_max();
-            let relative = if change > 0.0 { change / self.size[kind].reduce_max() } else { change };
-            // `f64::max` would hide a NaN.
-            if relative > largest || relative.is_nan() {
-                largest = relative;
-            }
-        }
-        largest
-    }
-}
-
 impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
     /// Computes momenta, factors, positions and actions of the stages from the right-hand sides. Returns the largest change
     /// of each kind relative to its largest value. An action that vanishes by cancellation, as that of a Hamiltonian of
@@ -70,7 +42,7 @@ impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
     pub(super) fn move_stages<S: Simd>(&mut self, predict: bool) -> f64 {
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
         let [p, z] = self.least.map(Lanes::splat);
-        let mut seen = Changes { change: [zero; KINDS], size: [zero, p, z, one] };
+        let mut seen = Changes::compared_with([zero, p, z, one]);
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, predict, &mut seen));
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_group::<S, K>(r, predict, &mut seen));
         seen.largest()
@@ -78,7 +50,7 @@ impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
 
     /// The factors, momenta and predicted velocities of the stages in K registers from the r-th on.
     #[inline(always)]
-    fn push<S: Simd, const K: usize>(&mut self, r: usize, predict: bool, seen: &mut Changes<S>) {
+    fn push<S: Simd, const K: usize>(&mut self, r: usize, predict: bool, seen: &mut Changes<S, KINDS>) {
         let (m, s, zero) = (self.table.m, self.table.s, Lanes::<S>::splat(0.0));
         let [one_minus_rho] = m.rows([&*self.rows.rate], s, [[zero; K]], r);
         let mut inverse = [zero; K];
@@ -117,7 +89,7 @@ impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
 
     /// The positions and actions of the stages in K registers from the r-th on.
     #[inline(always)]
-    fn move_group<S: Simd, const K: usize>(&mut self, r: usize, predict: bool, seen: &mut Changes<S>) {
+    fn move_group<S: Simd, const K: usize>(&mut self, r: usize, predict: bool, seen: &mut Changes<S, KINDS>) {
         let (m, s) = (self.table.m, self.table.s);
         let start = Lanes::<S>::splat(self.z);
         let [mut z] = m.rows([&*self.rows.l], s, [[start; K]], r);

@@ -13,10 +13,11 @@ mod tangent;
 use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON};
 use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::increments::Increments;
 use crate::gauss::system::{CollocationSystem, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
-use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
+use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::Stages;
 use contact_geom::numbers::max_abs_or_nan;
@@ -75,8 +76,7 @@ pub(crate) struct HamiltonianStages {
     /// The velocity at the last stage of the last successful step, or at the start.
     known: Vec<f64>,
     evaluations: u64,
-    /// The increments of positions and momenta in a step.
-    increments: [Vec<Unevaluated>; 2],
+    increments: Increments,
     /// The stage at which H is evaluated outside of the iteration, and the workspace for it.
     stage: Stage,
     evaluation: Evaluation,
@@ -87,7 +87,6 @@ impl HamiltonianStages {
     pub fn new(system: &dyn SystemAtPoints, table: StageTable, state: PointRef<'_>, v: &[f64]) -> Self {
         let n = state.q.len();
         let sums = |x: &[f64]| x.iter().map(|x| CompensatedSum::from(*x)).collect();
-        let increments = || vec![Unevaluated::default(); n];
         HamiltonianStages {
             tail: Tail::new(table.s),
             table,
@@ -109,7 +108,7 @@ impl HamiltonianStages {
             defect: 0.0,
             known: v.to_vec(),
             evaluations: 0,
-            increments: [increments(), increments()],
+            increments: Increments::zeros(n),
             stage: Stage::zeros(n),
             evaluation: Evaluation::of(system),
         }
