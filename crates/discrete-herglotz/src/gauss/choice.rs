@@ -10,7 +10,7 @@ use crate::gauss::routes::hamiltonian::HamiltonianStages;
 use crate::gauss::routes::linear::Linear;
 use crate::gauss::routes::separable::Separable;
 use crate::gauss::stages::mass_matrix::Mass;
-use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
+use crate::gauss::system::{CollocationSystem, PointGradient, PointRef};
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
 use contact_geom::Structure;
@@ -57,7 +57,7 @@ pub(crate) fn route_of(
         let general = General::new(extension, StageTable::new(s, h), mass, start.depends_on_action, state, start.v);
         return Ok((Box::new(general), None, 0.0));
     }
-    let mut gradient = Gradient::zeros(start.q.len());
+    let mut gradient = PointGradient::zeros(start.q.len());
     system.gradient(start.t, at, &mut gradient);
     let table = Condensed::of(s, h, gradient.z)?;
     let of_sigma = of_sigma(1.0 + table.grow.head, table.gamma * h);

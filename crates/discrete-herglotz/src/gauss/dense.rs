@@ -1,7 +1,7 @@
 //! The solved stages of a step, and its collocation polynomial.
 
 use crate::DenseStep;
-use crate::gauss::system::{CollocationSystem, PointRef};
+use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::SolvedStages;
@@ -9,7 +9,6 @@ use crate::integration::dense_step::Series;
 use crate::numbers::array::from_fn;
 use crate::numbers::registers::{MAX_STAGES, Stages};
 use crate::numbers::state_words::saved;
-use contact_geom::PhasePoint;
 use contact_geom::nalgebra::DMatrix;
 
 /// The state at the start of a step in the variables of the route: y are velocities in the condensed routes, momenta in
@@ -59,81 +58,57 @@ pub(crate) struct SolvedStep<'r> {
     pub from: &'r StartValues,
 }
 
-/// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, padded with 0 after the last stage.
-pub(crate) struct Solved {
-    pub v: Vec<Stages>,
-    pub force: Vec<Stages>,
-    pub rate: Stages,
-    pub l: Stages,
-    /// Whether `l` was computed.
-    pub knows_l: bool,
+/// The stages of a solved step, into which a route writes: V, `rho L_q`, `rho L_z` and L, padded with 0 after the last
+/// stage. They are 0 before.
+pub(crate) struct Solved<'s> {
+    pub v: &'s mut [Stages],
+    pub force: &'s mut [Stages],
+    pub rate: &'s mut Stages,
+    pub l: &'s mut Stages,
 }
 
-impl Solved {
-    pub fn zeros(n: usize) -> Self {
-        let zero = || vec![Stages::ZERO; n];
-        Solved { v: zero(), force: zero(), rate: Stages::ZERO, l: Stages::ZERO, knows_l: true }
-    }
-
-    /// The stages of a condensed step from its accelerations and positions.
-    pub fn from_accelerations(
+impl Solved<'_> {
+    /// Writes the stages of a condensed step from its accelerations and positions; L only if it is requested.
+    pub fn set_accelerations(
+        self,
         system: &dyn CollocationSystem,
         step: &SolvedStep<'_>,
         table: &Condensed,
         [a, x]: [&[Stages]; 2],
         wants_l: bool,
-    ) -> Self {
+    ) {
         let SolvedStep { t, from: start, mass } = *step;
         let (n, s) = (a.len(), table.s);
-        let mut solved = Self::zeros(n);
-        solved.knows_l = wants_l;
         for d in 0..n {
-            let v = &mut solved.v[d].0;
+            let v = &mut self.v[d].0;
             v.iter_mut().zip(&table.inverse_rho.0).for_each(|(v, inverse)| *v = inverse * start.y[d]);
             for (column, a) in table.d.0.iter().zip(&a[d].0).take(s) {
                 v.iter_mut().zip(&column.0).for_each(|(v, entry)| *v += entry * a);
             }
             v[s..].fill(0.0);
         }
-        let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
         for i in 0..s {
             let rho = 1.0 / table.inverse_rho.0[i];
             for d in 0..n {
                 let entry = |e: usize| mass.map_or(f64::from(u8::from(d == e)), |mass| mass[(d, e)]);
-                solved.force[d].0[i] =
+                self.force[d].0[i] =
                     (0..n).map(|e| entry(e) * (rho * a[e].0[i])).reduce(|sum, term| sum + term).unwrap_or(0.0);
             }
-            solved.rate.0[i] = rho * table.gamma;
+            self.rate.0[i] = rho * table.gamma;
             if wants_l {
-                for d in 0..n {
-                    (q[d], v[d]) = (x[d].0[i], solved.v[d].0[i]);
-                }
-                solved.l.0[i] = system.value(t + table.times.0[i], PointRef { q: &q, v: &v, z: 0.0 });
+                self.l.0[i] = system.value_at_stage(t + table.times.0[i], i, x, self.v);
             }
         }
         if wants_l && table.gamma != 0.0 {
             // So far the values are those of `L - gamma z`; this adds `gamma z`.
-            let (actions, values) = (table.actions(), solved.l);
+            let (actions, values) = (table.actions(), *self.l);
             for i in 0..s {
-                solved.l.0[i] += actions.from_start[i] * start.z;
+                self.l.0[i] += actions.from_start[i] * start.z;
             }
             for (column, value) in actions.from_values.iter().zip(&values.0).take(s) {
-                solved.l.0.iter_mut().zip(column).for_each(|(l, entry)| *l += entry * value);
+                self.l.0.iter_mut().zip(column).for_each(|(l, entry)| *l += entry * value);
             }
         }
-        solved
-    }
-
-    /// The collocation polynomial through these stages.
-    pub fn curve<const N: usize>(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> DenseStep<N> {
-        let [v, force] = [&self.v, &self.force].map(|of| from_fn(|d| through(&of[d], s)));
-        DenseStep::new(s, (t, h), start, [v, force], [through(&self.rate, s), through(&self.l, s)])
-    }
-
-    /// These stages for the tangent of the step.
-    pub fn stages<const N: usize>(&self, s: usize, (t, h): (f64, f64), start: PhasePoint<N>) -> SolvedStages<N> {
-        let [v, force] = [&self.v, &self.force].map(|of| from_fn(|d| of[d]));
-        SolvedStages { s, t, h, start, v, force, rate: self.rate, l: self.l, knows_l: self.knows_l }
     }
 
     /// Divides stage values by weights, and pads them with 0.
@@ -144,6 +119,13 @@ impl Solved {
         }
         values
     }
+}
+
+/// The collocation polynomial through the stages of a step.
+pub(crate) fn curve_through<const N: usize>(stages: &SolvedStages<N>) -> DenseStep<N> {
+    let SolvedStages { s, t, h, start, v, force, rate, l, .. } = stages;
+    let [v, force] = [v, force].map(|of| from_fn(|d| through(&of[d], *s)));
+    DenseStep::new(*s, (*t, *h), *start, [v, force], [through(rate, *s), through(l, *s)])
 }
 
 /// The Legendre series of the polynomial through values at the nodes. The Gauss quadrature of its products with the

@@ -2,7 +2,7 @@
 
 use crate::gauss::checks::check_step;
 use crate::gauss::choice::{Start, route_of};
-use crate::gauss::dense::StepStart;
+use crate::gauss::dense::{Solved, StepStart, curve_through};
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::RouteState;
 use crate::gauss::steps::{GaussSteps, Setup};
@@ -11,6 +11,7 @@ use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};
 use crate::integration::{SolvedStages, SuspectInterval, depends_on_action, is_separable};
 use crate::numbers::array::from_fn;
+use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{restored_from, words_of};
 use crate::{DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, StepperOptions, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
@@ -99,6 +100,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         state.z.rest = terms.z;
     }
 
+    /// The stages of the last step, with the values of L if they are requested or known.
+    fn solved(&self, wants_l: bool) -> Option<SolvedStages<N>> {
+        let (mut v, mut force) = ([Stages::ZERO; N], [Stages::ZERO; N]);
+        let (mut rate, mut l) = (Stages::ZERO, Stages::ZERO);
+        let to = Solved { v: &mut v, force: &mut force, rate: &mut rate, l: &mut l };
+        let (knows_l, t, from) = self.steps.solved(&self.system, wants_l, to)?;
+        let (s, h, start) = (self.steps.s, self.steps.h, self.phase(&from.q, &from.y, from.z));
+        Some(SolvedStages { s, t, h, start, v, force, rate, l, knows_l })
+    }
+
     /// The phase point of a state in the variables of the route.
     fn phase(&self, q: &[f64], y: &[f64], z: f64) -> PhasePoint<N> {
         let mut p: SVector<f64, N> = SVector::zeros();
@@ -141,13 +152,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
 
     /// The collocation polynomial of the last step; computed only when it is requested.
     fn dense(&self) -> Option<DenseStep<N>> {
-        let (solved, t, from) = self.steps.solved(&self.system, true)?;
-        Some(solved.curve(self.steps.s, (t, self.steps.h), self.phase(&from.q, &from.y, from.z)))
+        Some(curve_through(&self.solved(true)?))
     }
 
     fn solved_stages(&self) -> Option<SolvedStages<N>> {
-        let (solved, t, from) = self.steps.solved(&self.system, false)?;
-        Some(solved.stages(self.steps.s, (t, self.steps.h), self.phase(&from.q, &from.y, from.z)))
+        self.solved(false)
     }
 
     fn last_velocity(&self) -> Option<SVector<f64, N>> {

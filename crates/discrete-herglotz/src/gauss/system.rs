@@ -8,6 +8,7 @@ use crate::gauss::routes::separable::SeparableKernel;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::curvature::curvature;
 use crate::integration::{AtState, at_state};
+use crate::numbers::registers::Stages;
 use crate::solve::mass_matrix::{BLOCK, mass_matrix};
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -33,15 +34,15 @@ impl<'r> PointRef<'r> {
 
 /// A gradient `(L_q, L_v, L_z)`, or `(H_q, H_p, H_z)` with `H_p` in the place of `L_v`.
 #[derive(Clone, Debug)]
-pub(crate) struct Gradient {
+pub(crate) struct PointGradient {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
     pub z: f64,
 }
 
-impl Gradient {
+impl PointGradient {
     pub fn zeros(n: usize) -> Self {
-        Gradient { q: vec![0.0; n], v: vec![0.0; n], z: 0.0 }
+        PointGradient { q: vec![0.0; n], v: vec![0.0; n], z: 0.0 }
     }
 
     fn set<const N: usize>(&mut self, g: &ChartVector<N>) {
@@ -65,7 +66,7 @@ pub(crate) struct ForceDerivatives {
 #[derive(Clone, Debug)]
 pub(crate) struct PointDerivatives {
     pub value: f64,
-    pub gradient: Gradient,
+    pub gradient: PointGradient,
     pub qq: DMatrix<f64>,
     pub qv: DMatrix<f64>,
     pub vv: DMatrix<f64>,
@@ -84,7 +85,7 @@ impl PointDerivatives {
         let force = || ForceDerivatives { value: line(), q: square(), v: square(), z: line() };
         PointDerivatives {
             value: 0.0,
-            gradient: Gradient::zeros(n),
+            gradient: PointGradient::zeros(n),
             qq: square(),
             qv: square(),
             vv: square(),
@@ -125,17 +126,20 @@ pub(crate) trait SystemAtPoints {
     /// The value of L.
     fn value(&self, t: f64, x: PointRef<'_>) -> f64;
 
+    /// `L(t, q, v, 0)` at the i-th stage.
+    fn value_at_stage(&self, t: f64, i: usize, q: &[Stages], v: &[Stages]) -> f64;
+
     /// L, which is returned, its gradient, and `L_q + f`, as Newton's method for the stages evaluates them.
-    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut Gradient, force: &mut [f64]) -> f64;
+    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut PointGradient, force: &mut [f64]) -> f64;
 
     /// The gradient of L.
-    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient);
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient);
 
     /// L, its gradient and Hessian, and the applied force with its derivatives.
     fn derivatives(&self, t: f64, x: PointRef<'_>, out: &mut PointDerivatives);
 
     /// The contact Hamiltonian with its gradient, if the Lagrangian is given by one; the applied force is not included.
-    fn hamiltonian(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) -> Option<f64>;
+    fn hamiltonian(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient) -> Option<f64>;
 
     /// The contact Hamiltonian with its derivatives, and the applied force with its derivatives in q, v, z; `false` where
     /// the Lagrangian is not given by one.
@@ -154,11 +158,11 @@ pub(crate) trait SystemAtPoints {
     fn mass_matrix(&self, t: f64, x: PointRef<'_>, out: &mut DMatrix<f64>);
 
     /// First-order bounds of the rounding errors of L, which is returned, and of its gradient.
-    fn rounding(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) -> f64;
+    fn rounding(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient) -> f64;
 
     /// The same at a state with the momentum p, for a Lagrangian that is given by a contact Hamiltonian from the
     /// derivatives of the Hamiltonian.
-    fn rounding_at_state(&self, t: f64, x: PointRef<'_>, p: &[f64], out: &mut Gradient) -> f64;
+    fn rounding_at_state(&self, t: f64, x: PointRef<'_>, p: &[f64], out: &mut PointGradient) -> f64;
 
     /// The velocity at a state, near a guess.
     ///
@@ -177,7 +181,7 @@ pub(crate) trait SystemAtPoints {
         state: PointRef<'_>,
         near: &[f64],
         v: &mut [f64],
-        out: &mut Gradient,
+        out: &mut PointGradient,
     ) -> Result<(), StepError>;
 
     /// The rate dt/dtau of the time transformation.
@@ -229,7 +233,12 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         Lagrangian::value(self.0, t, &vector_of(x.q), &vector_of(x.v), x.z)
     }
 
-    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut Gradient, force: &mut [f64]) -> f64 {
+    fn value_at_stage(&self, t: f64, i: usize, q: &[Stages], v: &[Stages]) -> f64 {
+        let [q, v] = [q, v].map(|of| SVector::from_fn(|d, _| of[d].0[i]));
+        Lagrangian::value(self.0, t, &q, &v, 0.0)
+    }
+
+    fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut PointGradient, force: &mut [f64]) -> f64 {
         let x = point(x);
         // Dual numbers with many directions would not fit on the stack.
         let (value, d) = if const { N > BLOCK } {
@@ -249,7 +258,7 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         value
     }
 
-    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) {
+    fn gradient(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient) {
         out.set(&Derivatives::gradient(self.0, t, &point(x)));
     }
 
@@ -262,7 +271,7 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         out.set_force(AppliedForce::of(self.0, t, &x));
     }
 
-    fn hamiltonian(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) -> Option<f64> {
+    fn hamiltonian(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient) -> Option<f64> {
         let (value, gradient) = self.0.hamiltonian_with_gradient(t, &state(x))?;
         out.set(&gradient);
         Some(value)
@@ -302,13 +311,13 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         out.copy_from_slice(mass_matrix(self.0, t, &point(x)).as_slice());
     }
 
-    fn rounding(&self, t: f64, x: PointRef<'_>, out: &mut Gradient) -> f64 {
+    fn rounding(&self, t: f64, x: PointRef<'_>, out: &mut PointGradient) -> f64 {
         let (of_value, once) = gradient_rounding(self.0, t, &point(x));
         out.set(&once);
         of_value
     }
 
-    fn rounding_at_state(&self, t: f64, x: PointRef<'_>, p: &[f64], out: &mut Gradient) -> f64 {
+    fn rounding_at_state(&self, t: f64, x: PointRef<'_>, p: &[f64], out: &mut PointGradient) -> f64 {
         let state = PhasePoint { q: vector_of(x.q), p: vector_of(p), z: x.z };
         let (of_value, once) = rounding_at_state(self.0, t, &point(x), &state);
         out.set(&once);
@@ -327,7 +336,7 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
         at: PointRef<'_>,
         near: &[f64],
         v: &mut [f64],
-        out: &mut Gradient,
+        out: &mut PointGradient,
     ) -> Result<(), StepError> {
         let AtState { x, force, rate, .. } = at_state(self.0, t, &state::<N>(at), &vector_of(near))?;
         v.copy_from_slice(x.v.as_slice());

@@ -21,6 +21,9 @@ use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::DMatrix;
 use std::sync::Arc;
 
+/// The number of coordinates up to which the stages of a step are computed on the stack.
+const FEW: usize = 4;
+
 /// The state of a linear motion, and the affine map to its changes in a step, `q1 - q0` and `v1 - v0`.
 pub(crate) struct Linear {
     /// The instruction set of the kernels.
@@ -84,18 +87,32 @@ impl Linear {
         arch.dispatch(Advance { map, q, v, z, trial, last, steps })
     }
 
-    /// The accelerations and the positions of the stages of a step.
-    fn stages_of(&self, step: &SolvedStep<'_>) -> [Vec<Stages>; 2] {
+    /// Gives the accelerations and the positions of the stages of a step to a function. For few coordinates they are on the
+    /// stack, so that nothing is allocated.
+    fn with_stages(&self, step: &SolvedStep<'_>, then: &mut dyn FnMut([&[Stages]; 2])) {
+        let n = self.q.len();
+        let (mut few, mut many) = ([Stages::ZERO; 2 * FEW], Vec::new());
+        let both = if n <= FEW {
+            &mut few[..2 * n]
+        } else {
+            many.resize(2 * n, Stages::ZERO);
+            &mut many[..]
+        };
+        let (a, x) = both.split_at_mut(n);
+        self.set_stages(step, a, x);
+        then([a, x]);
+    }
+
+    /// Computes the accelerations and the positions of the stages of a step.
+    fn set_stages(&self, step: &SolvedStep<'_>, a: &mut [Stages], positions: &mut [Stages]) {
         let StartValues { q, y: v, .. } = step.from;
         let (n, s, table) = (q.len(), self.table.s, &self.table);
-        let mut a = vec![Stages::ZERO; n];
         for (d, a) in a.iter_mut().enumerate() {
             for i in 0..s {
                 let sides = q.iter().chain(v).chain(&[1.0]);
                 a.0[i] = self.stages[i * n + d].iter().zip(sides).map(|(e, side)| e * side).sum();
             }
         }
-        let mut positions = vec![Stages::ZERO; n];
         for (d, positions) in positions.iter_mut().enumerate() {
             for i in 0..MAX_STAGES {
                 // The last stage is repeated in the padding.
@@ -107,7 +124,6 @@ impl Linear {
                 positions.0[i] = x;
             }
         }
-        [a, positions]
     }
 }
 
@@ -167,14 +183,18 @@ impl StageRoute for Linear {
     }
 
     /// The values of L are known if z is advanced.
-    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool) -> Solved {
-        let [a, x] = self.stages_of(step);
-        Solved::from_accelerations(system, step, &self.table, [&a, &x], wants_l && self.map.action.is_some())
+    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool, to: Solved<'_>) -> bool {
+        let (knows_l, mut to) = (wants_l && self.map.action.is_some(), Some(to));
+        self.with_stages(step, &mut |stages| {
+            if let Some(to) = to.take() {
+                to.set_accelerations(system, step, &self.table, stages, knows_l);
+            }
+        });
+        knows_l
     }
 
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve) {
-        let [a, x] = self.stages_of(step);
-        curve.of_accelerations(system, step, &self.table, [&a, &x]);
+        self.with_stages(step, &mut |stages| curve.of_accelerations(system, step, &self.table, stages));
     }
 
     #[cfg(test)]

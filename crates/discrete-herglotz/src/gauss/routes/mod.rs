@@ -97,8 +97,8 @@ pub(crate) trait StageRoute: Saved {
     /// transform.
     fn solve_stages(&mut self, system: &dyn CollocationSystem, t: f64) -> Result<(), StepError>;
 
-    /// The stages of the last step, for dense output; with the values of L if they are requested or known.
-    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool) -> Solved;
+    /// Writes the stages of the last step, with the values of L if they are requested or known; returns whether they are.
+    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool, to: Solved<'_>) -> bool;
 
     /// Collects the stages of the last step in a curve, for defect samples.
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve);

@@ -7,7 +7,7 @@
 
 use crate::gauss::stages::damped_newton::{DampedNewton, StageUnknowns};
 use crate::gauss::stages::lifted_equations::{LiftedStages, StageUnknowns as TypedUnknowns, StageValue as TypedValue};
-use crate::gauss::system::{Gradient, PointDerivatives, PointRef, SystemAtPoints};
+use crate::gauss::system::{PointDerivatives, PointGradient, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::numbers::array::from_fn;
 use crate::solve::DenseLu;
@@ -99,7 +99,7 @@ impl<'x> Unknowns<'x> {
 /// L with its gradient at a stage, and `L_q + f` with the applied force f.
 pub(crate) struct StageValue {
     pub l: f64,
-    gradient: Gradient,
+    gradient: PointGradient,
     force: Vec<f64>,
 }
 
@@ -132,7 +132,7 @@ impl Workspace {
     pub fn new(system: &dyn SystemAtPoints, s: usize, between_ends: bool) -> Self {
         let n = system.dimension();
         let unknowns = s * (n + 2) + if between_ends { n } else { 0 };
-        let value = |_| StageValue { l: 0.0, gradient: Gradient::zeros(n), force: vec![0.0; n] };
+        let value = |_| StageValue { l: 0.0, gradient: PointGradient::zeros(n), force: vec![0.0; n] };
         let evaluated = Evaluated {
             s,
             n,
@@ -172,7 +172,7 @@ impl Workspace {
             rho: x.rho.to_vec(),
             p0: if x.p0.is_empty() { SVector::zeros() } else { vector_of(x.p0) },
         };
-        let value = |StageValue { l, gradient: Gradient { q, v, z }, force }: &StageValue| TypedValue {
+        let value = |StageValue { l, gradient: PointGradient { q, v, z }, force }: &StageValue| TypedValue {
             l: Dual { re: *l, d: ChartVector { x: vector_of(q), y: vector_of(v), z: *z } },
             force: vector_of(force),
         };

@@ -10,7 +10,7 @@ use crate::gauss::limits::FIRST_NEWTON_PAUSE;
 use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::steps::sequence::Sequence;
-use crate::gauss::system::{CollocationSystem, Gradient};
+use crate::gauss::system::{CollocationSystem, PointGradient};
 use crate::numbers::compensated::copy_values;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
@@ -82,7 +82,7 @@ pub(crate) struct GaussSteps {
     end: StartValues,
     v: Vec<f64>,
     p: Vec<f64>,
-    gradient: Gradient,
+    gradient: PointGradient,
     /// The velocity 0, from which velocities are found where nothing nearer is known.
     near: Vec<f64>,
 }
@@ -128,7 +128,7 @@ impl GaussSteps {
             end: zeros(),
             v: vec![0.0; q.len()],
             p: vec![0.0; q.len()],
-            gradient: Gradient::zeros(q.len()),
+            gradient: PointGradient::zeros(q.len()),
             near: vec![0.0; q.len()],
         }
     }
@@ -144,11 +144,16 @@ impl GaussSteps {
         self.solved.then_some(SolvedStep { mass: self.mass.as_ref(), t, from: &self.from })
     }
 
-    /// The stages of the last step, with their values of L if they are requested or known; the time and the state in the
-    /// variables of the route at its start.
-    pub fn solved(&self, system: &dyn CollocationSystem, wants_l: bool) -> Option<(Solved, f64, &StartValues)> {
+    /// Writes the stages of the last step, with their values of L if they are requested or known. Returns whether they are,
+    /// the time, and the state in the variables of the route at its start.
+    pub fn solved(
+        &self,
+        system: &dyn CollocationSystem,
+        wants_l: bool,
+        to: Solved<'_>,
+    ) -> Option<(bool, f64, &StartValues)> {
         let step = self.last_step()?;
-        Some((self.route.solved(system, &step, wants_l), step.t, &self.from))
+        Some((self.route.solved(system, &step, wants_l, to), step.t, &self.from))
     }
 
     /// The momenta of a state in the variables of the route: the velocities of the condensed routes are multiplied by the

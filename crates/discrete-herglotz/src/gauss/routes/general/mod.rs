@@ -16,7 +16,7 @@ use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::increments::Increments;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::stage_newton::StageNewton;
-use crate::gauss::system::{Gradient, PointRef, SystemAtPoints};
+use crate::gauss::system::{PointGradient, PointRef, SystemAtPoints};
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::stage_table::StageTable;
 use crate::numbers::compensated::{CompensatedSum, copy_values};
@@ -96,7 +96,7 @@ pub(crate) struct General {
     /// The point at which the system is evaluated outside of the iteration.
     point: Point,
     /// Bounds of the round-off of the gradient there.
-    rounding: Gradient,
+    rounding: PointGradient,
     increments: Increments,
 }
 
@@ -183,7 +183,7 @@ impl General {
             known: v.to_vec(),
             evaluations: 0,
             point: Point { q: line(), v: v.to_vec(), p: line(), z: 0.0 },
-            rounding: Gradient::zeros(n),
+            rounding: PointGradient::zeros(n),
             increments: Increments::zeros(n),
         };
         general.guess();

@@ -104,11 +104,9 @@ impl StageRoute for General {
         solved.map(|_| ())
     }
 
-    fn solved(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, _wants_l: bool) -> Solved {
-        let mut solved = Solved::zeros(self.q.len());
-        let Solved { v, force, rate, l, .. } = &mut solved;
-        self.copy_stages([v, force], [rate, l]);
-        solved
+    fn solved(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, _wants_l: bool, to: Solved<'_>) -> bool {
+        self.copy_stages([to.v, to.force], [to.rate, to.l]);
+        true
     }
 
     fn collect(&self, _system: &dyn CollocationSystem, _step: &SolvedStep<'_>, curve: &mut Curve) {

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::stages::product::dot;
-use crate::gauss::system::{Gradient, PointDerivatives, PointRef, SystemAtPoints};
+use crate::gauss::system::{PointDerivatives, PointGradient, PointRef, SystemAtPoints};
 use contact_geom::nalgebra::DMatrix;
 
 /// A stage: time, position, momentum `P = rho p`, action and `1 - rho`.
@@ -73,7 +73,7 @@ impl Evaluation {
         let (n, x) = (stage.q.len(), stage.phase_point());
         let Evaluation { derivatives: PointDerivatives { gradient, .. }, force, .. } = self;
         let Some(h) = system.hamiltonian(stage.t, x, gradient) else { return out.fill(f64::NAN) };
-        let Gradient { q: slope, v, z } = gradient;
+        let PointGradient { q: slope, v, z } = gradient;
         if system.is_forced() {
             system.applied_force(stage.t, PointRef { v, ..x }, force);
             for d in 0..n {

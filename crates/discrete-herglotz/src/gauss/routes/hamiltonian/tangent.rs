@@ -8,7 +8,7 @@ use crate::gauss::routes::hamiltonian::newton::factorise;
 use crate::gauss::routes::hamiltonian::stage::Stage;
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::product::dot;
-use crate::gauss::system::{CollocationSystem, Gradient, PointRef, SystemAtPoints, Typed, vector_of};
+use crate::gauss::system::{CollocationSystem, PointGradient, PointRef, SystemAtPoints, Typed, vector_of};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::integration::QuantityDerivatives;
 use crate::numbers::lanes::forget_branches;
@@ -37,7 +37,7 @@ struct Columns {
 /// The derivatives of H, of its gradient and of the force with respect to a quantity.
 struct ExplicitDerivatives {
     value: f64,
-    gradient: Gradient,
+    gradient: PointGradient,
     force: Vec<f64>,
 }
 
@@ -218,6 +218,6 @@ impl ExplicitDerivatives {
     fn of<const N: usize>(of: &QuantityDerivatives<N>) -> Self {
         let QuantityDerivatives { l, gradient: ChartVector { x, y, z }, force } = of;
         let [q, v, force] = [x, y, force].map(|part| part.as_slice().to_vec());
-        ExplicitDerivatives { value: *l, gradient: Gradient { q, v, z: *z }, force }
+        ExplicitDerivatives { value: *l, gradient: PointGradient { q, v, z: *z }, force }
     }
 }

@@ -1,7 +1,7 @@
 //! The coefficients of the map of a linear step.
 
 use crate::gauss::stages::product::{dot, matrix_product, product};
-use crate::gauss::system::{CollocationSystem, Gradient, PointDerivatives, PointRef};
+use crate::gauss::system::{CollocationSystem, PointDerivatives, PointGradient, PointRef};
 use crate::gauss::tables::condensed::Condensed;
 use crate::numbers::compensated::Unevaluated;
 use crate::numbers::double_double::solve_exactly;
@@ -70,7 +70,7 @@ impl LinearStages {
         let mut at_start = PointDerivatives::of(system);
         system.derivatives(t, start, &mut at_start);
         let gradient = |q: &[f64]| {
-            let mut gradient = Gradient::zeros(n);
+            let mut gradient = PointGradient::zeros(n);
             system.gradient(t, PointRef { q, v: &origin, z: 0.0 }, &mut gradient);
             gradient
         };
@@ -153,7 +153,7 @@ impl Solution<'_> {
     fn action(
         &self,
         PointDerivatives { qq, qv, vv, .. }: &PointDerivatives,
-        at_place: &Gradient,
+        at_place: &PointGradient,
         rest: f64,
         place: Vec<f64>,
     ) -> Action {

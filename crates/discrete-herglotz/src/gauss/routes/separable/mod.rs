@@ -18,7 +18,7 @@ use crate::gauss::stages::position_newton::PositionNewton;
 use crate::gauss::stages::product::product_of_sizes;
 use crate::gauss::stages::slope_newton::SlopeNewton;
 use crate::gauss::stages::stage_values::CondensedStages;
-use crate::gauss::system::{CollocationSystem, Gradient, PointRef};
+use crate::gauss::system::{CollocationSystem, PointGradient, PointRef};
 use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
 use crate::numbers::instructions::Instructions;
@@ -81,7 +81,7 @@ pub(crate) struct Separable {
 struct Point {
     q: Vec<f64>,
     v: Vec<f64>,
-    rounding: Gradient,
+    rounding: PointGradient,
     /// The round-off of the accelerations.
     of_acceleration: Vec<f64>,
 }
@@ -110,7 +110,7 @@ impl Separable {
             changes: [vec![Unevaluated::default(); n], vec![Unevaluated::default(); n]],
             velocities: vec![Stages::ZERO; n],
             values: Stages::ZERO,
-            point: Point { q: zeros(), v: zeros(), rounding: Gradient::zeros(n), of_acceleration: zeros() },
+            point: Point { q: zeros(), v: zeros(), rounding: PointGradient::zeros(n), of_acceleration: zeros() },
             far: false,
             warm: false,
             newton: None,

@@ -81,8 +81,10 @@ impl StageRoute for Separable {
     }
 
     /// The values of L are known if z is advanced.
-    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool) -> Solved {
-        Solved::from_accelerations(system, step, &self.table, self.vectors.solved(), wants_l && self.wants_z)
+    fn solved(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, wants_l: bool, to: Solved<'_>) -> bool {
+        let knows_l = wants_l && self.wants_z;
+        to.set_accelerations(system, step, &self.table, self.vectors.solved(), knows_l);
+        knows_l
     }
 
     fn collect(&self, system: &dyn CollocationSystem, step: &SolvedStep<'_>, curve: &mut Curve) {
