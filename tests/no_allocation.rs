@@ -265,9 +265,10 @@ fn gradients_have_bounded_memory() {
         assert!(found.loss.is_some() && found.outcome.steps == steps);
     };
     let count = |steps: usize| allocations(|| gradient(steps));
-    // Two kept states at an interval of 64 steps need no more than a few allocations each.
+    // The steps of each interval of 64 are taken again by a stepper of their own, whose vectors are on the heap: at most 32
+    // allocations. One allocation in each step would be 64.
     let (few, more) = (count(64 * 16), count(64 * 32));
-    assert!(more <= few + 16 * 16, "{few} and {more} allocations");
+    assert!(more <= few + 32 * 16, "{few} and {more} allocations");
     let (few, many) = (peak(|| gradient(40_000)), peak(|| gradient(160_000)));
     assert!(many <= few + few / 4, "{few} and {many} bytes");
 }
