@@ -139,3 +139,39 @@ fn through(values: &Stages, s: usize) -> Series {
     }
     Series(c)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::chebyshev::node;
+    use contact_geom::{PhasePoint, numbers::max_or_nan};
+
+    /// The states at the nodes agree with those of the curve to a few units of round-off of each term.
+    #[test]
+    fn a_sketch_is_on_the_curve() {
+        for s in 1..=MAX_STAGES {
+            let value = |i: usize, seed: f64| (1.3 * i as f64 + seed).sin();
+            let stages = |seed: f64| Stages(from_fn(|i| if i < s { value(i, seed) } else { 0.0 }));
+            let curve = curve_through(&SolvedStages::<2> {
+                s,
+                t: 0.5,
+                h: 0.3,
+                start: PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2),
+                v: [stages(0.1), stages(0.7)],
+                force: [stages(1.9), stages(2.3)],
+                rate: stages(3.1),
+                l: stages(0.4),
+                knows_l: true,
+            });
+            let mut states = Vec::new();
+            curve.states_at_nodes(&mut states);
+            assert_eq!(states.len() + 1, curve.sampling_degree());
+            for (i, found) in states.iter().enumerate() {
+                let at = curve.at_fraction(node(curve.sampling_degree(), i + 1));
+                let off =
+                    max_or_nan((found.q - at.q).amax(), max_or_nan((found.p - at.p).amax(), (found.z - at.z).abs()));
+                assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, node {i}: {off:e}");
+            }
+        }
+    }
+}

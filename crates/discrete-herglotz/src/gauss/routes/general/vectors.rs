@@ -6,7 +6,7 @@ use crate::numbers::registers::Stages;
 const NEARBY: usize = 20;
 
 /// Five vectors for each coordinate. For few coordinates they are within the struct, next to the matrix that multiplies
-/// them: the addresses of a matrix elsewhere may agree with theirs modulo the size of a page, which delays its loads.
+/// them: a processor delays a load if the last twelve bits of its address agree with those of a recent store.
 #[repr(C)]
 pub(crate) struct StageVectors {
     nearby: [Stages; NEARBY],

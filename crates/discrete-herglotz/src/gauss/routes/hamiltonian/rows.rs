@@ -2,8 +2,8 @@
 
 use crate::numbers::registers::Stages;
 
-/// The right-hand sides of the stage equations and the stages, one row for each component, in one allocation: the addresses
-/// of separate ones may agree modulo the size of a page, which delays loads.
+/// The right-hand sides of the stage equations and the stages, one row for each component, in one allocation: a
+/// processor delays a load if the last twelve bits of its address agree with those of a recent store.
 ///
 /// The order is that of [`Rows`]: the right-hand sides of y = (q, P, z, 1 - rho), and then the rows of the stages.
 pub(crate) struct StageRows {
