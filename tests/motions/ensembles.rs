@@ -64,7 +64,7 @@ impl<'a, L: Lagrangian<1> + 'a> Integrator<'a, L, 1> for By {
         of: &Problem<'a, L, 1>,
         h: f64,
         wants: StepperOptions,
-    ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         match self {
             By::Splitting(by) => by.stepper(of, h, wants),
             By::Gauss(by) => by.stepper(of, h, wants),

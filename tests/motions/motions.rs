@@ -22,6 +22,6 @@ fn run_of<L: Lagrangian<N>, const N: usize>(
     span: f64,
     integrator: AnyIntegrator,
     steps: Steps,
-) -> Result<Outcome<N>, InputError> {
+) -> Result<Outcome, InputError> {
     Problem::new(lagrangian, 0.0, start)?.by(integrator).steps(steps).run(Until::Time(span))
 }

@@ -34,12 +34,15 @@ struct Outputs<const N: usize> {
 }
 
 impl<const N: usize> Outputs<N> {
-    fn of<'p, 'o>(&self, run: Run<'p, 'o, RandomSystem<N>, N>) -> Run<'p, 'o, RandomSystem<N>, N> {
+    fn of<'p, 'o>(
+        &self,
+        run: Run<'p, 'o, Problem<'p, RandomSystem<N>, N>>,
+    ) -> Run<'p, 'o, Problem<'p, RandomSystem<N>, N>> {
         let run = if self.action { run } else { run.without_action() };
         if self.conformal_factor { run.with_conformal_factor() } else { run }
     }
 
-    fn rows(&self) -> Option<Rows<'_, N>> {
+    fn rows(&self) -> Option<Rows<'_>> {
         let rows = Rows::every(self.rows?).ok()?;
         let rows = if self.action { rows } else { rows.without_action() };
         Some(match &self.momentum {
@@ -177,7 +180,7 @@ fn larger_of<const N: usize>(
 }
 
 /// Fails for an outcome with a number that is not finite; a factor may underflow or overflow in one step.
-fn finite<'r, const N: usize>(outcome: &Outcome<N>, rows: impl Iterator<Item = &'r Row<N>>) -> Result<(), Wrong> {
+fn finite<'r, const N: usize>(outcome: &Outcome, rows: impl Iterator<Item = &'r Row>) -> Result<(), Wrong> {
     let end = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z).chain([outcome.t]);
     let rows = rows.flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.columns.clone()).chain([r.t]));
     let good = end.chain(rows).all(f64::is_finite) && outcome.log_factor.is_none_or(|f| !f.is_nan());
@@ -191,7 +194,7 @@ const LOST: usize = 4;
 /// up to the first step that is [wrong](ORDER_ONE): after that the motion may run away and take long to compute.
 fn worst_step<const N: usize>(
     problem: &Problem<N>,
-    plan: &Plan<'_, N>,
+    plan: &Plan<'_>,
     [size_q, size_p, _]: [f64; 3],
 ) -> Result<(usize, f64), Wrong> {
     let none = (0, 0.0);

@@ -41,7 +41,7 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumber
 
 /// Compares four steppers from one start: the first in one piece, the second in chunks, the third with compensated
 /// sums, the last without the action where the scheme has it.
-fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
+fn judge<S: Stepper, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
     let start = four[0].state();
     let all = four[0].advance(steps);
     let (mut taken, mut halted) = (0, Ok(()));

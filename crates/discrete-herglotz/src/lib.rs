@@ -72,8 +72,8 @@ pub use error::{InputError, SelectionFailure, StepError};
 
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
-    DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, Piece, PlanEntry, Problem, Reset, SplittingScheme,
-    Start, StepFailure, Stepper, StepperOptions,
+    DenseStep, INTERRUPTION, InitialState, Integrator, Interrupt, MethodInfo, Piece, PlanEntry, Problem, Reset,
+    SplittingScheme, Start, StepFailure, Stepper, StepperOptions, SystemProblem,
 };
 pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]
@@ -85,7 +85,9 @@ pub use run::{
 };
 pub use status::{Status, UnresolvedStep};
 pub use switching::DividedGauss;
-pub use system::System;
+pub use system::{
+    AtState, AtSwitch, Components, ForceKind, Point, SecondDerivatives, State, System, TypedSystem, Vector,
+};
 pub use theory::discrete_lagrangian::{DiscreteLagrangian, DiscreteStep};
 
 pub use contact_geom;

@@ -246,7 +246,7 @@ fn spherical_pendulum_by_a_constraint_and_by_a_group() {
     let state = GroupState { g, momentum: SVector::from([0.0, -2.5, 0.0]), z: 0.2 };
     let mut on_group = GroupMotion::<Rotations, 3>::new(0.0, state).unwrap();
     let gauss = GroupGauss::new::<Rotations, 3>(&top, 6, 0.05).unwrap();
-    let mut under_constraint: [Box<dyn Stepper<3>>; 2] = [Box::new(rattle.unwrap()), Box::new(lobatto.unwrap())];
+    let mut under_constraint: [Box<dyn Stepper>; 2] = [Box::new(rattle.unwrap()), Box::new(lobatto.unwrap())];
     let [mut highest, mut lowest]: [f64; 2] = [-1.0, 1.0];
     for _ in 0..120 {
         on_group.advance(&gauss, 1).unwrap();

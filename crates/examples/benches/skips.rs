@@ -39,9 +39,9 @@ struct Line {
 const RUNS: usize = 41;
 
 /// The median time of a motion, in microseconds, with its outcome.
-type Timed<const N: usize> = Result<(f64, Outcome<N>), InputError>;
+type Timed<const N: usize> = Result<(f64, Outcome), InputError>;
 
-fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome<N>) -> Timed<N> {
+fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome) -> Timed<N> {
     assert_eq!(outcome.status, Status::Completed);
     times.sort_by(f64::total_cmp);
     Ok((times[RUNS / 2], outcome))
@@ -62,7 +62,7 @@ fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until
 }
 
 /// The time of a whole run, with its work between the steps.
-fn whole<const N: usize>(run: impl Fn() -> Result<Outcome<N>, InputError>) -> Timed<N> {
+fn whole<const N: usize>(run: impl Fn() -> Result<Outcome, InputError>) -> Timed<N> {
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
         let clock = Instant::now();

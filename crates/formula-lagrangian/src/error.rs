@@ -3,9 +3,9 @@
 use std::fmt::{Display, Formatter};
 use thiserror::Error;
 
-/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian). Their number is a constant
-/// of the type, and programs that read formulas compile an integrator for each.
-pub const MOST_COORDINATES: usize = 16;
+/// The largest number of coordinates of a formula: its second derivatives fit into memory. Programs that read formulas
+/// compile all integrators for up to 16.
+pub const MOST_COORDINATES: usize = 256;
 
 /// Invalid input to a formula.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -103,7 +103,7 @@ pub enum FormulaError {
     /// A Hamiltonian was requested of a Lagrangian.
     #[error("the formula is a Lagrangian; parse a Hamiltonian with `Formula::parse_hamiltonian`")]
     IsLagrangian,
-    /// The number of coordinates is outside the range that is compiled.
+    /// The number of coordinates is out of range.
     #[error(
         "the formula has {found} coordinates; it can have from 1 to {MOST_COORDINATES}. Use a lattice or bodies for \
          systems with more: `lattice` and `bodies` in Python, [lattice] in a scene"

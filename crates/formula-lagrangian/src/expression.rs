@@ -7,8 +7,11 @@ use crate::names::Names;
 use crate::node::Inputs;
 use crate::parser::{Parser, ValueName};
 use crate::tape::Tape;
-use crate::{Formula, FormulaError, Graph, Id, MOST_COORDINATES};
+use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Scalar;
+
+/// The number of coordinates up to which an evaluation with the conformal factor does not allocate.
+const FEW_COORDINATES: usize = 16;
 
 /// An expression over the names of a formula, evaluated along a motion; made by [`Formula::expression`].
 ///
@@ -96,8 +99,7 @@ impl Expression {
             return value;
         }
         // The logarithm is passed as one more coordinate.
-        let (mut wide_q, mut wide_v) = ([T::zero(); MOST_COORDINATES + 1], [T::zero(); MOST_COORDINATES + 1]);
-        if let (Some(to_q), Some(to_v)) = (wide_q.get_mut(..=n), wide_v.get_mut(..=n)) {
+        let mut wide = |to_q: &mut [T], to_v: &mut [T]| {
             for (to, from) in to_q.iter_mut().zip(q).chain(to_v.iter_mut().zip(v)) {
                 *to = *from;
             }
@@ -105,6 +107,11 @@ impl Expression {
                 *last = log_factor;
             }
             evaluate(to_q, to_v);
+        };
+        let (mut few_q, mut few_v) = ([T::zero(); FEW_COORDINATES + 1], [T::zero(); FEW_COORDINATES + 1]);
+        match (few_q.get_mut(..=n), few_v.get_mut(..=n)) {
+            (Some(to_q), Some(to_v)) => wide(to_q, to_v),
+            _ => wide(&mut vec![T::zero(); n + 1], &mut vec![T::zero(); n + 1]),
         }
         value
     }

@@ -7,7 +7,7 @@ use formula_lagrangian::Formula;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-fn run<const N: usize>(text: &str, names: &[&str], q: [f64; N], v: [f64; N], span: f64, wanted: f64) -> Outcome<N> {
+fn run<const N: usize>(text: &str, names: &[&str], q: [f64; N], v: [f64; N], span: f64, wanted: f64) -> Outcome {
     let lagrangian = Formula::parse(text, names, &[]).unwrap().lagrangian::<N>().unwrap();
     let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new(q, v, 0.0)).unwrap();
     problem.accuracy(wanted).run(Until::Time(span)).unwrap()

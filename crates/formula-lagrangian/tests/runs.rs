@@ -12,7 +12,7 @@ fn a_pendulum_by_gauss() {
     let typed = Pendulum { gamma: -0.1 };
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
     let gauss = GaussCollocation { stages: 8 };
-    let run = |outcome: discrete_herglotz::Outcome<1>| (outcome.q[0], outcome.p[0]);
+    let run = |outcome: discrete_herglotz::Outcome| (outcome.q[0], outcome.p[0]);
     let problem = Problem::new(&lagrangian, 0.0, start).unwrap();
     let ours = run(problem.by(gauss).steps(Steps::Size(0.5)).run(Until::Time(50.0)).unwrap());
     let problem = Problem::new(&typed, 0.0, start).unwrap();

@@ -6,14 +6,14 @@ use formula_lagrangian::Formula;
 use std::f64::consts::PI;
 
 /// The motion of one coordinate x from a position and a velocity, with a required accuracy.
-fn by_accuracy(text: &str, [x, v]: [f64; 2], span: f64, wanted: f64) -> Outcome<1> {
+fn by_accuracy(text: &str, [x, v]: [f64; 2], span: f64, wanted: f64) -> Outcome {
     let lagrangian = Formula::parse(text, &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
     let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new([x], [v], 0.0)).unwrap();
     problem.accuracy(wanted).run(Until::Time(span)).unwrap()
 }
 
 /// The same with a given integrator and number of steps.
-fn by_steps(text: &str, [x, v]: [f64; 2], span: f64, by: &str, steps: usize) -> Outcome<1> {
+fn by_steps(text: &str, [x, v]: [f64; 2], span: f64, by: &str, steps: usize) -> Outcome {
     let lagrangian = Formula::parse(text, &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
     let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new([x], [v], 0.0)).unwrap();
     problem.by(by.parse::<AnyIntegrator>().unwrap()).steps(Steps::Count(steps)).run(Until::Time(span)).unwrap()

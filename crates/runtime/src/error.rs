@@ -55,6 +55,17 @@ pub enum RuntimeError {
         /// Its value.
         value: f64,
     },
+    /// A formula with many coordinates was used where kernels are compiled for few.
+    #[error(
+        "a formula with more than {most} coordinates has no {what}: it runs by contact Gauss collocation as a smooth \
+         Lagrangian; use a lattice or bodies for sums of local terms"
+    )]
+    OfFewCoordinates {
+        /// What there is none for it.
+        what: &'static str,
+        /// The number of coordinates up to which there is.
+        most: usize,
+    },
     /// A force has no finite value at the start.
     #[error("the force on `{coordinate}` is {value} at the start; choose a start or a force where it is finite")]
     ForceUndefined {

@@ -1,7 +1,8 @@
 //! Motions of Lagrangians whose formula and dimension are known at run time only.
 //!
 //! The libraries below this one are generic in the number of coordinates and in the Lagrangian. This crate has one type
-//! for all formulas in 1 to 16 coordinates, for which the generic code is compiled once. [`System`] is a formula with
+//! for all formulas in 1 to 16 coordinates, for which the generic code is compiled once; formulas with more run by contact
+//! Gauss collocation, which evaluates them at one point at a time. [`System`] is a formula with
 //! its integrators, [`Motion`] a request for one motion, [`Ensemble`] for many, and [`BoundaryProblem`] for a path
 //! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates. [`Body`] is a
 //! rigid body about a fixed point.

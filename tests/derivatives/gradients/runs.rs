@@ -9,30 +9,45 @@ use discrete_herglotz::{GaussCollocation, Outcome, Problem, Run, SplittingScheme
 
 /// An integrator whose runs are differentiated.
 pub trait Method: Copy {
-    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N>;
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(
+        self,
+        problem: &'p Problem<'_, L, N>,
+    ) -> Run<'p, 'o, Problem<'p, L, N>>;
 }
 
 impl Method for GaussCollocation {
-    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(
+        self,
+        problem: &'p Problem<'_, L, N>,
+    ) -> Run<'p, 'o, Problem<'p, L, N>> {
         problem.by(self)
     }
 }
 
 impl Method for SplittingScheme {
-    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(
+        self,
+        problem: &'p Problem<'_, L, N>,
+    ) -> Run<'p, 'o, Problem<'p, L, N>> {
         problem.by(self)
     }
 }
 
 impl Method for rules::Method {
-    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(
+        self,
+        problem: &'p Problem<'_, L, N>,
+    ) -> Run<'p, 'o, Problem<'p, L, N>> {
         problem.by(self)
     }
 }
 
 /// Compositions.
 impl Method for (rules::Method, SplittingScheme) {
-    fn run<'p, 'o, L: Parametric<N>, const N: usize>(self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'o, L, N> {
+    fn run<'p, 'o, L: Parametric<N>, const N: usize>(
+        self,
+        problem: &'p Problem<'_, L, N>,
+    ) -> Run<'p, 'o, Problem<'p, L, N>> {
         problem.by(CompositionMethod::new(self.0, self.1))
     }
 }
@@ -62,7 +77,7 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
     }
 
     /// The end of the run with a variable moved by a distance.
-    fn moved(&self, variable: &Variable, by: f64) -> Outcome<N> {
+    fn moved(&self, variable: &Variable, by: f64) -> Outcome {
         let (mut start, mut t0, mut t_end) = (self.start(), self.t0, self.t_end);
         let mut changed = None;
         let (Start::Velocity(VelocityPoint { q, v: rate, z })

@@ -104,12 +104,12 @@ pub fn run<H: ContactHamiltonian<N>, const N: usize>(
     (stages, h): (usize, f64),
     end: f64,
     mut see: impl FnMut(f64, &PhasePoint<N>, f64),
-) -> Outcome<N> {
+) -> Outcome {
     let of = OfHamiltonian(hamiltonian);
     let problem = Problem::of_hamiltonian(&of, t0, start).unwrap();
     see(t0, &start, 0.0);
     let mut log_factor = 0.0;
-    let mut observer = Each(|at: &StepView<'_, N>| {
+    let mut observer = Each(|at: &StepView<'_>| {
         log_factor += at.sigma.ln();
         see(at.t, &at.state, log_factor);
     });

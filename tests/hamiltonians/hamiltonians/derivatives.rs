@@ -73,7 +73,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         Problem::new(self.lagrangian, SPAN.0, self.start).unwrap()
     }
 
-    fn run<'p>(&self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'p, L, N> {
+    fn run<'p>(&self, problem: &'p Problem<'_, L, N>) -> Run<'p, 'p, Problem<'p, L, N>> {
         problem.by(GaussCollocation { stages: self.stages }).steps(Steps::Count(7))
     }
 

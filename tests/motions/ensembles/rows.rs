@@ -136,7 +136,7 @@ fn observers_of_members_see_what_those_of_single_runs_do() {
             let bottom = Event::new(|_, x: &contact_geom::PhasePoint<1>| x.q[0]);
             Ok((Rows::every(2)?.with_energy().with_velocity(), Events::new([bottom])))
         };
-        let seen = |(rows, events): (Rows<'_, 1>, Events<'_, 1>)| (rows.rows, events.crossings);
+        let seen = |(rows, events): (Rows<'_>, Events<'_>)| (rows.rows, events.crossings);
         let start = |i: usize| if i == 4 { VelocityPoint::new([0.0], [f64::INFINITY], 0.0) } else { pendulum_start(i) };
         let run = |threads: usize| {
             let ensemble = Ensemble::new(&pendulum, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(threads);
@@ -173,7 +173,7 @@ fn observers_of_members_see_what_those_of_single_runs_do() {
     }
     let ensemble = Ensemble::new(&pendulum, 0.0, 9, pendulum_start).by(SplittingScheme::STRANG).steps(Steps::Count(4));
     let none = |_: usize| Rows::every(1);
-    let observed = ensemble.checkpoint("nowhere").observe(none, |rows: Rows<'_, 1>| rows.rows);
-    let fold = |_: &Member<1>, _: Option<Vec<Row<1>>>| unreachable!("nothing is computed");
+    let observed = ensemble.checkpoint("nowhere").observe(none, |rows: Rows<'_>| rows.rows);
+    let fold = |_: &Member<1>, _: Option<Vec<Row>>| unreachable!("nothing is computed");
     assert!(matches!(observed.run(Until::Time(1.0), fold), Err(EnsembleError::Observed)));
 }

@@ -108,7 +108,7 @@ fn problem(system: &One, start: VelocityPoint<1>) -> Problem<'_, One, 1> {
 }
 
 /// The error in (q, p) of a run up to a time, relative to their size.
-fn error(run: Run<'_, '_, One, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
+fn error(run: Run<'_, '_, Problem<'_, One, 1>>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
     let outcome = run.run(Until::Time(t))?;
     assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
     let size = truth[0].hypot(truth[1]);
@@ -152,7 +152,7 @@ fn steps_far_beyond_the_period() {
 }
 
 /// A run with a relative error of a millionth, by a named integrator or by the default.
-fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, One, 1>, name: Option<&str>) -> Run<'p, 'o, One, 1> {
+fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, One, 1>, name: Option<&str>) -> Run<'p, 'o, Problem<'p, One, 1>> {
     let run = problem.accuracy(1e-6);
     if let Some(name) = name { run.by(by(name)) } else { run }
 }

@@ -23,7 +23,7 @@ const CASES: u32 = 8;
 const BOUND: f64 = 1e-9;
 
 /// A state and `sigma_d` after one step.
-fn step<const N: usize>(stepper: Result<impl Stepper<N>, InputError>) -> Result<(PhasePoint<N>, f64), String> {
+fn step<const N: usize>(stepper: Result<impl Stepper, InputError>) -> Result<(PhasePoint<N>, f64), String> {
     let mut stepper = stepper.map_err(|e| e.to_string())?;
     stepper.advance(1).map_err(|halt| halt.cause.to_string())?;
     Ok((stepper.state(), stepper.sigma()))

@@ -63,8 +63,8 @@ fn events<'f, const N: usize, L: Lagrangian<N>>(
     system: &L,
     x: VelocityPoint<N>,
     (stages, steps, until): (usize, usize, f64),
-    events: impl IntoIterator<Item = Event<'f, N>>,
-) -> (Outcome<N>, Vec<Crossing<N>>) {
+    events: impl IntoIterator<Item = Event<'f>>,
+) -> (Outcome, Vec<Crossing>) {
     let mut events = Events::new(events);
     let problem = Problem::new(system, 0.0, x).unwrap();
     let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Count(steps)).observe(&mut events);

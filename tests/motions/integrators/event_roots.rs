@@ -26,8 +26,8 @@ fn times_of(
     system: &One,
     (t0, x, v): (f64, f64, f64),
     (stages, steps, to): (usize, usize, f64),
-    event: Event<'_, 1>,
-) -> (Outcome<1>, Vec<f64>) {
+    event: Event<'_>,
+) -> (Outcome, Vec<f64>) {
     let mut events = Events::new([event]);
     let problem = Problem::new(system, t0, VelocityPoint::new([x], [v], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(steps));

@@ -32,7 +32,7 @@ pub struct Driven {
 
 impl Driven {
     /// The time derivative of the function of a crossing: of the momentum for event 1, of the position for others.
-    fn rate(&self, c: &Crossing<1>) -> f64 {
+    fn rate(&self, c: &Crossing) -> f64 {
         match c.event {
             1 => self.force * (self.frequency * c.t).cos() - c.state.q[0] - 0.02 * c.state.p[0],
             _ => c.state.p[0],
@@ -52,8 +52,8 @@ fn run_to<'f>(
     (t0, start): (f64, impl Into<Start<1>>),
     (by, steps): (AnyIntegrator, Steps),
     to: f64,
-    events: impl IntoIterator<Item = Event<'f, 1>>,
-) -> (discrete_herglotz::Outcome<1>, Vec<Crossing<1>>) {
+    events: impl IntoIterator<Item = Event<'f>>,
+) -> (discrete_herglotz::Outcome, Vec<Crossing>) {
     let mut events = Events::new(events);
     let problem = Problem::new(system, t0, start).unwrap();
     let outcome = problem.by(by).steps(steps).observe(&mut events).run(Until::Time(to)).unwrap();
@@ -304,7 +304,7 @@ fn whole_and_divided(
     [begin, end]: [f64; 2],
     (cuts, own): (&[f64], &[bool]),
     stages: usize,
-) -> Option<[Vec<Crossing<1>>; 2]> {
+) -> Option<[Vec<Crossing>; 2]> {
     let system = One::from(driven);
     let way = (AnyIntegrator::Gauss { stages }, Steps::Size(0.05));
     let all = || {
@@ -339,8 +339,8 @@ fn whole_and_divided(
 }
 
 /// The same crossings, at the same times up to round-off.
-fn assert_same_crossings(driven: Driven, [whole, divided]: &[Vec<Crossing<1>>; 2]) {
-    let names = |found: &[Crossing<1>]| found.iter().map(|c| c.event).collect::<Vec<_>>();
+fn assert_same_crossings(driven: Driven, [whole, divided]: &[Vec<Crossing>; 2]) {
+    let names = |found: &[Crossing]| found.iter().map(|c| c.event).collect::<Vec<_>>();
     assert_eq!(names(whole), names(divided), "{whole:?} and {divided:?}");
     for (a, b) in whole.iter().zip(divided) {
         // The rounding of 400 steps of a motion of size 5, over the rate, and the rounding of the time.

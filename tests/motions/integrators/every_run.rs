@@ -35,7 +35,7 @@ fn everything(known: OneCoordinate, integrator: impl for<'a> Integrator<'a, One,
     let name = integrator.info().name;
     let (system, initial) = (&one(known), known.initial());
     let problem = Problem::new(system, 0.25, initial).unwrap();
-    let of = |problem: &Problem<'_, One, 1>, until: f64| -> Outcome<1> {
+    let of = |problem: &Problem<'_, One, 1>, until: f64| -> Outcome {
         problem.by(integrator.clone()).steps(Steps::Size(0.05)).run(Until::Time(until)).unwrap()
     };
     let error = |order: i32| f64::powi(0.15, order) + 1e-12;
@@ -50,7 +50,7 @@ fn everything(known: OneCoordinate, integrator: impl for<'a> Integrator<'a, One,
     let mut rows = Rows::at([0.25, 0.3, 1.111, 2.0, 3.25]).unwrap().with_energy().with_conformal_factor();
     let observed = problem.by(integrator.clone()).steps(Steps::Size(0.05)).observe(&mut rows).with_conformal_factor();
     assert_eq!(observed.run(Until::Time(3.25)).unwrap().state(), whole.state(), "{name}");
-    let kept = |row: &discrete_herglotz::Row<1>| row.energy.unwrap() / row.log_factor.unwrap().exp();
+    let kept = |row: &discrete_herglotz::Row| row.energy.unwrap() / row.log_factor.unwrap().exp();
     let off = max_abs_or_nan(rows.rows.iter().map(|row| kept(row) / kept(&rows.rows[0]) - 1.0));
     assert!(rows.rows.len() == 5 && off <= error(order), "{name}: {off:e}");
 
@@ -66,9 +66,9 @@ fn everything(known: OneCoordinate, integrator: impl for<'a> Integrator<'a, One,
     let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", known.name()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
     let mut seen = 0;
-    let mut last = Each(|at: &StepView<'_, 1>| seen = at.k);
+    let mut last = Each(|at: &StepView<'_>| seen = at.k);
     let mut enough = StopsAt(30, "the user");
-    let run = || -> Run<'_, '_, One, 1> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
+    let run = || -> Run<'_, '_, Problem<'_, One, 1>> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
     let run_to_30 = run().observe(&mut saved).observe(&mut last).observe(&mut enough);
     let cut = run_to_30.run(Until::Time(3.25)).unwrap();
     assert_eq!((cut.status, seen), (Status::Stopped { step: 30, t: cut.t, by: "the user" }, 30), "{name}");

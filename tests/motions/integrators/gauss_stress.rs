@@ -190,7 +190,7 @@ fn unresolved_steps_are_flagged() {
         let (refused, unresolved) = flagged(1e-4, s);
         assert!(!refused && unresolved.is_none(), "s = {s}: {unresolved:?}");
     }
-    let unflagged = |mut stepper: Box<dyn Stepper<1> + '_>, steps: usize| {
+    let unflagged = |mut stepper: Box<dyn Stepper + '_>, steps: usize| {
         stepper.advance(steps).unwrap();
         assert_eq!(stepper.unresolved(), None);
     };

@@ -42,7 +42,7 @@ fn check<const N: usize>(
     assert!(deviation <= walk, "{name}: deviation {deviation:e}");
 }
 
-fn runner<const N: usize>(mut stepper: impl Stepper<N> + 'static) -> Box<dyn FnMut(usize) -> PhasePoint<N>> {
+fn runner<const N: usize>(mut stepper: impl Stepper + 'static) -> Box<dyn FnMut(usize) -> PhasePoint<N>> {
     Box::new(move |n| {
         stepper.advance(n).unwrap();
         stepper.state()

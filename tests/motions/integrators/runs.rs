@@ -39,12 +39,12 @@ fn from_start<L: Lagrangian<1>>(lagrangian: &L) -> Problem<'_, L, 1> {
 fn ten_steps<'p, 'o, L: Lagrangian<N>, const N: usize>(
     problem: &'p Problem<'p, L, N>,
     by: AnyIntegrator,
-) -> Run<'p, 'o, L, N> {
+) -> Run<'p, 'o, Problem<'p, L, N>> {
     problem.by(by).steps(Steps::Count(10))
 }
 
 /// The titles of what a plan computes, and of what it skips.
-fn titles<const N: usize>(plan: &Plan<'_, N>, computed: bool) -> Vec<&'static str> {
+fn titles<const N: usize>(plan: &Plan<'_>, computed: bool) -> Vec<&'static str> {
     plan.entries().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
 }
 
@@ -382,7 +382,7 @@ fn bad_runs() {
     let mut all = Rows::every(1).unwrap();
     let many = problem.steps(Steps::Count(1 << 40)).observe(&mut all).run(until);
     assert!(matches!(many.err(), Some(InputError::TooMany { what: "the number of rows", .. })));
-    assert!(matches!(Rows::<1>::every(0).err(), Some(InputError::Count { found: 0, .. })));
+    assert!(matches!(Rows::every(0).err(), Some(InputError::Count { found: 0, .. })));
     let nowhere = VelocityPoint::new([f64::NAN], [0.0], 0.0);
     assert!(matches!(Problem::new(&pendulum, 0.0, nowhere).err(), Some(InputError::Geometry(_))));
     // The error names the hypothesis.

@@ -187,7 +187,7 @@ fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
 
 /// The orbit over a little more than three revolutions with an accuracy, by an integrator or the default; and the true
 /// error.
-fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, Outcome<2>, f64) {
+fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, Outcome, f64) {
     let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
     let problem = Problem::new(&kepler, 0.0, pericentre(e)).unwrap();
     let run = problem.accuracy(wanted);

@@ -23,12 +23,7 @@ fn equal_points() {
 }
 
 /// A run of a rule by a number of steps of a size from t = 0, with a row of each.
-fn every_step(
-    lagrangian: &One,
-    start: PhasePoint<1>,
-    method: Method,
-    (h, steps): (f64, usize),
-) -> (Outcome<1>, Vec<Row<1>>) {
+fn every_step(lagrangian: &One, start: PhasePoint<1>, method: Method, (h, steps): (f64, usize)) -> (Outcome, Vec<Row>) {
     let problem = Problem::new(lagrangian, 0.0, start).unwrap();
     let mut rows = Rows::every(1).unwrap();
     let run = problem.by(AnyIntegrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut rows);
@@ -36,7 +31,7 @@ fn every_step(
     (outcome, rows.rows)
 }
 
-fn all_finite(rows: &[Row<1>]) -> bool {
+fn all_finite(rows: &[Row]) -> bool {
     rows.iter().all(|row| [row.t, row.q[0], row.p[0], row.z.unwrap_or(f64::NAN)].iter().all(|x| x.is_finite()))
 }
 

@@ -12,7 +12,7 @@ fn run_to<L: Lagrangian<N>, const N: usize>(
     start: VelocityPoint<N>,
     span: f64,
     wanted: f64,
-) -> Result<Outcome<N>, InputError> {
+) -> Result<Outcome, InputError> {
     Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
 }
 

@@ -33,7 +33,7 @@ fn run_in<'r, 'o, L: Lagrangian<N>, const N: usize>(
     integrator: AnyIntegrator,
     count: usize,
     span: f64,
-) -> Run<'r, 'o, L, N> {
+) -> Run<'r, 'o, Problem<'r, L, N>> {
     problem.by(integrator).steps(steps(integrator, count, span))
 }
 
@@ -97,7 +97,7 @@ fn rows_at_times() {
         let observed = run_in(&problem, integrator, 40, span).observe(&mut rows).run(Until::Time(span)).unwrap();
         assert_eq!(observed, run_in(&problem, integrator, 40, span).run(Until::Time(span)).unwrap(), "{integrator}");
         assert_eq!(rows.rows.iter().map(|row| row.t).collect::<Vec<_>>(), times, "{integrator}");
-        let error = |row: &discrete_herglotz::Row<2>, truth: &Option<PhasePoint<2>>| {
+        let error = |row: &discrete_herglotz::Row, truth: &Option<PhasePoint<2>>| {
             let state = PhasePoint { q: row.q, p: row.p, z: row.z.unwrap() };
             assert_eq!(row.v, Some(row.p));
             truth.map_or(0.0, |truth| distance(&state, &truth))
@@ -247,7 +247,7 @@ fn the_factor_of_a_stop_is_that_up_to_it() {
 fn events_that_are_not_defined() {
     let pendulum = one(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
-    let run = |events: &mut Events<'_, 1>| {
+    let run = |events: &mut Events<'_>| {
         problem
             .by(AnyIntegrator::Gauss { stages: 4 })
             .steps(Steps::Count(20))
@@ -286,8 +286,8 @@ fn observers_ask_and_stop() {
         let plain = run_in(&problem, integrator, 20, 1.0).without_action().run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.z, plain.log_factor), (None, None));
         let mut seen = Vec::new();
-        let mut watch = Each(|at: &StepView<'_, 2>| seen.push((at.k, at.t, at.energy().unwrap())));
-        let watched: Outcome<2> =
+        let mut watch = Each(|at: &StepView<'_>| seen.push((at.k, at.t, at.energy().unwrap())));
+        let watched: Outcome =
             run_in(&problem, integrator, 20, 1.0).without_action().observe(&mut watch).run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.q, plain.p, plain.steps), (watched.q, watched.p, watched.steps), "{integrator}");
         assert!(watched.z.is_some() && seen.len() == watched.steps, "{integrator}");
@@ -310,7 +310,7 @@ fn what_cannot_be_observed_is_refused() {
     let pendulum = one(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     for times in [vec![1.0, 0.5, 2.0], vec![0.0, f64::NAN], vec![f64::INFINITY], vec![1.0, 1.0]] {
-        assert!(matches!(Rows::<1>::at(times.clone()), Err(InputError::Times { .. })), "{times:?}");
+        assert!(matches!(Rows::at(times.clone()), Err(InputError::Times { .. })), "{times:?}");
     }
     let run = |times: &[f64], to| {
         let mut rows = Rows::at(times.iter().copied()).unwrap();

@@ -10,7 +10,7 @@ use discrete_herglotz::{
     splitting::{ActionSplitting, Splitting, Strang},
 };
 
-type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
+type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper + 'a>, InputError> + 'a;
 
 /// The numbers of steps after which the walk is measured.
 const LENGTHS: [usize; 3] = [1 << 10, 1 << 12, 1 << 14];

@@ -12,7 +12,7 @@ fn ball(gamma: f64, g: f64, law: Impact) -> SwitchingOne {
 }
 
 /// The run of a ball from the height 1 at rest, with its impacts.
-fn dropped(ball: &SwitchingOne, steps: Steps, t_end: f64) -> (Outcome<1>, Vec<f64>) {
+fn dropped(ball: &SwitchingOne, steps: Steps, t_end: f64) -> (Outcome, Vec<f64>) {
     let problem = Problem::new(ball, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let mut resets = Resets::new();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(steps);

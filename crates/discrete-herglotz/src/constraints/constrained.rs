@@ -4,6 +4,7 @@ use super::drag_rattle::substeps;
 use super::variation::{Along, Varied};
 use super::{ConstrainedStart, ContactLobatto, DragRattle, OffConstraint};
 use crate::integration::{StepFormula, check_kicks};
+use crate::system::OfTyped;
 use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -102,7 +103,7 @@ where
                 if let Some((claim, _)) = missing.into_iter().find(|(_, claimed)| !claimed) {
                     return Err(InputError::Unclaimed { claim });
                 }
-                check_kicks(lagrangian, "RATTLE")
+                check_kicks(&OfTyped(lagrangian), "RATTLE")
             }
             ConstrainedMethod::Lobatto { stages } => ContactLobatto::<L, C, N, M>::check(lagrangian, stages),
         }
@@ -113,7 +114,7 @@ where
         problem: &Problem<'a, L, N>,
         h: f64,
         _options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let start = self.start(problem.t0, problem.start);
         let constraint = self.constraint.clone();
         Ok(match self.method {

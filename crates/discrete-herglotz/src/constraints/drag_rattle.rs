@@ -6,7 +6,7 @@ use super::{ConstrainedStart, Corrections, Progress};
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, SplittingScheme, StepError, StepFailure, Stepper};
+use crate::{InputError, SplittingScheme, State, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
@@ -287,7 +287,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
     }
 }
 
-impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Stepper<N> for DragRattle<L, C, N, M> {
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Stepper for DragRattle<L, C, N, M> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let step = self.step(self.time(), &self.state).map_err(|cause| StepFailure { taken, cause })?;
@@ -299,8 +299,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.state
+    fn state(&self) -> State {
+        self.state.into()
     }
 
     fn time(&self) -> f64 {

@@ -89,7 +89,7 @@ where
         problem: &Problem<'a, L, N>,
         h: f64,
         _options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let start = ConstrainedStart { t: problem.t0, ..ConstrainedStart::new(problem.start) };
         let rule = |h| self.rule.discretise(problem, h);
         let distribution = self.distribution.clone();

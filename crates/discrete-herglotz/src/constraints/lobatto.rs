@@ -7,7 +7,7 @@ use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_s
 use crate::integration::check_unforced;
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
-use crate::{InputError, StepError, StepFailure, Stepper};
+use crate::{InputError, State, StepError, StepFailure, Stepper, Vector};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
@@ -427,7 +427,7 @@ fn real<T: Scalar, const N: usize>(x: &ChartVector<N, T>) -> ChartVector<N> {
     ChartVector { x: x.x.map(|e| e.re()), y: x.y.map(|e| e.re()), z: x.z.re() }
 }
 
-impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Stepper<N> for ContactLobatto<L, C, N, M> {
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Stepper for ContactLobatto<L, C, N, M> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let mut workspace = std::mem::replace(&mut self.workspace, Workspace::empty());
@@ -441,8 +441,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.state
+    fn state(&self) -> State {
+        self.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -457,8 +457,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
         self.evaluations
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        Some(self.velocity)
+    fn last_velocity(&self) -> Option<Vector> {
+        Some(self.velocity.into())
     }
 
     fn save(&self) -> Option<Vec<u64>> {

@@ -6,7 +6,7 @@ use super::start::{inverse_mass, round_off, tangent_velocity};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
 use crate::integration::check_unforced;
 use crate::numbers::state_words::{restored_from, saved, words_of};
-use crate::{DiscreteLagrangian, InputError, SplittingScheme, StepError, StepFailure, Stepper};
+use crate::{DiscreteLagrangian, InputError, SplittingScheme, State, StepError, StepFailure, Stepper, Vector};
 use contact_geom::constraints::{Distribution, DistributionDerivatives};
 use contact_geom::nalgebra::SVector;
 use contact_geom::support::independent_rows;
@@ -117,7 +117,7 @@ where
             return Err(InputError::Step { h });
         }
         let mut x = start.at;
-        crate::integration::problem::check_time(start.t)?;
+        crate::integration::system_problem::check_time(start.t)?;
         PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
         let substeps = substeps(scheme)?;
         let omega = distribution.omega(&x.q);
@@ -258,7 +258,7 @@ where
     }
 }
 
-impl<L, W, D, const N: usize, const M: usize> Stepper<N> for Nonholonomic<L, W, D, N, M>
+impl<L, W, D, const N: usize, const M: usize> Stepper for Nonholonomic<L, W, D, N, M>
 where
     L: Lagrangian<N>,
     W: Distribution<N, M>,
@@ -272,8 +272,8 @@ where
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.current.state
+    fn state(&self) -> State {
+        self.current.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -288,8 +288,8 @@ where
         self.evaluations
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        Some(self.current.velocity)
+    fn last_velocity(&self) -> Option<Vector> {
+        Some(self.current.velocity.into())
     }
 
     fn save(&self) -> Option<Vec<u64>> {

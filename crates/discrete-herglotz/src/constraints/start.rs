@@ -69,7 +69,7 @@ impl<const N: usize> ConstrainedStart<N> {
         h: f64,
     ) -> Result<VelocityPoint<N>, InputError> {
         let mut x = self.at;
-        crate::integration::problem::check_time(self.t)?;
+        crate::integration::system_problem::check_time(self.t)?;
         PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
         let (c, g) = constraint.with_jacobian(&x.q);
         if !(c.iter().chain(g.iter()).all(|e| e.is_finite())) {

@@ -1,8 +1,8 @@
 //! Ensembles with a requested error.
 
+use crate::GaussCollocation;
 use crate::ensemble::builder::Ensemble;
-use crate::ensemble::step_control::StepControl;
-use crate::{GaussCollocation, Run};
+use crate::ensemble::step_control::{MemberRun, StepControl};
 use contact_geom::Lagrangian;
 
 /// The number of stages if no integrator is given.
@@ -25,7 +25,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// with the error that was reached. So the error bound holds for each member, as far as two runs that agree are
     /// right. The cost is three times that of given steps.
     pub fn accuracy(self, wanted: f64) -> Self {
-        fn within<'p, 'o, L: Lagrangian<N>, const N: usize>(run: Run<'p, 'o, L, N>, wanted: f64) -> Run<'p, 'o, L, N> {
+        fn within<'p, 'o, L: Lagrangian<N>, const N: usize>(
+            run: MemberRun<'p, 'o, L, N>,
+            wanted: f64,
+        ) -> MemberRun<'p, 'o, L, N> {
             run.accuracy(wanted)
         }
         let stages = if wanted < SMALL_ERROR { STAGES_FOR_SMALL_ERRORS } else { DEFAULT_STAGES };

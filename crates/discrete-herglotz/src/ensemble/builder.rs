@@ -255,7 +255,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let Some(length) = self.length else { return Err(refused(InputError::NoSteps)) };
         let common = Common { t0: self.t0, length, until, action: self.action, rows: self.rows };
         if let Some(stride) = self.rows {
-            Rows::<N>::every(stride).map_err(refused)?;
+            Rows::every(stride).map_err(refused)?;
         }
         let (mut planned, mut refused) = (None, None);
         for index in self.sample() {

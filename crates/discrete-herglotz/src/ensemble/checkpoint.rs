@@ -5,7 +5,7 @@ use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard};
 use crate::numbers::state_words::digest;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};
+use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep, Vector};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::collections::BTreeMap;
@@ -197,7 +197,7 @@ pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard
             steps.load(from)?;
             t.load(from)?;
             state.load(from)?;
-            rows = load_rows(from)?;
+            rows = load_rows::<N>(from)?;
             Ok(Ending { status: Status::Completed, unresolved, steps, t, state })
         } else {
             Err(InputError::NoSteps)
@@ -207,25 +207,27 @@ pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard
     from.is_empty().then_some((shard, Shard { members, batch_kernel, with_causes: false }))
 }
 
-fn save_rows<const N: usize>(rows: &[Row<N>], to: &mut Vec<u64>) {
+fn save_rows(rows: &[Row], to: &mut Vec<u64>) {
     rows.len().save(to);
     for Row { t, q, p, z, .. } in rows {
         t.save(to);
-        [*q, *p].save(to);
+        q.save(to);
+        p.save(to);
         save_option(z.as_ref(), to);
     }
 }
 
-fn load_rows<const N: usize>(from: &mut &[u64]) -> Option<Vec<Row<N>>> {
+fn load_rows<const N: usize>(from: &mut &[u64]) -> Option<Vec<Row>> {
     let mut count = 0;
     count.load(from)?;
     // A row has at least one word.
     let mut rows = Vec::with_capacity(from.len().min(count));
     for _ in 0..count {
-        let (mut t, mut x) = (0.0, [SVector::zeros(); 2]);
+        let (mut t, mut q, mut p) = (0.0, Vector::zeros(N), Vector::zeros(N));
         t.load(from)?;
-        x.load(from)?;
-        let ([q, p], z) = (x, load_option(from, || 0.0)?);
+        q.load(from)?;
+        p.load(from)?;
+        let z = load_option(from, || 0.0)?;
         rows.push(Row { t, q, v: None, p, z, energy: None, log_factor: None, columns: Vec::new() });
     }
     Some(rows)

@@ -31,7 +31,7 @@ pub(crate) struct Lane<const N: usize> {
     /// The current state.
     pub state: PhasePoint<N>,
     /// The rows, if they are recorded.
-    pub rows: Option<Vec<Row<N>>>,
+    pub rows: Option<Vec<Row>>,
     /// Whether a step may not have resolved the motion.
     pub suspect: bool,
     /// Whether the state is the result. If it is not, the member has a run of its own.
@@ -60,8 +60,9 @@ impl<const N: usize> Lane<N> {
     }
 }
 
-fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bool) -> Row<N> {
-    Row { t, q, v: None, p, z: action.then_some(z), energy: None, log_factor: None, columns: Vec::new() }
+fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bool) -> Row {
+    let z = action.then_some(z);
+    Row { t, q: q.into(), v: None, p: p.into(), z, energy: None, log_factor: None, columns: Vec::new() }
 }
 
 /// Flags members as interrupted: each then has a run of its own, which reports how far it came.

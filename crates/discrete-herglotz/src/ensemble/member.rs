@@ -11,7 +11,7 @@ pub struct Member<const N: usize> {
     /// The result of the motion; an error if it could not start, as in a single run.
     pub ending: Result<Ending<N>, InputError>,
     /// The recorded states, if [rows](crate::Ensemble::rows_every) are requested.
-    pub rows: Vec<Row<N>>,
+    pub rows: Vec<Row>,
 }
 
 /// The result of the motion of a member: the final state, or the last state that was computed if the run ended early.
@@ -29,10 +29,10 @@ pub struct Ending<const N: usize> {
     pub state: PhasePoint<N>,
 }
 
-impl<const N: usize> From<Outcome<N>> for Ending<N> {
-    fn from(outcome: Outcome<N>) -> Self {
+impl<const N: usize> From<Outcome> for Ending<N> {
+    fn from(outcome: Outcome) -> Self {
         let Outcome { status, unresolved, steps, t, .. } = outcome;
-        Ending { status, unresolved, steps, t, state: outcome.state() }
+        Ending { status, unresolved, steps, t, state: outcome.state().fixed() }
     }
 }
 

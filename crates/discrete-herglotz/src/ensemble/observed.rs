@@ -16,7 +16,7 @@ const MEMBERS_PER_OBSERVED_SHARD: usize = 16;
 ///
 /// ```
 /// use contact_examples::systems::Pendulum;
-/// use contact_geom::{PhasePoint, VelocityPoint};
+/// use contact_geom::VelocityPoint;
 /// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Steps, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };
@@ -24,8 +24,8 @@ const MEMBERS_PER_OBSERVED_SHARD: usize = 16;
 /// let ensemble = problem.ensemble(10, |i| VelocityPoint::new([0.1 + 0.1 * i as f64], [0.0], 0.0));
 /// let ensemble = ensemble.by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
 /// // The times at which each pendulum hangs down.
-/// let downward = |_: usize| Ok(Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]));
-/// let times = |events: Events<'_, 1>| events.crossings.iter().map(|crossing| crossing.t).collect::<Vec<f64>>();
+/// let downward = |_: usize| Ok(Events::new([Event::new(|_, x| x.q[0])]));
+/// let times = |events: Events<'_>| events.crossings.iter().map(|crossing| crossing.t).collect::<Vec<f64>>();
 /// ensemble.observe(downward, times).run(Until::Time(10.0), |member, times| println!("{}: {times:?}", member.index))?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -42,7 +42,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// Each member has a run of its own, distributed over the threads, since observers may request quantities of a run
     /// (the velocity, the energy, the last step with dense output) that lanes do not have. To record states after a
     /// number of steps in lanes, use [`rows_every`](Self::rows_every).
-    pub fn observe<O: Observer<N>, S: Send, F, T>(self, observer: F, extract: T) -> ObservedEnsemble<'a, L, F, T, N>
+    pub fn observe<O: Observer, S: Send, F, T>(self, observer: F, extract: T) -> ObservedEnsemble<'a, L, F, T, N>
     where
         F: Fn(usize) -> Result<O, InputError> + Sync,
         T: Fn(O) -> S + Sync,
@@ -58,7 +58,7 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
     /// # Errors
     /// Those of [`Ensemble::run`]; [`EnsembleError::Observed`] with a checkpoint. If an observer refuses the run of its
     /// member, the fold is called with the cause.
-    pub fn run<O: Observer<N>, S: Send>(
+    pub fn run<O: Observer, S: Send>(
         &self,
         until: Until,
         mut fold: impl FnMut(&Member<N>, Option<S>),

@@ -1,10 +1,10 @@
 //! The run of a single member.
 
 use crate::ensemble::member::{Ending, Member};
-use crate::ensemble::step_control::StepControl;
+use crate::ensemble::step_control::{MemberRun, StepControl};
 use crate::run::Interruption;
 use crate::{
-    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, StepError, Stepper,
+    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Start, StepError, Stepper,
     StepperOptions, Until,
     integration::{BatchKernel, StepFormula},
 };
@@ -39,7 +39,7 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         problem: &Problem<'p, L, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'p>, InputError> {
         self.integrator.stepper(&self.own(problem), h, options)
     }
 
@@ -101,7 +101,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         lagrangian: &'a L,
         start: Start<N>,
         interrupt: Option<Interrupt<'a>>,
-        then: impl FnOnce(Run<'_, '_, L, N>) -> Result<R, E>,
+        then: impl FnOnce(MemberRun<'_, '_, L, N>) -> Result<R, E>,
     ) -> Result<R, E> {
         let problem = Problem { interrupt, ..Problem::new(lagrangian, self.t0, start)? };
         let run = self.length.of(problem.by(OfMember { integrator, lagrangian }));
@@ -114,7 +114,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
         (index, start): (usize, Start<N>),
-        observer: Option<&mut impl Observer<N>>,
+        observer: Option<&mut impl Observer>,
         interrupt: Option<Interrupt<'a>>,
     ) -> Member<N> {
         let (mut rows, mut asking) = (Vec::new(), interrupt.map(Interruption));
@@ -153,7 +153,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         interrupt: Option<Interrupt<'a>>,
     ) -> Result<(f64, usize), InputError> {
         self.with(integrator, lagrangian, start, interrupt, |run| {
-            let plan: Plan<'_, N> = run.plan(self.until)?;
+            let plan: Plan<'_> = run.plan(self.until)?;
             Ok((plan.step_size(), plan.count()))
         })
     }

@@ -11,7 +11,8 @@ use crate::numbers::lanes::{branched, forget_branches};
 use crate::numbers::state_words::digest;
 use crate::run::may_drift;
 use crate::switching::has_switching_functions;
-use crate::{InputError, Integrator, Interrupt, Observer, Rows, Start, Status};
+use crate::system::OfTyped;
+use crate::{InputError, Integrator, Interrupt, Observer, Point, Rows, Start, Status};
 use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, VelocityPoint, legendre};
 use std::ops::Range;
 
@@ -93,11 +94,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         if const { L::HINTS.hamiltonian } {
             return Kernel::OneByOne;
         }
-        let start = VelocityPoint { q: state.q, v: state.p, z: state.z };
-        if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
+        let (system, start) = (OfTyped(lagrangian), Point::new(state.q, state.p, state.z));
+        if has_switching_functions(&system, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
         }
-        let separable = is_separable(lagrangian, &structure);
+        let separable = is_separable(&system, &structure);
         let kernel = match self.integrator.batch_kernel() {
             Some(BatchKernel::Splitting(scheme)) if separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state)
@@ -143,12 +144,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs the members again that have not completed.
     pub(crate) fn run_again(&self, shard: &mut Shard<N>) {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
-            *member = self.run_single(member.index, None::<&mut Rows<'_, N>>);
+            *member = self.run_single(member.index, None::<&mut Rows<'_>>);
         }
     }
 
     /// Runs a member with a run of its own, and with an observer if there is one.
-    pub(crate) fn run_single(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
+    pub(crate) fn run_single(&self, index: usize, observer: Option<&mut impl Observer>) -> Member<N> {
         let (lagrangian, start) = (self.members)(index);
         self.common.run(self.integrator, lagrangian, (index, start), observer, self.interrupt)
     }
@@ -205,18 +206,19 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         if !branched() {
             let order = self.integrator.info().order;
-            let structure = lagrangian.structure();
+            let (system, structure) = (OfTyped(lagrangian), lagrangian.structure());
             let dissipates = structure.autonomous && structure.has_constant_rate() && (structure.z_free || action);
             for ((place, from), Lane { state, rows, suspect, status, .. }) in places.into_iter().zip(&states).zip(lanes)
             {
                 if status == LaneStatus::Valid && ChartVector::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
                     let check_resolution = self.check_resolution && dissipates;
-                    let suspect = suspect || check_resolution && may_drift(lagrangian, order, (t0, from), (t, &state));
+                    let may_drift = || may_drift(&system, order, (t0, &from.into()), (t, &state.into()));
+                    let suspect = suspect || check_resolution && may_drift();
                     let member = &mut members[place];
                     let mut unresolved = None;
                     if suspect && self.check_resolution {
-                        let own = self.run_single(member.index, None::<&mut Rows<'_, N>>);
+                        let own = self.run_single(member.index, None::<&mut Rows<'_>>);
                         match own.ending {
                             Ok(ending) if ending.status == Status::Completed => unresolved = ending.unresolved,
                             _ => {
@@ -235,7 +237,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
         {
             let of = (member.index, *start);
-            *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_, N>>, self.interrupt);
+            *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_>>, self.interrupt);
         }
         batch_kernel
     }

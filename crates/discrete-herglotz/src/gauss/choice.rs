@@ -27,6 +27,8 @@ pub(crate) struct Start<'r> {
     /// Whether L is given by a contact Hamiltonian.
     pub is_hamiltonian: bool,
     pub is_separable: bool,
+    /// Whether the system is evaluated at one point at a time.
+    pub by_points: bool,
     /// Whether the motion depends on the action.
     pub depends_on_action: bool,
 }
@@ -53,7 +55,7 @@ pub(crate) fn route_of(
     let at = PointRef { v: start.v, ..state };
     let InitialMass { w, inverse } = InitialMass::of(system, start.t, at)?;
     if !(start.is_separable && structure.has_constant_rate()) {
-        let (extension, mass) = ((Extension::new(start.t, 0.0), false), Mass::new(structure, inverse));
+        let (extension, mass) = ((Extension::new(start.t, 0.0), false), Mass::new(structure, inverse, start.by_points));
         let general = General::new(extension, StageTable::new(s, h), mass, start.depends_on_action, state, start.v);
         return Ok((Box::new(general), None, 0.0));
     }

@@ -2,10 +2,9 @@
 
 use crate::Stepper;
 use crate::gauss::{DefectSample, GaussRoute, GaussStepper, StepStart, TransformedStepper};
-use contact_geom::Lagrangian;
 
 /// A stepper of contact Gauss collocation whose steps can be examined.
-pub(crate) trait CollocationStepper<const N: usize>: Stepper<N> {
+pub(crate) trait CollocationStepper: Stepper {
     /// The defect of the last step between its nodes, at a number of sets of points.
     fn sample_defect(&self, sets: usize) -> Option<DefectSample>;
 
@@ -25,16 +24,16 @@ pub(crate) trait CollocationStepper<const N: usize>: Stepper<N> {
     }
 
     /// The compensation terms of its sums, beyond the last digits of the state.
-    /// [`set_compensation`](Self::set_compensation) restores them.
-    fn compensation(&self) -> StepStart<N> {
-        StepStart::ZERO
+    /// [`set_compensation`](Self::set_compensation) restores them. `None`, the default, where they are not carried over.
+    fn compensation(&self) -> Option<StepStart> {
+        None
     }
 
     /// Sets the compensation terms.
-    fn set_compensation(&mut self, _rests: &StepStart<N>) {}
+    fn set_compensation(&mut self, _rests: &StepStart) {}
 }
 
-impl<L: Lagrangian<N>, const N: usize> CollocationStepper<N> for GaussStepper<'_, L, N> {
+impl CollocationStepper for GaussStepper<'_> {
     fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         GaussStepper::sample_defect(self, sets)
     }
@@ -44,15 +43,15 @@ impl<L: Lagrangian<N>, const N: usize> CollocationStepper<N> for GaussStepper<'_
     fn is_linear(&self) -> bool {
         self.route() == GaussRoute::Linear
     }
-    fn compensation(&self) -> StepStart<N> {
-        GaussStepper::compensation(self)
+    fn compensation(&self) -> Option<StepStart> {
+        Some(GaussStepper::compensation(self))
     }
-    fn set_compensation(&mut self, rests: &StepStart<N>) {
+    fn set_compensation(&mut self, rests: &StepStart) {
         GaussStepper::set_compensation(self, rests);
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> CollocationStepper<N> for TransformedStepper<'_, L, N> {
+impl CollocationStepper for TransformedStepper<'_> {
     fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         TransformedStepper::sample_defect(self, sets)
     }

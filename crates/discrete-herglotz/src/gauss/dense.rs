@@ -1,45 +1,29 @@
 //! The solved stages of a step, and its collocation polynomial.
 
-use crate::DenseStep;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::SolvedStages;
 use crate::integration::dense_step::Series;
-use crate::numbers::array::from_fn;
 use crate::numbers::registers::{MAX_STAGES, Stages};
 use crate::numbers::state_words::saved;
+use crate::{DenseStep, Vector};
 use contact_geom::nalgebra::DMatrix;
-
-/// The state at the start of a step in the variables of the route: y are velocities in the condensed routes, momenta in
-/// the general one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StepStart<const N: usize> {
-    pub q: [f64; N],
-    pub y: [f64; N],
-    pub z: f64,
-}
-
-saved!([const N: usize] StepStart<N> { q, y, z });
-
-impl<const N: usize> StepStart<N> {
-    pub const ZERO: Self = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
-}
 
 /// The state at the start of a step in the variables of the route: y are velocities in the condensed routes, momenta in
 /// the others.
 #[derive(Clone, Debug)]
-pub(crate) struct StartValues {
-    pub q: Vec<f64>,
-    pub y: Vec<f64>,
+pub(crate) struct StepStart {
+    pub q: Vector,
+    pub y: Vector,
     pub z: f64,
 }
 
-saved!([] StartValues { q, y, z });
+saved!([] StepStart { q, y, z });
 
-impl StartValues {
+impl StepStart {
     pub fn zeros(n: usize) -> Self {
-        StartValues { q: vec![0.0; n], y: vec![0.0; n], z: 0.0 }
+        StepStart { q: Vector::zeros(n), y: Vector::zeros(n), z: 0.0 }
     }
 
     pub fn copy_from(&mut self, from: &Self) {
@@ -55,7 +39,7 @@ impl StartValues {
 pub(crate) struct SolvedStep<'r> {
     pub mass: Option<&'r DMatrix<f64>>,
     pub t: f64,
-    pub from: &'r StartValues,
+    pub from: &'r StepStart,
 }
 
 /// The stages of a solved step, into which a route writes: V, `rho L_q`, `rho L_z` and L, padded with 0 after the last
@@ -122,10 +106,10 @@ impl Solved<'_> {
 }
 
 /// The collocation polynomial through the stages of a step.
-pub(crate) fn curve_through<const N: usize>(stages: &SolvedStages<N>) -> DenseStep<N> {
+pub(crate) fn curve_through(stages: SolvedStages) -> DenseStep {
     let SolvedStages { s, t, h, start, v, force, rate, l, .. } = stages;
-    let [v, force] = [v, force].map(|of| from_fn(|d| through(&of[d], *s)));
-    DenseStep::new(*s, (*t, *h), *start, [v, force], [through(rate, *s), through(l, *s)])
+    let [v, force] = [v, force].map(|of| of.iter().map(|of| through(of, s)).collect());
+    DenseStep::new(s, (t, h), start, [v, force], [through(&rate, s), through(&l, s)])
 }
 
 /// The Legendre series of the polynomial through values at the nodes. The Gauss quadrature of its products with the
@@ -143,8 +127,11 @@ fn through(values: &Stages, s: usize) -> Series {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::State;
+    use crate::numbers::array::from_fn;
     use crate::solve::chebyshev::node;
-    use contact_geom::{PhasePoint, numbers::max_or_nan};
+    use contact_geom::numbers::max_or_nan;
+    use smallvec::smallvec;
 
     /// The states at the nodes agree with those of the curve to a few units of round-off of each term.
     #[test]
@@ -152,13 +139,13 @@ mod tests {
         for s in 1..=MAX_STAGES {
             let value = |i: usize, seed: f64| (1.3 * i as f64 + seed).sin();
             let stages = |seed: f64| Stages(from_fn(|i| if i < s { value(i, seed) } else { 0.0 }));
-            let curve = curve_through(&SolvedStages::<2> {
+            let curve = curve_through(SolvedStages {
                 s,
                 t: 0.5,
                 h: 0.3,
-                start: PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2),
-                v: [stages(0.1), stages(0.7)],
-                force: [stages(1.9), stages(2.3)],
+                start: State::new([1.0, -2.0], [0.4, 0.9], 0.2),
+                v: smallvec![stages(0.1), stages(0.7)],
+                force: smallvec![stages(1.9), stages(2.3)],
                 rate: stages(3.1),
                 l: stages(0.4),
                 knows_l: true,
@@ -169,7 +156,7 @@ mod tests {
             for (i, found) in states.iter().enumerate() {
                 let at = curve.at_fraction(node(curve.sampling_degree(), i + 1));
                 let off =
-                    max_or_nan((found.q - at.q).amax(), max_or_nan((found.p - at.p).amax(), (found.z - at.z).abs()));
+                    max_or_nan((&found.q - at.q).amax(), max_or_nan((&found.p - at.p).amax(), (found.z - at.z).abs()));
                 assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, node {i}: {off:e}");
             }
         }

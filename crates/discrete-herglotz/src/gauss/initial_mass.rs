@@ -1,9 +1,10 @@
 //! The mass matrix at the start of a run.
 
 use crate::gauss::system::{PointRef, SystemAtPoints};
+use crate::solve::mass_matrix::inverse;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{numbers::max_abs_or_nan, support::linear};
+use contact_geom::numbers::max_abs_or_nan;
 
 /// The mass matrix W at the start of a run, and its inverse.
 pub(crate) struct InitialMass {
@@ -16,12 +17,9 @@ impl InitialMass {
     /// [`InputError::FirstStep`] if W is singular to round-off.
     pub fn of(system: &dyn SystemAtPoints, t: f64, start: PointRef<'_>) -> Result<Self, InputError> {
         let n = system.dimension();
-        let (mut w, mut inverse) = (DMatrix::zeros(n, n), DMatrix::identity(n, n));
+        let mut w = DMatrix::zeros(n, n);
         system.mass_matrix(t, start, &mut w);
-        for mut column in inverse.column_iter_mut() {
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-        }
+        let inverse = inverse(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         // This condition number is invariant under scaling of the coordinates: |W^-1| |W| = 1 for every diagonal W.
         let product = |i: usize, j: usize| (0..n).map(|k| inverse[(i, k)].abs() * w[(k, j)].abs()).sum::<f64>();
         let condition = max_abs_or_nan((0..n).map(|i| (0..n).map(|j| product(i, j)).sum()));

@@ -70,7 +70,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         problem: &Problem<'a, L, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         Ok(Box::new(GaussStepper::new(problem, self.stages, h, options)?))
     }
 
@@ -116,7 +116,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         problem: &Problem<'a, L, N>,
         h: f64,
         _: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
         // The stepper is compiled only for Lagrangians with a time transformation; the check rejects all others.
         if const { L::HINTS.time_transformation } {

@@ -1,6 +1,6 @@
 //! Contact Gauss collocation.
 
-mod checks;
+pub(crate) mod checks;
 mod choice;
 mod collocation_stepper;
 mod curve;

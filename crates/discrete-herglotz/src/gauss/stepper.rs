@@ -6,16 +6,18 @@ use crate::gauss::dense::{Solved, StepStart, curve_through};
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::RouteState;
 use crate::gauss::steps::{GaussSteps, Setup};
-use crate::gauss::system::{Typed, vector_of};
+use crate::gauss::system::{ByPoints, CollocationSystem, Typed};
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};
-use crate::integration::{SolvedStages, SuspectInterval, depends_on_action, is_separable};
-use crate::numbers::array::from_fn;
+use crate::integration::{SolvedStages, StageVectors, SuspectInterval, SystemProblem, depends_on_action, is_separable};
+use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{restored_from, words_of};
-use crate::{DenseStep, InputError, PlanEntry, Problem, StepFailure, Stepper, StepperOptions, UnresolvedStep};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint};
+use crate::system::OfTyped;
+use crate::{
+    DenseStep, InputError, PlanEntry, Problem, State, StepFailure, Stepper, StepperOptions, UnresolvedStep, Vector,
+};
+use contact_geom::Lagrangian;
 
 /// A stepper of contact Gauss collocation.
 ///
@@ -24,19 +26,20 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration converges fast;
 /// if that does not converge either, Newton's method is used, in the stage positions alone if the mass matrix and the
 /// rate are constant. The step fails if none of them converges.
-pub struct GaussStepper<'a, L, const N: usize> {
-    system: Typed<'a, L, N>,
+pub struct GaussStepper<'a> {
+    system: Box<dyn CollocationSystem + 'a>,
+    depends_on_action: bool,
     steps: GaussSteps,
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
+impl<'a> GaussStepper<'a> {
     /// A stepper at the start of a problem with `stages` from 1 to 16 and the time step `h`, negative for a motion
     /// backward in time, by the least expensive route that the structure of the Lagrangian allows.
     ///
     /// # Errors
     /// [`InputError::Stages`], [`InputError::Step`]; [`InputError::FirstStep`] if the mass matrix at the start is
     /// singular; [`InputError::Sigma`] and [`InputError::FirstStep`] if the step is too long for a constant rate.
-    pub fn new(
+    pub fn new<L: Lagrangian<N>, const N: usize>(
         problem: &Problem<'a, L, N>,
         stages: usize,
         h: f64,
@@ -44,7 +47,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     ) -> Result<Self, InputError> {
         check_step(stages, h)?;
         let Problem { lagrangian, t0, state, start, structure, .. } = *problem;
-        let system = Typed(lagrangian);
         let start = Start {
             t: t0,
             q: start.q.as_slice(),
@@ -53,13 +55,52 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             z: start.z,
             structure,
             is_hamiltonian: L::HINTS.hamiltonian,
-            is_separable: is_separable(lagrangian, &structure),
-            depends_on_action: depends_on_action(lagrangian, &structure),
+            by_points: false,
+            is_separable: is_separable(&OfTyped(lagrangian), &structure),
+            depends_on_action: depends_on_action(&OfTyped(lagrangian), &structure),
         };
-        let (route, mass, of_sigma) = route_of(&system, &start, stages, h, options.action)?;
-        let (q, v, check_resolution) = (start.q, start.v, options.check_resolution);
+        Self::of(Box::new(Typed(lagrangian)), &start, stages, h, options)
+    }
+
+    /// A stepper at the start of a problem whose system is evaluated at one point at a time.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub(crate) fn by_points(
+        problem: &SystemProblem<'a>,
+        stages: usize,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Self, InputError> {
+        check_step(stages, h)?;
+        let SystemProblem { system, t0, start, state, structure, .. } = problem;
+        let start = Start {
+            t: *t0,
+            q: &start.q,
+            v: &start.v,
+            p: &state.p,
+            z: start.z,
+            structure: *structure,
+            is_hamiltonian: false,
+            by_points: true,
+            is_separable: false,
+            depends_on_action: depends_on_action(&**system, structure),
+        };
+        Self::of(Box::new(ByPoints(system.clone())), &start, stages, h, options)
+    }
+
+    /// A stepper of a system from its start, with a valid number of stages and a valid step.
+    fn of(
+        system: Box<dyn CollocationSystem + 'a>,
+        start: &Start<'_>,
+        stages: usize,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Self, InputError> {
+        let (route, mass, of_sigma) = route_of(&*system, start, stages, h, options.action)?;
+        let (t0, q, v, check_resolution) = (start.t, start.q, start.v, options.check_resolution);
         let steps = GaussSteps::new(Setup { s: stages, h, t0, route, mass, of_sigma, q, v, check_resolution });
-        Ok(GaussStepper { system, steps })
+        Ok(GaussStepper { system, depends_on_action: start.depends_on_action, steps })
     }
 
     /// Without Newton's method: a step whose fixed-point iteration does not converge fails with
@@ -83,17 +124,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if there is
     /// no solved step.
     pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
-        self.steps.sample_defect(&self.system, sets)
+        self.steps.sample_defect(&*self.system, sets)
     }
 
     /// The compensation terms of the state's compensated sums.
-    pub(crate) fn compensation(&self) -> StepStart<N> {
+    pub(crate) fn compensation(&self) -> StepStart {
         let RouteState { q, y, z } = self.steps.route.state();
-        StepStart { q: from_fn(|d| q[d].rest), y: from_fn(|d| y[d].rest), z: z.rest }
+        let rests = |of: &[CompensatedSum]| of.iter().map(|x| x.rest).collect();
+        StepStart { q: rests(q), y: rests(y), z: z.rest }
     }
 
     /// Takes over the compensation terms of a stepper of the same problem that has reached this stepper's start.
-    pub(crate) fn set_compensation(&mut self, terms: &StepStart<N>) {
+    pub(crate) fn set_compensation(&mut self, terms: &StepStart) {
         let state = self.steps.route.state_mut();
         state.q.iter_mut().zip(&terms.q).for_each(|(q, rest)| q.rest = *rest);
         state.y.iter_mut().zip(&terms.y).for_each(|(y, rest)| y.rest = *rest);
@@ -101,32 +143,33 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     }
 
     /// The stages of the last step, with the values of L if they are requested or known.
-    fn solved(&self, wants_l: bool) -> Option<SolvedStages<N>> {
-        let (mut v, mut force) = ([Stages::ZERO; N], [Stages::ZERO; N]);
+    fn solved(&self, wants_l: bool) -> Option<SolvedStages> {
+        let zeros = || StageVectors::from_elem(Stages::ZERO, self.system.dimension());
+        let (mut v, mut force) = (zeros(), zeros());
         let (mut rate, mut l) = (Stages::ZERO, Stages::ZERO);
         let to = Solved { v: &mut v, force: &mut force, rate: &mut rate, l: &mut l };
-        let (knows_l, t, from) = self.steps.solved(&self.system, wants_l, to)?;
+        let (knows_l, t, from) = self.steps.solved(&*self.system, wants_l, to)?;
         let (s, h, start) = (self.steps.s, self.steps.h, self.phase(&from.q, &from.y, from.z));
         Some(SolvedStages { s, t, h, start, v, force, rate, l, knows_l })
     }
 
     /// The phase point of a state in the variables of the route.
-    fn phase(&self, q: &[f64], y: &[f64], z: f64) -> PhasePoint<N> {
-        let mut p: SVector<f64, N> = SVector::zeros();
-        GaussSteps::momenta(self.steps.mass.as_ref(), y, p.as_mut_slice());
-        PhasePoint { q: vector_of(q), p, z }
+    fn phase(&self, q: &[f64], y: &[f64], z: f64) -> State {
+        let mut p = Vector::zeros(y.len());
+        GaussSteps::momenta(self.steps.mass.as_ref(), y, &mut p);
+        State { q: q.into(), p, z }
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
+impl Stepper for GaussStepper<'_> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        self.steps.advance(&self.system, steps)
+        self.steps.advance(&*self.system, steps)
     }
 
-    fn state(&self) -> PhasePoint<N> {
+    fn state(&self) -> State {
         let RouteState { q, y, z } = self.steps.route.state();
-        let [q, y]: [[f64; N]; 2] = [from_fn(|d| q[d].value), from_fn(|d| y[d].value)];
-        self.phase(&q, &y, z.value)
+        let values = |of: &[CompensatedSum]| of.iter().map(|x| x.value).collect::<Vector>();
+        self.phase(&values(q), &values(y), z.value)
     }
 
     fn time(&self) -> f64 {
@@ -146,29 +189,28 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        let lagrangian = self.system.0;
-        work_summary(self.route(), depends_on_action(lagrangian, &lagrangian.structure()))
+        work_summary(self.route(), self.depends_on_action)
     }
 
     /// The collocation polynomial of the last step; computed only when it is requested.
-    fn dense(&self) -> Option<DenseStep<N>> {
-        Some(curve_through(&self.solved(true)?))
+    fn dense(&self) -> Option<DenseStep> {
+        Some(curve_through(self.solved(true)?))
     }
 
-    fn solved_stages(&self) -> Option<SolvedStages<N>> {
+    fn solved_stages(&self) -> Option<SolvedStages> {
         self.solved(false)
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        if self.steps.k == 0 { None } else { self.steps.route.last_velocity().map(vector_of) }
+    fn last_velocity(&self) -> Option<Vector> {
+        if self.steps.k == 0 { None } else { self.steps.route.last_velocity().map(Vector::from) }
     }
 
-    fn guess(&mut self, longer: &DenseStep<N>) {
+    fn guess(&mut self, longer: &DenseStep) {
         let part = self.steps.h / longer.length();
         let nodes = &Coefficients::of(self.steps.s).c;
         self.steps.route.predict_stages(&mut |i, velocity| {
             let (v, l, rho) = longer.stage(part * nodes[i].0);
-            velocity.copy_from_slice(v.as_slice());
+            velocity.copy_from_slice(&v);
             // L is not finite where the collocation polynomial of the action has a pole.
             (if l.is_finite() { l } else { 0.0 }, rho)
         });
@@ -185,16 +227,15 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// The first unresolved step that was recorded in the run; if there is none, the result of a defect sample of the
     /// last step alone. Further steps are sampled only if this is called more often.
     fn unresolved(&self) -> Option<UnresolvedStep> {
-        self.steps.find_unresolved(&self.system)
+        self.steps.find_unresolved(&*self.system)
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         let suspect = &mut self.steps.suspect;
         if !std::mem::take(&mut suspect.is_new) {
             return None;
         }
-        let [from, to] =
-            [&suspect.from, &suspect.to].map(|of| PhasePoint { q: vector_of(&of.q), p: vector_of(&of.y), z: of.z });
+        let [from, to] = [&suspect.from, &suspect.to].map(|of| State { q: of.q.clone(), p: of.y.clone(), z: of.z });
         Some(SuspectInterval { step: suspect.step, steps: 2, t: suspect.t, from, to })
     }
 }

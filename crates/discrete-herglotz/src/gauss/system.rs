@@ -1,5 +1,9 @@
 //! A mechanical system as collocation sees it: its number of coordinates is known at run time, and vectors are slices.
 
+mod by_points;
+
+pub(crate) use by_points::ByPoints;
+
 use crate::StepError;
 use crate::gauss::curve::SampleKernel;
 use crate::gauss::routes::general::GeneralKernel;

@@ -68,7 +68,7 @@ impl<const N: usize> VirtualWork<N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        crate::integration::problem::check_time(t)?;
+        crate::integration::system_problem::check_time(t)?;
         from.check()?;
         Self::solved(lagrangian, &Products::new(stages, h), t, from, guess).map_err(InputError::FirstStep)
     }

@@ -109,7 +109,7 @@ impl<'a, H: ContactHamiltonian<N>, const N: usize> Integrator<'a, OfHamiltonian<
         problem: &Problem<'a, OfHamiltonian<H>, N>,
         h: f64,
         _options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let stepper = MapStepper::of((&problem.lagrangian.0, self.maps()?), h, problem.t0, &problem.state)?;
         stepper.maps.add_step(problem.t0, h, &mut { stepper.sums }, &mut 0).map_err(InputError::first_step)?;
         Ok(Box::new(stepper))

@@ -4,7 +4,7 @@ use super::ContactIncrement;
 use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::state_words::{Saved, saved};
-use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper};
+use crate::{InputError, PlanEntry, State, StepError, StepFailure, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
@@ -71,14 +71,14 @@ impl<M, const N: usize> MapStepper<M, N> {
         if !(h.is_finite() && h != 0.0) {
             return Err(InputError::Step { h });
         }
-        crate::integration::problem::check_time(t0)?;
+        crate::integration::system_problem::check_time(t0)?;
         x.check()?;
         Ok(MapStepper { maps, h, t0, taken: 0, sums: StateSums::new(x), evaluations: 0 })
     }
 }
 
 /// A step whose result is not finite, or whose factor is not positive, fails and leaves the state before it.
-impl<M: ContactMaps<N>, const N: usize> Stepper<N> for MapStepper<M, N> {
+impl<M: ContactMaps<N>, const N: usize> Stepper for MapStepper<M, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let mut sums = StateSums { sigma: 1.0, ..self.sums };
@@ -90,8 +90,8 @@ impl<M: ContactMaps<N>, const N: usize> Stepper<N> for MapStepper<M, N> {
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.sums.state()
+    fn state(&self) -> State {
+        self.sums.state().into()
     }
 
     fn time(&self) -> f64 {

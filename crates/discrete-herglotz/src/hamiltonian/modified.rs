@@ -87,10 +87,10 @@ pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
             return Err(InputError::TooMany { what, found: count, most: MAX_STEPS as f64, remedy });
         }
         let count = (count as usize).max(1);
-        let (mut states, mut sigmas) = (vec![stepper.state()], Vec::with_capacity(count + most));
+        let (mut states, mut sigmas) = (vec![stepper.state().fixed::<N>()], Vec::with_capacity(count + most));
         for _ in 0..count + most {
             stepper.advance(1).map_err(|failure| InputError::FirstStep(failure.cause))?;
-            states.push(stepper.state());
+            states.push(stepper.state().fixed());
             sigmas.push(stepper.sigma());
         }
         for k in 1..=most {

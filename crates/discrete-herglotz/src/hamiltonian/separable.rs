@@ -171,7 +171,7 @@ impl<'a, H: ContactHamiltonian<N>, const N: usize> Integrator<'a, OfHamiltonian<
         problem: &Problem<'a, OfHamiltonian<H>, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         self.of(problem)?.stepper(problem, h, options)
     }
 

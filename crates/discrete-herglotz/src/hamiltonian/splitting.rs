@@ -64,7 +64,7 @@ where
         problem: &Problem<'a, OfHamiltonian<H>, N>,
         h: f64,
         _options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         check_sum(&problem.lagrangian.0, &self.pieces, problem.t0, &problem.state)?;
         Ok(Box::new(PieceStepper::new(self.pieces.clone(), &self.scheme, h, problem.t0, problem.state)?))
     }

@@ -1,6 +1,6 @@
 //! L and its derivatives at a state (q, p, z).
 
-use crate::{StepError, System, theory::legendre_inverse};
+use crate::{StepError, TypedSystem, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, VelocityPoint};
 
@@ -14,11 +14,6 @@ pub(crate) struct AtState<const N: usize> {
     pub rate: f64,
 }
 
-/// The state of a point of TQ x R, by the Legendre transformation `p = L_v`.
-pub(crate) fn state_of<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> PhasePoint<N> {
-    PhasePoint { q: x.q, p: system.gradient(t, x).y, z: x.z }
-}
-
 /// L and its derivatives at a state. For a Lagrangian that is given by a contact Hamiltonian they are those of the
 /// Hamiltonian, `v = H_p`, `L = p . v - H`, `L_q = -H_q`, `L_z = -H_z`, whatever the rank of `H_pp`; for all others v is
 /// found from the momentum, starting from a guess.
@@ -26,7 +21,7 @@ pub(crate) fn state_of<const N: usize>(system: &dyn System<N>, t: f64, x: &Veloc
 /// # Errors
 /// Those of [`legendre_inverse`].
 pub(crate) fn at_state<const N: usize>(
-    system: &dyn System<N>,
+    system: &dyn TypedSystem<N>,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,

@@ -1,33 +1,72 @@
 //! An integrator with the Lagrangian for which it takes steps.
 
-use crate::integration::{BatchKernel, Integrator, MethodInfo, StepFormula, StepperOptions, SystemProblem};
-use crate::{InputError, StepError, Stepper, System};
-use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{ChartVector, Lagrangian, PhasePoint, VelocityPoint};
+use crate::integration::{Integrator, MethodInfo, StepFormula, StepperOptions, SystemProblem};
+use crate::{Components, InputError, Point, State, StepError, Stepper, Vector};
+use contact_geom::Lagrangian;
+use contact_geom::nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// The integrator of a run, for the lifetime of the Lagrangian.
-pub(crate) type SharedIntegrator<'a, const N: usize> = Arc<dyn Integrator<'a, dyn System<N> + 'a, N> + 'a>;
+/// An integrator as runs and searches see it: bound to its Lagrangian. The methods and their defaults are those of
+/// [`Integrator`].
+pub(crate) trait BoundIntegrator<'a> {
+    fn info(&self) -> MethodInfo;
 
-/// An integrator with its Lagrangian: an integrator for problems whose Lagrangian has no type. A run takes its steppers
-/// from it, and so compiles those of no other integrator.
-pub(crate) struct Bound<'a, I, L> {
+    fn check(&self) -> Result<(), InputError>;
+
+    fn stepper(
+        &self,
+        problem: &SystemProblem<'a>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper + 'a>, InputError>;
+
+    fn constraint_force(&self, _t: f64, x: &Point) -> Result<Vector, StepError> {
+        Ok(Vector::zeros(x.q.len()))
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        None
+    }
+
+    fn step_jacobian(
+        &self,
+        _problem: &SystemProblem<'a>,
+        _h: f64,
+        _step: (f64, &State, &State),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        Ok(None)
+    }
+
+    fn step_variation(
+        &self,
+        _problem: &SystemProblem<'a>,
+        _h: f64,
+        _step: (f64, &State, &State),
+        _variation: &mut dyn FnMut(f64, &Point) -> (f64, Components),
+    ) -> Result<Option<Components>, StepError> {
+        Ok(None)
+    }
+}
+
+/// The integrator of a run, for the lifetime of the Lagrangian.
+pub(crate) type SharedIntegrator<'a> = Arc<dyn BoundIntegrator<'a> + 'a>;
+
+/// An integrator with its Lagrangian. A run takes its steppers from it, and so compiles those of no other integrator.
+struct Bound<'a, I, L, const N: usize> {
     integrator: I,
     lagrangian: &'a L,
 }
 
-impl<'a, I, L> Bound<'a, I, L> {
-    /// The integrator of a run.
-    pub fn shared<const N: usize>(integrator: I, lagrangian: &'a L) -> SharedIntegrator<'a, N>
-    where
-        I: Integrator<'a, L, N> + 'a,
-        L: Lagrangian<N>,
-    {
-        Arc::new(Bound { integrator, lagrangian })
-    }
+/// An integrator for problems of one Lagrangian, as runs see it.
+pub(crate) fn bound<'a, I, L, const N: usize>(integrator: I, lagrangian: &'a L) -> SharedIntegrator<'a>
+where
+    I: Integrator<'a, L, N> + 'a,
+    L: Lagrangian<N>,
+{
+    Arc::new(Bound { integrator, lagrangian })
 }
 
-impl<'a, I, L, const N: usize> Integrator<'a, dyn System<N> + 'a, N> for Bound<'a, I, L>
+impl<'a, I, L, const N: usize> BoundIntegrator<'a> for Bound<'a, I, L, N>
 where
     I: Integrator<'a, L, N>,
     L: Lagrangian<N>,
@@ -36,30 +75,21 @@ where
         self.integrator.info()
     }
 
-    fn check(&self, _system: &(dyn System<N> + 'a)) -> Result<(), InputError> {
+    fn check(&self) -> Result<(), InputError> {
         self.integrator.check(self.lagrangian)
     }
 
     fn stepper(
         &self,
-        problem: &SystemProblem<'a, N>,
+        problem: &SystemProblem<'a>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        self.integrator.stepper(&problem.with_lagrangian(self.lagrangian), h, options)
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        self.integrator.stepper(&problem.of(self.lagrangian), h, options)
     }
 
-    fn constraint_force(
-        &self,
-        _system: &(dyn System<N> + 'a),
-        t: f64,
-        x: &VelocityPoint<N>,
-    ) -> Result<SVector<f64, N>, StepError> {
-        self.integrator.constraint_force(self.lagrangian, t, x)
-    }
-
-    fn batch_kernel(&self) -> Option<BatchKernel> {
-        self.integrator.batch_kernel()
+    fn constraint_force(&self, t: f64, x: &Point) -> Result<Vector, StepError> {
+        self.integrator.constraint_force(self.lagrangian, t, &x.fixed()).map(Vector::from)
     }
 
     fn step_formula(&self) -> Option<StepFormula> {
@@ -68,20 +98,26 @@ where
 
     fn step_jacobian(
         &self,
-        problem: &SystemProblem<'a, N>,
+        problem: &SystemProblem<'a>,
         h: f64,
-        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        (t, from, to): (f64, &State, &State),
     ) -> Result<Option<DMatrix<f64>>, StepError> {
-        self.integrator.step_jacobian(&problem.with_lagrangian(self.lagrangian), h, step)
+        self.integrator.step_jacobian(&problem.of(self.lagrangian), h, (t, &from.fixed(), &to.fixed()))
     }
 
     fn step_variation(
         &self,
-        problem: &SystemProblem<'a, N>,
+        problem: &SystemProblem<'a>,
         h: f64,
-        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
-        variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
-    ) -> Result<Option<ChartVector<N>>, StepError> {
-        self.integrator.step_variation(&problem.with_lagrangian(self.lagrangian), h, step, variation)
+        (t, from, to): (f64, &State, &State),
+        variation: &mut dyn FnMut(f64, &Point) -> (f64, Components),
+    ) -> Result<Option<Components>, StepError> {
+        let mut variation = |t: f64, x: &contact_geom::VelocityPoint<N>| {
+            let (l, gradient) = variation(t, &x.into());
+            (l, gradient.fixed())
+        };
+        let (problem, step) = (problem.of(self.lagrangian), (t, &from.fixed(), &to.fixed()));
+        let found = self.integrator.step_variation(&problem, h, step, &mut variation)?;
+        Ok(found.map(Components::from))
     }
 }

@@ -1,16 +1,15 @@
 //! Numerical checks of the claimed structure of a Lagrangian.
 
-use crate::{InputError, System, theory::legendre_inverse};
+use crate::system::{ForceKind, OfTyped};
+use crate::{InputError, Point, State, System, TypedSystem};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    Defect, ForceStructure, GeometryError, PhasePoint, Structure, VelocityPoint, numbers::max_abs_or_nan,
-};
+use contact_geom::{Defect, ForceStructure, GeometryError, Structure, VelocityPoint, numbers::max_abs_or_nan};
 
 /// Refuses a Lagrangian with an applied force, for a method that takes none.
 ///
 /// # Errors
 /// [`InputError::Forced`].
-pub fn check_unforced<const N: usize>(system: &dyn System<N>, method: &'static str) -> Result<(), InputError> {
+pub fn check_unforced<const N: usize>(system: &dyn TypedSystem<N>, method: &'static str) -> Result<(), InputError> {
     if system.has_force() { Err(InputError::Forced { method }) } else { Ok(()) }
 }
 
@@ -18,19 +17,23 @@ pub fn check_unforced<const N: usize>(system: &dyn System<N>, method: &'static s
 ///
 /// # Errors
 /// [`InputError::Forced`].
-pub(crate) fn check_kicks<const N: usize>(system: &dyn System<N>, method: &'static str) -> Result<(), InputError> {
-    let kicks = !system.hints().forced || system.force_structure().is_of_positions();
-    if kicks { Ok(()) } else { Err(InputError::Forced { method }) }
+pub(crate) fn check_kicks(system: &dyn System, method: &'static str) -> Result<(), InputError> {
+    if !system.hints().forced || is_of_positions(system) { Ok(()) } else { Err(InputError::Forced { method }) }
 }
 
 /// Whether L is separable with a force of time and positions alone, if any.
-pub(crate) fn is_separable<const N: usize>(system: &dyn System<N>, structure: &Structure) -> bool {
-    structure.separable && (!system.hints().forced || system.force_structure().is_of_positions())
+pub(crate) fn is_separable(system: &dyn System, structure: &Structure) -> bool {
+    structure.separable && (!system.hints().forced || is_of_positions(system))
+}
+
+/// Whether the applied force depends on time and positions alone; so does a force that does not exist.
+fn is_of_positions(system: &dyn System) -> bool {
+    matches!(system.force_kind(), ForceKind::None | ForceKind::OfPositions)
 }
 
 /// Whether the action may act on the motion by more than a rate that depends on time alone.
-pub(crate) fn depends_on_action<const N: usize>(system: &dyn System<N>, structure: &Structure) -> bool {
-    !structure.is_affine_in_z() || system.hints().forced && system.force_structure() == ForceStructure::General
+pub(crate) fn depends_on_action(system: &dyn System, structure: &Structure) -> bool {
+    !structure.is_affine_in_z() || system.hints().forced && system.force_kind() == ForceKind::General
 }
 
 /// The bound on derivatives that vanish according to a claim, relative to the size of their terms: some thousand units
@@ -44,14 +47,19 @@ pub(crate) const MAX_CLAIM_DEFECT: f64 = 1e-12;
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at
 /// neither point.
 pub fn check_claims<const N: usize>(
-    system: &dyn System<N>,
+    system: &dyn TypedSystem<N>,
     t: f64,
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
+    verified_structure(&OfTyped(system), t, &start.into())
+}
+
+/// The same for a system whose number of coordinates is known at run time.
+pub(crate) fn verified_structure(system: &dyn System, t: f64, start: &Point) -> Result<Structure, InputError> {
     let structure = system.structure();
-    let nearby = near(start);
-    for (t, x) in [(t, start), (shifted(t, 2 * N + 1), &nearby)] {
-        if let Some(Defect { claim, size }) = force_defect(system, t, x) {
+    let (nearby, n) = (near(start), system.dimension());
+    for (t, x) in [(t, start), (shifted(t, 2 * n + 1), &nearby)] {
+        if let Some(Defect { claim, size }) = system.force_defect(t, x) {
             return Err(InputError::FalseClaim { claim, size });
         }
     }
@@ -64,7 +72,7 @@ pub fn check_claims<const N: usize>(
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
     }
-    let at_both = [(t, start), (shifted(t, 2 * N + 1), &nearby)].map(|(t, x)| system.claim_defects(t, x));
+    let at_both = [(t, start), (shifted(t, 2 * n + 1), &nearby)].map(|(t, x)| system.claim_defects(t, x));
     if at_both.iter().all(Option::is_none) {
         return Err(GeometryError::Undefined { what: "the Lagrangian" }.into());
     }
@@ -81,17 +89,19 @@ fn shifted(x: f64, i: usize) -> f64 {
 }
 
 /// A point near another.
-fn near<const N: usize>(x: &VelocityPoint<N>) -> VelocityPoint<N> {
-    VelocityPoint {
-        q: x.q.map_with_location(|i, _, q| shifted(q, i)),
-        v: x.v.map_with_location(|i, _, v| shifted(v, N + i)),
-        z: shifted(x.z, 2 * N),
-    }
+fn near(x: &Point) -> Point {
+    let n = x.q.len();
+    let moved = |of: &[f64], first: usize| of.iter().enumerate().map(|(i, x)| shifted(*x, first + i)).collect();
+    Point { q: moved(&x.q, 0), v: moved(&x.v, n), z: shifted(x.z, 2 * n) }
 }
 
 /// The defect of the declared structure of an applied force, if it is false at a point: the force is compared with its
 /// declared form, which does not depend on the action.
-fn force_defect<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
+pub(crate) fn force_defect<const N: usize>(
+    system: &dyn TypedSystem<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> Option<Defect> {
     if !system.hints().forced {
         return None;
     }
@@ -114,12 +124,7 @@ fn force_defect<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoin
 
 /// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. Also `None`
 /// where L is not defined, or where the inverse Legendre transformation fails.
-pub(crate) fn violated_claim<const N: usize>(
-    system: &dyn System<N>,
-    t: f64,
-    state: &PhasePoint<N>,
-    guess: &SVector<f64, N>,
-) -> Option<Defect> {
+pub(crate) fn violated_claim(system: &dyn System, t: f64, state: &State, guess: &[f64]) -> Option<Defect> {
     let hints = system.hints();
     if hints.proved && !hints.forced {
         return None;
@@ -127,8 +132,8 @@ pub(crate) fn violated_claim<const N: usize>(
     if hints.hamiltonian {
         return system.hamiltonian_defect(t, state);
     }
-    let x = legendre_inverse(system, t, state, guess).ok()?;
-    if let Some(defect) = force_defect(system, t, &x) {
+    let x = system.legendre_inverse(t, state, guess).ok()?;
+    if let Some(defect) = system.force_defect(t, &x) {
         return Some(defect);
     }
     if hints.proved {
@@ -142,11 +147,11 @@ pub(crate) fn violated_claim<const N: usize>(
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
-pub(crate) fn check_claims_over<const N: usize>(
-    system: &dyn System<N>,
+pub(crate) fn check_claims_over(
+    system: &dyn System,
     t0: f64,
     span: f64,
-    start: &VelocityPoint<N>,
+    start: &Point,
     times: usize,
 ) -> Result<(), InputError> {
     let hints = system.hints();

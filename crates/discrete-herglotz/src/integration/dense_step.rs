@@ -2,12 +2,18 @@
 
 use crate::numbers::registers::MAX_STAGES;
 use crate::solve::chebyshev::{MAX_DEGREE, node};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{State, Vector};
+use smallvec::SmallVec;
 use std::sync::OnceLock;
 
 /// The number of Legendre polynomials that the integrals of the highest degree need.
 pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
+
+/// The number of coordinates up to which the curves of a step need no memory on the heap.
+pub(crate) const FEW: usize = 4;
+
+/// A curve for each coordinate.
+pub(crate) type Curves = SmallVec<[Series; FEW]>;
 
 /// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0
 /// to h
@@ -20,25 +26,25 @@ pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
 /// At its ends it equals the states of the run, of order 2s, to round-off; between them its order is s. The curve of a
 /// run is therefore continuous, and its velocity jumps by `O(h^s)` between steps. Where the action is not requested and
 /// z decouples, z keeps its initial value.
-#[derive(Clone, Copy, Debug)]
-pub struct DenseStep<const N: usize> {
+#[derive(Clone, Debug)]
+pub struct DenseStep {
     s: usize,
     t: f64,
     h: f64,
-    start: PhasePoint<N>,
-    v: [Series; N],
-    force: [Series; N],
+    start: State,
+    v: Curves,
+    force: Curves,
     rate: Series,
     l: Series,
 }
 
-impl<const N: usize> DenseStep<N> {
+impl DenseStep {
     /// A step from the Legendre series of V, `rho L_q`, `rho L_z` and L on it, each with `s` coefficients.
     pub(crate) fn new(
         s: usize,
         (t, h): (f64, f64),
-        start: PhasePoint<N>,
-        [v, force]: [[Series; N]; 2],
+        start: State,
+        [v, force]: [Curves; 2],
         [rate, l]: [Series; 2],
     ) -> Self {
         DenseStep { s, t, h, start, v, force, rate, l }
@@ -50,21 +56,21 @@ impl<const N: usize> DenseStep<N> {
     }
 
     /// The state at a time in the [`span`](Self::span); outside of it the polynomials are extrapolated.
-    pub fn at(&self, t: f64) -> PhasePoint<N> {
+    pub fn at(&self, t: f64) -> State {
         self.at_fraction((t - self.t) / self.h)
     }
 
     /// The velocity `dq/dt` of the curve at a time: the polynomial of degree `s - 1` through the velocities of the
     /// stages.
-    pub fn velocity(&self, t: f64) -> SVector<f64, N> {
+    pub fn velocity(&self, t: f64) -> Vector {
         let p = polynomials(self.s, (t - self.t) / self.h);
-        SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
+        self.v.iter().map(|v| v.value(&p, self.s)).collect()
     }
 
     /// The velocity, the value of L and rho at a fraction of the step.
-    pub(crate) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
+    pub(crate) fn stage(&self, fraction: f64) -> (Vector, f64, f64) {
         let p = polynomials(self.s, fraction);
-        let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
+        let v = self.v.iter().map(|v| v.value(&p, self.s)).collect();
         let rho = 1.0 - self.h * self.rate.value(&integrals(self.s, &p, fraction), self.s);
         (v, self.l.value(&p, self.s), rho)
     }
@@ -86,7 +92,7 @@ impl<const N: usize> DenseStep<N> {
     }
 
     /// Appends the states at the Chebyshev-Lobatto nodes of the step, without those at its ends.
-    pub(crate) fn states_at_nodes(&self, to: &mut Vec<PhasePoint<N>>) {
+    pub(crate) fn states_at_nodes(&self, to: &mut Vec<State>) {
         let table = integrals_to_nodes(self.s);
         let along = |series: &Series| {
             let mut sums = [0.0; MAX_INNER_NODES];
@@ -97,24 +103,24 @@ impl<const N: usize> DenseStep<N> {
             }
             sums
         };
-        let (moved, pushed) = (self.v.each_ref().map(along), self.force.each_ref().map(along));
+        let [moved, pushed] = [&self.v, &self.force].map(|of| of.iter().map(along).collect::<SmallVec<[_; FEW]>>());
         let (rate, action) = (along(&self.rate), along(&self.l));
-        to.extend((0..self.sampling_degree() - 1).map(|i| PhasePoint {
-            q: SVector::from_fn(|d, _| self.start.q[d] + moved[d][i]),
-            p: SVector::from_fn(|d, _| (self.start.p[d] + pushed[d][i]) / (1.0 - rate[i])),
+        to.extend((0..self.sampling_degree() - 1).map(|i| State {
+            q: self.start.q.iter().zip(&moved).map(|(q, moved)| q + moved[i]).collect(),
+            p: self.start.p.iter().zip(&pushed).map(|(p, pushed)| (p + pushed[i]) / (1.0 - rate[i])).collect(),
             z: self.start.z + action[i],
         }));
     }
 
     /// The state at a fraction of the step.
-    pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
+    pub(crate) fn at_fraction(&self, fraction: f64) -> State {
         let p = polynomials(self.s, fraction);
         let integrals = integrals(self.s, &p, fraction);
         let integral = |series: &Series| self.h * series.value(&integrals, self.s);
         let rho = 1.0 - integral(&self.rate);
-        PhasePoint {
-            q: SVector::from_fn(|d, _| self.start.q[d] + integral(&self.v[d])),
-            p: SVector::from_fn(|d, _| (self.start.p[d] + integral(&self.force[d])) / rho),
+        State {
+            q: self.start.q.iter().zip(&self.v).map(|(q, v)| q + integral(v)).collect(),
+            p: self.start.p.iter().zip(&self.force).map(|(p, force)| (p + integral(force)) / rho).collect(),
             z: self.start.z + integral(&self.l),
         }
     }

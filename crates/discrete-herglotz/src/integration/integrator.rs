@@ -99,7 +99,7 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         problem: &Problem<'a, L, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
+    ) -> Result<Box<dyn Stepper + 'a>, InputError>;
 
     /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.

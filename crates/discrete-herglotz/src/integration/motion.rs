@@ -1,22 +1,20 @@
 //! Quantities of a motion that are computed from its states.
 
-use crate::{DenseStep, StepError};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{DenseStep, State, StepError, Vector};
 
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
-pub(crate) type NearbyVelocity<const N: usize> = Option<SVector<f64, N>>;
+pub(crate) type NearbyVelocity<'v> = Option<&'v Vector>;
 
 /// Quantities of a motion that observers compute from its states.
-pub(crate) trait Motion<const N: usize> {
+pub(crate) trait Motion {
     /// The velocity at a state; if several velocities have its momentum, the one close to `near`.
-    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<SVector<f64, N>, StepError>;
+    fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError>;
 
     /// The energy at a state.
-    fn energy(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<f64, StepError>;
+    fn energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<f64, StepError>;
 
     /// The derivatives `(qdot, pdot, zdot)` at a state.
-    fn rates(&self, t: f64, state: &PhasePoint<N>, near: NearbyVelocity<N>) -> Result<PhasePoint<N>, StepError>;
+    fn rates(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<State, StepError>;
 
     /// A digest that identifies the run.
     fn fingerprint(&self) -> u64;
@@ -25,9 +23,9 @@ pub(crate) trait Motion<const N: usize> {
     /// the whole step, if it is known, is the initial guess.
     fn state_within_step(
         &self,
-        from: &(f64, PhasePoint<N>),
+        from: &(f64, State),
         t: f64,
-        near: NearbyVelocity<N>,
-        curve: Option<&DenseStep<N>>,
-    ) -> Result<(PhasePoint<N>, f64), StepError>;
+        near: NearbyVelocity<'_>,
+        curve: Option<&DenseStep>,
+    ) -> Result<(State, f64), StepError>;
 }

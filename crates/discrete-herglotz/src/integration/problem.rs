@@ -1,16 +1,16 @@
 //! Initial value problems: a Lagrangian with an initial state.
 
-use crate::integration::check_claims::check_claims;
-use crate::integration::{AtState, at_state, state_of};
+use crate::integration::system_problem::{InitialState, SystemProblem, check_time};
+use crate::system::OfTyped;
 use crate::{
-    DiscreteLagrangian, InputError, Interrupt, StepError, System,
-    theory::{discrete_regularity, legendre_inverse, legendre_minus},
+    DiscreteLagrangian, InputError, Interrupt, State, StepError,
+    theory::{discrete_regularity, legendre_minus},
 };
-use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    ContactHamiltonian, Defect, DiscretePoint, GeometryError, Lagrangian, OfHamiltonian, PhasePoint, Regularity,
-    Structure, VelocityPoint, numbers::max_abs_or_nan,
+    ContactHamiltonian, DiscretePoint, Lagrangian, OfHamiltonian, PhasePoint, Structure, VelocityPoint,
 };
+use std::sync::Arc;
 
 /// The initial state of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,14 @@ impl<const N: usize> From<VelocityPoint<N>> for Start<N> {
 impl<const N: usize> From<PhasePoint<N>> for Start<N> {
     fn from(x: PhasePoint<N>) -> Self {
         Start::Momentum(x, SVector::zeros())
+    }
+}
+
+/// With the guess 0 of the velocity. A problem with another number of coordinates refuses it: its action is then NaN.
+impl<const N: usize> From<State> for Start<N> {
+    fn from(x: State) -> Self {
+        let z = if x.q.len() == N { x.z } else { f64::NAN };
+        Start::from(PhasePoint { q: x.q.fixed(), p: x.p.fixed(), z })
     }
 }
 
@@ -65,9 +73,6 @@ pub struct Problem<'a, L: ?Sized, const N: usize> {
     pub(crate) interrupt: Option<Interrupt<'a>>,
 }
 
-/// A problem as runs, checks and searches see it, whatever its Lagrangian.
-pub(crate) type SystemProblem<'a, const N: usize> = Problem<'a, dyn System<N> + 'a, N>;
-
 impl<L: ?Sized, const N: usize> Clone for Problem<'_, L, N> {
     fn clone(&self) -> Self {
         *self
@@ -77,12 +82,6 @@ impl<L: ?Sized, const N: usize> Clone for Problem<'_, L, N> {
 impl<L: ?Sized, const N: usize> Copy for Problem<'_, L, N> {}
 
 impl<'a, L: ?Sized, const N: usize> Problem<'a, L, N> {
-    /// The same with another view of the Lagrangian.
-    pub(crate) fn with_lagrangian<M: ?Sized>(self, lagrangian: &'a M) -> Problem<'a, M, N> {
-        let Problem { t0, start, state, from_momentum, structure, interrupt, .. } = self;
-        Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt }
-    }
-
     /// The same with an interrupt for its trial runs and error estimates. A run itself is ended by an
     /// [`Observer`](crate::Observer).
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
@@ -115,66 +114,6 @@ impl<'a, L: ?Sized, const N: usize> Problem<'a, L, N> {
     }
 }
 
-impl<'a, const N: usize> SystemProblem<'a, N> {
-    /// The problem of a system after all checks of its start.
-    fn checked(system: &'a (dyn System<N> + 'a), t0: f64, start: Start<N>) -> Result<Self, InputError> {
-        check_time(t0)?;
-        if N == 0 {
-            return Err(InputError::Dimension);
-        }
-        if system.hints().hamiltonian {
-            return Self::given_by_hamiltonian(system, t0, start);
-        }
-        let (start, state) = match start {
-            Start::Velocity(x) => {
-                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-                (x, None)
-            }
-            Start::Momentum(x, guess) => {
-                x.check()?;
-                (legendre_inverse(system, t0, &x, &guess).map_err(InputError::FirstStep)?, Some(x))
-            }
-        };
-        check_regular(system, t0, &start)?;
-        let structure = check_claims(system, t0, &start)?;
-        let from_momentum = state.is_some();
-        let state = state.unwrap_or_else(|| state_of(system, t0, &start));
-        Ok(Problem { lagrangian: system, t0, start, state, from_momentum, structure, interrupt: None })
-    }
-
-    /// The problem of a Lagrangian that is given by a contact Hamiltonian.
-    fn given_by_hamiltonian(system: &'a (dyn System<N> + 'a), t0: f64, start: Start<N>) -> Result<Self, InputError> {
-        if system.hints().switching_functions {
-            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
-            return Err(InputError::Hypothesis { hypothesis });
-        }
-        let (state, from_momentum) = match start {
-            Start::Velocity(x) => {
-                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
-                let state = state_of(system, t0, &x);
-                if !state.p.iter().all(|p| p.is_finite()) {
-                    return Err(InputError::NoMomentum);
-                }
-                (state, false)
-            }
-            Start::Momentum(x, _) => {
-                x.check()?;
-                (x, true)
-            }
-        };
-        let AtState { x: start, l, force, rate } =
-            at_state(system, t0, &state, &SVector::zeros()).map_err(|_| InputError::Undefined)?;
-        if !(l.is_finite() && rate.is_finite() && force.iter().all(|f| f.is_finite())) {
-            return Err(InputError::Undefined);
-        }
-        let structure = check_claims(system, t0, &start)?;
-        if let Some(Defect { claim, size }) = system.hamiltonian_defect(t0, &state) {
-            return Err(InputError::FalseClaim { claim, size });
-        }
-        Ok(Problem { lagrangian: system, t0, start, state, from_momentum, structure, interrupt: None })
-    }
-}
-
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The problem of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
     ///
@@ -182,12 +121,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// [`InputError`]: a time or a state that is not finite, an initial state at which L or a derivative is not
     /// defined, a singular `W = L_vv`, a momentum without a velocity, a false claim of structure.
     pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
-        Ok(SystemProblem::checked(lagrangian, t0, start.into())?.with_lagrangian(lagrangian))
+        let start = match start.into() {
+            Start::Velocity(x) => InitialState::Velocity(x.into()),
+            Start::Momentum(x, guess) => InitialState::Momentum(x.into(), guess.into()),
+        };
+        Ok(SystemProblem::checked(Arc::new(OfTyped(lagrangian)), t0, start)?.of(lagrangian))
     }
 
     /// The same problem without the type of its Lagrangian.
-    pub(crate) fn of_system(&self) -> SystemProblem<'a, N> {
-        self.with_lagrangian(self.lagrangian as &(dyn System<N> + 'a))
+    pub(crate) fn of_system(&self) -> SystemProblem<'a> {
+        let Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt } = *self;
+        let system = Arc::new(OfTyped(lagrangian));
+        SystemProblem { system, t0, start: start.into(), state: state.into(), from_momentum, structure, interrupt }
     }
 
     /// The problem from two positions and the action, as in the paper: the state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -261,27 +206,4 @@ pub(crate) fn start_of<const N: usize>(
         return Err(bad(StepError::Singular { pivot: regularity.fibre.smallest }));
     }
     legendre_minus(ld, t0, x).map_err(bad)
-}
-
-/// Returns an error for a time that is not finite.
-pub(crate) fn check_time(t0: f64) -> Result<(), GeometryError> {
-    if t0.is_finite() { Ok(()) } else { Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }) }
-}
-
-/// Returns an error for an initial state at which L is not defined or not regular.
-fn check_regular<const N: usize>(system: &dyn System<N>, t0: f64, start: &VelocityPoint<N>) -> Result<(), InputError> {
-    let (g, w) = (system.gradient(t0, start), system.hessian(t0, start).vv);
-    let value = system.value(t0, start);
-    if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
-        return Err(InputError::Undefined);
-    }
-    // W is scaled so that its rows have size one, since masses may differ by any factor.
-    let unit = SVector::<f64, N>::from_fn(|i, _| max_abs_or_nan(w.row(i).iter().copied()).sqrt());
-    let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
-    let Regularity { smallest, largest } = Regularity::of(scaled);
-    // A row of zeros cannot be scaled, and the comparison treats it as singular.
-    if smallest > 4.0 * N as f64 * f64::EPSILON * largest {
-        return Ok(());
-    }
-    Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))
 }

@@ -1,25 +1,23 @@
 //! The parts of a step that ends parts at zeros of switching functions and at breaks.
 
-use crate::StepError;
 use crate::integration::{Motion, WholeStep};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint};
+use crate::{Components, Point, State, StepError, Vector};
 
 /// A part of a step with its solved stages, and what happened at its end: all that its tangent needs. See
 /// [`Stepper::solved_parts`](crate::Stepper::solved_parts).
 #[derive(Clone, Debug)]
-pub struct SolvedPart<const N: usize> {
+pub struct SolvedPart {
     /// `None` for a part of length zero, between two passages at one point.
-    pub(crate) step: Option<WholeStep<N>>,
-    pub(crate) from: PartPoint<N>,
+    pub(crate) step: Option<WholeStep>,
+    pub(crate) from: PartPoint,
     /// The end, before anything happens there.
-    pub(crate) to: PartPoint<N>,
+    pub(crate) to: PartPoint,
     /// The point from which the motion continues.
-    pub(crate) next: PartPoint<N>,
+    pub(crate) next: PartPoint,
     pub(crate) end: PartEnd,
 }
 
-impl<const N: usize> SolvedPart<N> {
+impl SolvedPart {
     /// The times of the start and of the end.
     pub fn span(&self) -> (f64, f64) {
         (self.from.t, self.to.t)
@@ -73,21 +71,21 @@ pub enum Passage {
 }
 
 /// A time, a state and its velocity.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PartPoint<const N: usize> {
+#[derive(Clone, Debug)]
+pub(crate) struct PartPoint {
     pub t: f64,
-    pub state: PhasePoint<N>,
-    pub v: SVector<f64, N>,
+    pub state: State,
+    pub v: Vector,
 }
 
-impl<const N: usize> PartPoint<N> {
-    pub fn point(&self) -> VelocityPoint<N> {
-        VelocityPoint { q: self.state.q, v: self.v, z: self.state.z }
+impl PartPoint {
+    pub fn point(&self) -> Point {
+        Point { q: self.state.q.clone(), v: self.v.clone(), z: self.state.z }
     }
 
     /// The time derivatives of the state, as a vector.
-    pub fn rates(&self, motion: &impl Motion<N>) -> Result<ChartVector<N>, StepError> {
-        let PhasePoint { q, p, z } = motion.rates(self.t, &self.state, Some(self.v))?;
-        Ok(ChartVector { x: q, y: p, z })
+    pub fn rates(&self, motion: &impl Motion) -> Result<Components, StepError> {
+        let State { q, p, z } = motion.rates(self.t, &self.state, Some(&self.v))?;
+        Ok(Components { x: q, y: p, z })
     }
 }

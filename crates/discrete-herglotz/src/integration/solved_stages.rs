@@ -1,34 +1,39 @@
 //! The solved stages of a step.
 
+use crate::State;
+use crate::integration::dense_step::FEW;
 use crate::numbers::registers::Stages;
-use contact_geom::PhasePoint;
+use smallvec::SmallVec;
+
+/// The values at the stages of each coordinate.
+pub(crate) type StageVectors = SmallVec<[Stages; FEW]>;
 
 /// The solved stages of a step of contact Gauss collocation: all that its tangent needs. See
 /// [`Stepper::solved_stages`](crate::Stepper::solved_stages).
 #[derive(Clone, Debug)]
-pub struct SolvedStages<const N: usize> {
+pub struct SolvedStages {
     pub(crate) s: usize,
     /// The time at the start, and the length of the step.
     pub(crate) t: f64,
     pub(crate) h: f64,
-    pub(crate) start: PhasePoint<N>,
+    pub(crate) start: State,
     /// V, `rho (L_q + f)`, `rho L_z` and L, with padding of any values.
-    pub(crate) v: [Stages; N],
-    pub(crate) force: [Stages; N],
+    pub(crate) v: StageVectors,
+    pub(crate) force: StageVectors,
     pub(crate) rate: Stages,
     pub(crate) l: Stages,
     /// Whether L is known; otherwise its values are 0.
     pub(crate) knows_l: bool,
 }
 
-impl<const N: usize> SolvedStages<N> {
+impl SolvedStages {
     /// The times of the start and of the end.
     pub fn span(&self) -> (f64, f64) {
         (self.t, self.t + self.h)
     }
 
     /// The state at the start.
-    pub fn start(&self) -> &PhasePoint<N> {
+    pub fn start(&self) -> &State {
         &self.start
     }
 

@@ -1,31 +1,30 @@
 //! What is known of a step that was taken: its stages, or its ends.
 
 use crate::integration::SolvedStages;
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{State, Vector};
 
 /// The ends of a step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StepEnds<const N: usize> {
+#[derive(Clone, Debug)]
+pub(crate) struct StepEnds {
     pub t: f64,
     pub h: f64,
-    pub start: PhasePoint<N>,
-    pub end: PhasePoint<N>,
+    pub start: State,
+    pub end: State,
 }
 
 /// A step, or a part of one, that nothing interrupts.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
-pub(crate) enum WholeStep<const N: usize> {
+pub(crate) enum WholeStep {
     /// The stages of a collocation step.
-    Collocation(SolvedStages<N>),
+    Collocation(SolvedStages),
     /// The ends of a step that consists of sub-flows.
-    Flow(StepEnds<N>),
+    Flow(StepEnds),
 }
 
-impl<const N: usize> WholeStep<N> {
+impl WholeStep {
     /// The time and the state at the start.
-    pub fn start(&self) -> (f64, &PhasePoint<N>) {
+    pub fn start(&self) -> (f64, &State) {
         match self {
             WholeStep::Collocation(step) => (step.t, &step.start),
             WholeStep::Flow(step) => (step.t, &step.start),
@@ -41,10 +40,10 @@ impl<const N: usize> WholeStep<N> {
     }
 
     /// A velocity within the step.
-    pub fn velocity(&self) -> SVector<f64, N> {
+    pub fn velocity(&self) -> Vector {
         match self {
-            WholeStep::Collocation(step) => SVector::from_fn(|d, _| step.v[d].0[0]),
-            WholeStep::Flow(step) => (step.end.q - step.start.q) / step.h,
+            WholeStep::Collocation(step) => step.v.iter().map(|v| v.0[0]).collect(),
+            WholeStep::Flow(step) => (&step.end.q - &step.start.q) / step.h,
         }
     }
 }

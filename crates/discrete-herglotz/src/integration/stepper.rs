@@ -2,9 +2,7 @@
 
 use crate::integration::{Piece, Reset};
 use crate::integration::{SolvedPart, SolvedStages};
-use crate::{DenseStep, PlanEntry, StepError, UnresolvedStep};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{DenseStep, PlanEntry, State, StepError, UnresolvedStep, Vector};
 use thiserror::Error;
 
 /// A method applied to one motion: the current state, the workspace, and the data carried from one step to the next
@@ -13,7 +11,7 @@ use thiserror::Error;
 /// A run advances a stepper. [`Flow`](crate::rules::Flow) is the stepper of a
 /// [`DiscreteLagrangian`](crate::DiscreteLagrangian); methods that carry more than a guess of the velocity have their
 /// own.
-pub trait Stepper<const N: usize> {
+pub trait Stepper {
     /// Takes `steps` steps without observation between them.
     ///
     /// # Errors
@@ -31,7 +29,7 @@ pub trait Stepper<const N: usize> {
     }
 
     /// The state `(q, p, z)`. For a stepper without the action, `z` keeps its initial value.
-    fn state(&self) -> PhasePoint<N>;
+    fn state(&self) -> State;
 
     /// The time of the state.
     fn time(&self) -> f64;
@@ -44,31 +42,31 @@ pub trait Stepper<const N: usize> {
 
     /// The dense output of the last step, for a method that provides it; `None` before the first step and after a
     /// failed one.
-    fn dense(&self) -> Option<DenseStep<N>> {
+    fn dense(&self) -> Option<DenseStep> {
         None
     }
 
     /// The solved stages of the last step, from which its tangent is computed; `None` before the first step, after a
     /// failed one, and for a method whose tangent is not implemented.
-    fn solved_stages(&self) -> Option<SolvedStages<N>> {
+    fn solved_stages(&self) -> Option<SolvedStages> {
         None
     }
 
     /// The parts into which switching times and breaks divided the last step; empty if it was not divided or the
     /// [stages](Self::solved_stages) of a part are unknown.
-    fn solved_parts(&self) -> Vec<SolvedPart<N>> {
+    fn solved_parts(&self) -> Vec<SolvedPart> {
         Vec::new()
     }
 
     /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where
     /// several velocities have the same momentum. `None` before the first step, and where the velocity is unique.
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+    fn last_velocity(&self) -> Option<Vector> {
         None
     }
 
     /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state.
     /// This affects only the number of iterations.
-    fn guess(&mut self, _longer: &DenseStep<N>) {}
+    fn guess(&mut self, _longer: &DenseStep) {}
 
     /// Whether `sigma_d` is known in advance to be the same in all steps.
     fn has_constant_rate(&self) -> bool {
@@ -92,12 +90,12 @@ pub trait Stepper<const N: usize> {
     }
 
     /// The resets in the steps of the last call of [`advance`](Self::advance), in their order.
-    fn resets(&self) -> &[Reset<N>] {
+    fn resets(&self) -> &[Reset] {
         &[]
     }
 
     /// The pieces of the last step between its resets; empty for a step without resets.
-    fn pieces(&self) -> &[Piece<N>] {
+    fn pieces(&self) -> &[Piece] {
         &[]
     }
 
@@ -112,7 +110,7 @@ pub trait Stepper<const N: usize> {
     }
 
     /// The latest suspect interval since the last call: steps that may not have resolved the motion.
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         None
     }
 }
@@ -130,8 +128,8 @@ pub struct StepFailure {
 /// An interval of steps along which the second difference of the velocity is twice as large as in all steps before. For
 /// a smooth force this is harmless, but the force may jump there, or vary on a scale shorter than the steps. A
 /// [`Run`](crate::Run) examines the interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SuspectInterval<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct SuspectInterval {
     /// The number of steps before the interval.
     pub step: usize,
     /// The number of steps in the interval.
@@ -139,7 +137,7 @@ pub struct SuspectInterval<const N: usize> {
     /// The time at its start.
     pub t: f64,
     /// The state at its start.
-    pub from: PhasePoint<N>,
+    pub from: State,
     /// The state at its end.
-    pub to: PhasePoint<N>,
+    pub to: State,
 }

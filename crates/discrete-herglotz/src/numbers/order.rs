@@ -10,9 +10,9 @@
 /// assert_eq!(names, ["a", "b", "c"]);
 /// assert_eq!(sorted(&crossings, |(t, _)| *t, true)[2].1, "a");
 /// ```
-pub fn sorted<T: Copy>(items: &[T], key: impl Fn(&T) -> f64, descending: bool) -> Vec<T> {
+pub fn sorted<T: Clone>(items: &[T], key: impl Fn(&T) -> f64, descending: bool) -> Vec<T> {
     let keys: Vec<f64> = items.iter().map(key).collect();
-    order_of(&keys, descending).into_iter().map(|i| items[i]).collect()
+    order_of(&keys, descending).into_iter().map(|i| items[i].clone()).collect()
 }
 
 /// The indices of numbers in ascending or descending order; equal ones keep their order.

@@ -1,5 +1,6 @@
 //! Saving and restoring the state of steppers, so that an interrupted run can be resumed bitwise.
 
+use crate::{State, Vector};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Complex, SMatrix};
 
@@ -100,6 +101,16 @@ impl<T: Saved, const R: usize, const C: usize> Saved for SMatrix<T, R, C> {
     }
 }
 
+/// The length must be the same when it is read back.
+impl Saved for Vector {
+    fn save(&self, to: &mut Vec<u64>) {
+        self.as_slice().save(to);
+    }
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        (**self).load(from)
+    }
+}
+
 impl Saved for Complex<f64> {
     fn save(&self, to: &mut Vec<u64>) {
         [self.re, self.im].save(to);
@@ -130,6 +141,7 @@ macro_rules! saved {
 pub(crate) use saved;
 
 saved!([const N: usize] PhasePoint<N> { q, p, z });
+saved!([] State { q, p, z });
 
 /// The words of a value, for [`Stepper::save`](crate::Stepper::save).
 pub(crate) fn words_of(x: &impl Saved) -> Vec<u64> {

@@ -4,7 +4,7 @@ use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::resolution::thresholds::{
     MAX_RATIONAL_FACTOR, MIN_RELATIVE_DISPLACEMENT, MIN_SUSPECT_DIFFERENCE, MIN_SUSPECT_GROWTH, POSITION_ROUND_OFF,
 };
-use crate::{UnresolvedStep, integration::SuspectInterval};
+use crate::{State, UnresolvedStep, Vector, integration::SuspectInterval};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
     PhasePoint,
@@ -55,10 +55,12 @@ impl StepMonitor {
 }
 
 /// The monitor of the steps of a run, with the latest suspect interval.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ResolutionMonitor<const N: usize> {
+#[derive(Clone, Debug)]
+pub(crate) struct ResolutionMonitor {
     pub steps: StepMonitor,
-    pub suspect: Option<SuspectInterval<N>>,
+    pub suspect: Option<SuspectInterval>,
+    /// The number of coordinates.
+    dimension: usize,
 }
 
 /// A bound for the changes of position by round-off in a motion from this initial state. It is relative to the size of
@@ -68,18 +70,24 @@ pub(crate) fn rounding(q: &[f64], v: &[f64], h: f64) -> f64 {
     if extent.is_finite() { POSITION_ROUND_OFF * extent } else { 0.0 }
 }
 
-impl<const N: usize> ResolutionMonitor<N> {
+impl ResolutionMonitor {
     /// A monitor for a motion from a position and a velocity, with steps of length h.
-    pub fn new(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> Self {
-        ResolutionMonitor { steps: StepMonitor::new(q.as_slice(), v.as_slice(), h), suspect: None }
+    pub fn new(q: &[f64], v: &[f64], h: f64) -> Self {
+        ResolutionMonitor { steps: StepMonitor::new(q, v, h), suspect: None, dimension: q.len() }
     }
 
-    /// Records a suspect interval with this sharpness.
+    /// Records a suspect interval with this sharpness: the number of steps before it and in it, its start, and the states
+    /// at its ends.
     #[cold]
     #[inline(never)]
-    pub fn suspect(&mut self, sharpness: f64, suspect: SuspectInterval<N>) {
+    pub fn suspect<const N: usize>(
+        &mut self,
+        sharpness: f64,
+        (step, steps, t): (usize, usize, f64),
+        [from, to]: [&PhasePoint<N>; 2],
+    ) {
         self.steps.suspect(sharpness);
-        self.suspect = Some(suspect);
+        self.suspect = Some(SuspectInterval { step, steps, t, from: from.into(), to: to.into() });
     }
 }
 
@@ -167,10 +175,10 @@ pub(crate) fn factor_defect(sigma: f64) -> Option<f64> {
     if resolved { None } else { Some(sigma.ln().abs() / MAX_RATIONAL_FACTOR.ln()) }
 }
 
-saved!([const N: usize] SuspectInterval<N> { step, steps, t, from, to });
+saved!([] SuspectInterval { step, steps, t, from, to });
 saved!([] UnresolvedStep { step, defect });
 
-impl<const N: usize> Saved for ResolutionMonitor<N> {
+impl Saved for ResolutionMonitor {
     fn save(&self, to: &mut Vec<u64>) {
         save_option(self.steps.first.as_ref(), to);
         save_option(self.suspect.as_ref(), to);
@@ -178,8 +186,9 @@ impl<const N: usize> Saved for ResolutionMonitor<N> {
     }
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         self.steps.first = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
-        let nowhere = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
-        self.suspect = load_option(from, || SuspectInterval { step: 0, steps: 0, t: 0.0, from: nowhere, to: nowhere })?;
+        let nowhere = || State::new(Vector::zeros(self.dimension), Vector::zeros(self.dimension), 0.0);
+        let interval = || SuspectInterval { step: 0, steps: 0, t: 0.0, from: nowhere(), to: nowhere() };
+        self.suspect = load_option(from, interval)?;
         self.steps.sharpest.load(from)?;
         self.steps.floor.load(from)
     }

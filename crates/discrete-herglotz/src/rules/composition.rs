@@ -4,8 +4,8 @@ use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
 use crate::rules::flow::work_summary_of;
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, SplittingScheme, StepError, StepFailure, Stepper,
-    UnresolvedStep, integration::SuspectInterval, solve::Solver,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, SplittingScheme, State, StepError, StepFailure, Stepper,
+    UnresolvedStep, Vector, integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -49,7 +49,7 @@ pub struct Composition<D, const N: usize> {
     change: SVector<f64, N>,
     /// The state before the last step.
     before: PhasePoint<N>,
-    monitor: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor,
 }
 
 /// One substep: the index of its rule, and the earlier of its two times, relative to the start of the step.
@@ -82,7 +82,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        crate::integration::problem::check_time(t0)?;
+        crate::integration::system_problem::check_time(t0)?;
         state.check()?;
         let Some(lengths) = scheme.substeps() else {
             return Err(InputError::Hypothesis {
@@ -124,7 +124,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             acceleration: SVector::zeros(),
             change: SVector::zeros(),
             before: state,
-            monitor: ResolutionMonitor::new(&state.q, &SVector::zeros(), h),
+            monitor: ResolutionMonitor::new(state.q.as_slice(), &[0.0; N], h),
         };
         if let Some(first) = composition.substeps.first().copied() {
             let guess = SVector::zeros();
@@ -169,7 +169,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         {
             // The cause of a change of the first mean velocity may lie in the previous step.
             let t = self.t0 + step as f64 * self.h;
-            self.monitor.suspect(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
+            self.monitor.suspect(sharpest, (step, 2, t), [&self.before, &state]);
         }
         self.before = self.state;
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
@@ -217,7 +217,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     }
 }
 
-impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> {
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Composition<D, N> {
     fn has_constant_rate(&self) -> bool {
         self.rules.iter().all(|rule| rule.constant_rate())
     }
@@ -226,16 +226,16 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         work_summary_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        (self.taken > 0).then_some(self.velocity)
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.taken > 0).then(|| self.velocity.into())
     }
 
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         (0..steps).try_for_each(|taken| self.step().map_err(|cause| StepFailure { taken, cause }))
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.state
+    fn state(&self) -> State {
+        self.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -264,7 +264,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.monitor.steps.first
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         self.monitor.suspect.take()
     }
 }

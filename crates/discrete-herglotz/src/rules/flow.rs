@@ -1,11 +1,12 @@
 //! The discrete Hamiltonian flow with a current state.
 
-use crate::integration::problem::{check_time, start_of};
+use crate::integration::problem::start_of;
+use crate::integration::system_problem::check_time;
 use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, at_rest, sharper};
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep,
-    integration::SuspectInterval, solve::Solver,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, State, StepError, StepFailure, Stepper, UnresolvedStep,
+    Vector, integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint};
@@ -57,7 +58,7 @@ pub struct Flow<D, const N: usize> {
     evaluations: u64,
     /// The state before the last step.
     before: PhasePoint<N>,
-    monitor: ResolutionMonitor<N>,
+    monitor: ResolutionMonitor,
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
@@ -83,8 +84,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         // Checked first, because a singular Lagrangian is the cause of a first step that fails.
         ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
         let first = first.map_err(InputError::first_step)?;
-        let (velocities, monitor) =
-            ([first.velocity; 3], ResolutionMonitor::new(&state.q, &first.velocity, ld.step_size()));
+        let monitor = ResolutionMonitor::new(state.q.as_slice(), first.velocity.as_slice(), ld.step_size());
+        let velocities = [first.velocity; 3];
         Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, monitor })
     }
 
@@ -146,9 +147,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // The cause of a change of the mean velocities lies in this step or the previous one.
-            let suspect =
-                SuspectInterval { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
-            self.monitor.suspect(sharpness, suspect);
+            let t = self.t0 + step as f64 * h;
+            self.monitor.suspect(sharpness, (step, 2, t), [&self.before, &next.end]);
         }
         // After two steps, the velocity before the first is extrapolated linearly.
         self.velocities = match self.k {
@@ -193,7 +193,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     }
 }
 
-impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Flow<D, N> {
     fn has_constant_rate(&self) -> bool {
         self.ld.constant_rate()
     }
@@ -202,8 +202,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         work_summary_of(self.ld.is_explicit(), "step")
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        (self.k > 0).then_some(self.velocities[0])
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.k > 0).then(|| self.velocities[0].into())
     }
 
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
@@ -213,8 +213,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.state
+    fn state(&self) -> State {
+        self.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -243,7 +243,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         self.monitor.steps.first
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         self.monitor.suspect.take()
     }
 }

@@ -75,7 +75,7 @@ macro_rules! integrates {
                 problem: &Problem<'a, L, N>,
                 h: f64,
                 _: StepperOptions,
-            ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+            ) -> Result<Box<dyn Stepper + 'a>, InputError> {
                 let ld = DiscretizationMethod::<'a, L, N>::discretise(self, problem, h)?;
                 Ok(Box::new(Flow::with_guess(ld, problem.t0, problem.state, problem.start.v)?))
             }
@@ -248,7 +248,7 @@ impl<'a, L: Lagrangian<N>, D: DiscretizationMethod<'a, L, N>, const N: usize> In
         problem: &Problem<'a, L, N>,
         h: f64,
         _: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let rule = |h| self.rule.discretise(problem, h);
         Ok(Box::new(Composition::new(rule, &self.scheme, h, problem.t0, problem.state)?))
     }

@@ -127,7 +127,7 @@ impl Method {
         t: f64,
         state: &PhasePoint<N>,
     ) -> Result<AnyDiscreteLagrangian<L, N>, InputError> {
-        crate::integration::problem::check_time(t)?;
+        crate::integration::system_problem::check_time(t)?;
         state.check()?;
         Ok(match self.rule() {
             Some(rule) => AnyDiscreteLagrangian::Rule(rule.of(lagrangian, h)?),

@@ -113,7 +113,7 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
         problem: &Problem<'a, L, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         each!(*self, integrator => integrator.stepper(problem, h, options))
     }
 

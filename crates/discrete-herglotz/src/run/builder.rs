@@ -1,6 +1,7 @@
 //! The builder of a run: integrator, steps, observers and requests.
 
-use crate::integration::{Bound, SharedIntegrator};
+use crate::integration::SystemProblem;
+use crate::integration::{SharedIntegrator, bound};
 use crate::run::accuracy;
 use crate::run::integrate::integrate;
 use crate::run::observers::observer::{Borrowed, Observer};
@@ -8,10 +9,10 @@ use crate::run::observers::output_request::OutputRequest;
 use crate::run::planning::NO_STEP;
 use crate::run::request::{Request, StepControl, Steps, Until};
 use crate::run::{Outcome, Plan, ResumeState};
-use crate::switching::Collocation;
-use crate::{GaussCollocation, InputError, Integrator, Problem};
-use contact_geom::Lagrangian;
-use contact_geom::nalgebra::SVector;
+use crate::switching::{Collocation, CollocationByPoints, CollocationOf, CollocationSteppers};
+use crate::{GaussCollocation, InputError, Integrator, Problem, Vector};
+use contact_geom::{GeometryError, Lagrangian};
+use std::sync::Arc;
 
 /// The builder of a run: a [`Problem`] with an integrator, steps and observers.
 ///
@@ -32,21 +33,26 @@ use contact_geom::nalgebra::SVector;
 /// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-pub struct Run<'p, 'o, L, const N: usize> {
-    pub(crate) problem: &'p Problem<'p, L, N>,
-    integrator: Option<SharedIntegrator<'p, N>>,
-    length: Option<StepControl<'p, N>>,
+pub struct Run<'p, 'o, P = SystemProblem<'p>> {
+    pub(crate) problem: &'p P,
+    system: SystemProblem<'p>,
+    /// The collocation steppers of a system whose steps may have parts.
+    parts: Option<Collocation<'p>>,
+    integrator: Option<SharedIntegrator<'p>>,
+    length: Option<StepControl<'p>>,
     needs: OutputRequest,
-    scales: Option<SVector<f64, N>>,
+    scales: Option<Vector>,
     estimated: bool,
-    observers: Vec<Box<dyn Observer<N> + 'o>>,
+    observers: Vec<Box<dyn Observer + 'o>>,
     from: Option<ResumeState>,
 }
 
-impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
-    fn of(problem: &'p Problem<'p, L, N>) -> Self {
+impl<'p, 'o, P> Run<'p, 'o, P> {
+    fn of(problem: &'p P, system: SystemProblem<'p>, parts: Option<Collocation<'p>>) -> Self {
         Run {
             problem,
+            system,
+            parts,
             integrator: None,
             length: None,
             needs: OutputRequest::ACTION,
@@ -57,9 +63,8 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         }
     }
 
-    /// Sets the integrator.
-    pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
-        Run { integrator: Some(Bound::shared(integrator, self.problem.lagrangian)), ..self }
+    fn within(self, wanted: f64, collocation: Collocation<'p>) -> Self {
+        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps, collocation)), ..self }
     }
 
     /// Sets the size or the number of the steps.
@@ -67,31 +72,16 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Run { length: Some(StepControl::Given(steps)), ..self }
     }
 
-    /// Requests an error instead of a step size. Trial runs select one step size for the whole run, in time or in the
-    /// transformed time of the Lagrangian, such that at every tenth of the span the error of (q, p), relative to its
-    /// size at that time or at the end, is at most `wanted`, and so is the error of v, relative to the largest speed of
-    /// the motion. The trial runs cost a small multiple of the run. Features of the motion that are narrower than the
-    /// distance of their nodes, about the step divided by four times the number of stages, may be missed.
-    ///
-    /// If an observer's event ends the run, the trial runs end there too.
-    ///
-    /// If no integrator is given, contact Gauss collocation is used: with 8 stages; with 16 stages for many steps whose
-    /// stage equations are iterated in the accelerations only; and in the transformed time of the Lagrangian if this
-    /// takes far fewer steps.
-    pub fn accuracy(self, wanted: f64) -> Self {
-        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps, self.problem.lagrangian)), ..self }
-    }
-
     /// Sets a scale for each coordinate, for coordinates that differ in size or unit: errors are then those of the
     /// scaled coordinates `q_i/scales_i`, and of the scaled velocities `v_i/scales_i` relative to the largest such
     /// speed of the motion. The scales apply to [`accuracy`](Self::accuracy) and to the [error
     /// estimate](Self::with_error_estimate).
-    pub fn scales(self, scales: [f64; N]) -> Self {
+    pub fn scales(self, scales: impl Into<Vector>) -> Self {
         Run { scales: Some(scales.into()), ..self }
     }
 
     /// Adds an observer; observers are called in the order in which they were added.
-    pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
+    pub fn observe(mut self, observer: &'o mut impl Observer) -> Self {
         self.observers.push(Box::new(Borrowed(observer)));
         self
     }
@@ -126,20 +116,21 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// [`InputError`]: a span that is not finite, a step that is 0 or not finite, missing steps or a missing
     /// integrator, a false or a missing claim of structure, an integrator whose hypotheses the Lagrangian does not
     /// satisfy, an accuracy that cannot be reached.
-    pub fn plan(&self, until: Until) -> Result<Plan<'p, N>, InputError> {
+    pub fn plan(&self, until: Until) -> Result<Plan<'p>, InputError> {
         let needs = self.needs.and(self.observers.needs());
-        let problem = self.problem;
-        let (t0, Some(length)) = (problem.t0, self.length) else { return Err(InputError::NoSteps) };
-        let (t_end, span, length) = match (until, length) {
+        let (t0, n, Some(length)) = (self.system.t0, self.system.start.q.len(), self.length.clone()) else {
+            return Err(InputError::NoSteps);
+        };
+        let (t_end, span, length) = match (until, &length) {
             (Until::Time(t), _) => (t, t - t0, length),
             (Until::After(span), _) => (t0 + span, span, length),
             (Until::Steps(0), _) => return Err(NO_STEP),
-            (Until::Steps(_), StepControl::Given(Steps::Size(h))) if !(h != 0.0 && h.is_finite()) => {
-                return Err(InputError::Step { h });
+            (Until::Steps(_), StepControl::Given(Steps::Size(h))) if !(*h != 0.0 && h.is_finite()) => {
+                return Err(InputError::Step { h: *h });
             }
             (Until::Steps(count), StepControl::Given(Steps::Size(h))) => {
                 let span = count as f64 * h;
-                (t0 + span, span, StepControl::Exactly(count, h))
+                (t0 + span, span, StepControl::Exactly(count, *h))
             }
             (Until::Steps(_), _) => {
                 return Err(InputError::Hypothesis {
@@ -147,16 +138,18 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
                 });
             }
         };
-        if let Some(scales) = self.scales
+        if let Some(scales) = &self.scales
+            && scales.len() != n
+        {
+            return Err(GeometryError::WrongSize { what: "scales", expected: n, found: scales.len() }.into());
+        }
+        if let Some(scales) = &self.scales
             && let Some(index) = scales.iter().position(|scale| !(*scale > 0.0 && scale.is_finite()))
         {
             return Err(InputError::Scale { index, scale: scales[index] });
         }
-        // Written so that collocation is not compiled for a Lagrangian whose steps have no parts.
-        let parts =
-            if const { L::HINTS.switching_functions } { Some(problem.lagrangian as Collocation<'p, N>) } else { None };
-        let (integrator, scales) = (self.integrator.clone(), self.scales);
-        let request = Request { problem: problem.of_system(), t_end, span, integrator, needs, scales, parts };
+        let (integrator, scales, parts) = (self.integrator.clone(), self.scales.clone(), self.parts.clone());
+        let request = Request { problem: self.system.clone(), t_end, span, integrator, needs, scales, parts };
         let terminal = if let StepControl::Accuracy(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;
@@ -168,12 +161,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// # Errors
     /// Those of [`plan`](Self::plan), and those of observers that cannot observe the run. A failure during the run is
     /// reported as the status of the outcome.
-    pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
+    pub fn run(mut self, until: Until) -> Result<Outcome, InputError> {
         integrate(&self.plan(until)?, &mut self.observers, self.from.as_ref())
     }
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, L, N> {
+impl<'p, P> Run<'p, '_, P> {
     /// The same run with the action, on which its derivatives depend.
     ///
     /// # Errors
@@ -188,31 +181,90 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, L, N> {
     }
 
     /// Performs the run of a plan with one more observer, called after the others.
-    pub(crate) fn observed(
-        mut self,
-        plan: &Plan<'p, N>,
-        observer: &mut impl Observer<N>,
-    ) -> Result<Outcome<N>, InputError> {
+    pub(crate) fn observed(mut self, plan: &Plan<'p>, observer: &mut impl Observer) -> Result<Outcome, InputError> {
         let mut observers = std::mem::take(&mut self.observers);
         observers.push(Box::new(Borrowed(observer)));
         integrate(plan, &mut observers, self.from.as_ref())
     }
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
-    /// A run of the problem with an integrator.
-    pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, L, N> {
-        Run::of(self).by(integrator)
+impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
+    fn typed(problem: &'p Problem<'p, L, N>) -> Self {
+        // Written so that collocation is not compiled for a Lagrangian whose steps have no parts.
+        let parts: Option<Collocation<'p>> = if const { L::HINTS.switching_functions } {
+            Some(Arc::new(CollocationOf(problem.lagrangian)))
+        } else {
+            None
+        };
+        Run::of(problem, problem.of_system(), parts)
+    }
+
+    /// Sets the integrator.
+    pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
+        Run { integrator: Some(bound(integrator, self.problem.lagrangian)), ..self }
+    }
+
+    /// Requests an error instead of a step size. Trial runs select one step size for the whole run, in time or in the
+    /// transformed time of the Lagrangian, such that at every tenth of the span the error of (q, p), relative to its
+    /// size at that time or at the end, is at most `wanted`, and so is the error of v, relative to the largest speed of
+    /// the motion. The trial runs cost a small multiple of the run. Features of the motion that are narrower than the
+    /// distance of their nodes, about the step divided by four times the number of stages, may be missed.
+    ///
+    /// If an observer's event ends the run, the trial runs end there too.
+    ///
+    /// If no integrator is given, contact Gauss collocation is used: with 8 stages; with 16 stages for many steps whose
+    /// stage equations are iterated in the accelerations only; and in the transformed time of the Lagrangian if this
+    /// takes far fewer steps.
+    pub fn accuracy(self, wanted: f64) -> Self {
+        let collocation = Arc::new(CollocationOf::<L, N>(self.problem.lagrangian));
+        self.within(wanted, collocation)
+    }
+}
+
+impl<'p> Run<'p, '_> {
+    /// Sets the number of stages of contact Gauss collocation.
+    pub fn by(self, integrator: GaussCollocation) -> Self {
+        Run { integrator: Some(CollocationByPoints.gauss(integrator.stages)), ..self }
+    }
+
+    /// Requests an error instead of a step size, as in a run of a [`Problem`]. If no number of stages is given, there are 8,
+    /// or the steps are divided where the motion is fast.
+    pub fn accuracy(self, wanted: f64) -> Self {
+        self.within(wanted, Arc::new(CollocationByPoints))
+    }
+}
+
+impl<'a> SystemProblem<'a> {
+    /// A run of the problem with contact Gauss collocation.
+    pub fn by<'p, 'o>(&'p self, integrator: GaussCollocation) -> Run<'p, 'o> {
+        Run::of(self, self.clone(), None).by(integrator)
     }
 
     /// A run with given steps of contact Gauss collocation with eight stages.
-    pub fn steps<'o>(&self, steps: Steps) -> Run<'_, 'o, L, N> {
+    pub fn steps<'p, 'o>(&'p self, steps: Steps) -> Run<'p, 'o> {
+        self.by(GaussCollocation { stages: 8 }).steps(steps)
+    }
+
+    /// A run to a requested relative error of (q, p) and v.
+    pub fn accuracy<'p, 'o>(&'p self, wanted: f64) -> Run<'p, 'o> {
+        Run::of(self, self.clone(), None).accuracy(wanted)
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
+    /// A run of the problem with an integrator.
+    pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, Problem<'p, L, N>> {
+        Run::typed(self).by(integrator)
+    }
+
+    /// A run with given steps of contact Gauss collocation with eight stages.
+    pub fn steps<'p, 'o>(&'p self, steps: Steps) -> Run<'p, 'o, Problem<'p, L, N>> {
         self.by(GaussCollocation { stages: 8 }).steps(steps)
     }
 
     /// A run to a requested relative error of (q, p) and v, with an integrator that is selected for it; see
     /// [`Run::accuracy`].
-    pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
-        Run::of(self).accuracy(wanted)
+    pub fn accuracy<'p, 'o>(&'p self, wanted: f64) -> Run<'p, 'o, Problem<'p, L, N>> {
+        Run::typed(self).accuracy(wanted)
     }
 }

@@ -9,19 +9,18 @@ use crate::run::observers::observer::Observer;
 use crate::run::observers::output_request::{OutputRequest, RunInfo};
 use crate::run::observers::step_view::{StepView, Stop};
 use crate::run::{Outcome, Plan, ResumeState};
-use crate::{InputError, Status, StepError, Stepper};
-use contact_geom::PhasePoint;
+use crate::{InputError, State, Status, StepError, Stepper};
 
 /// The observers of a run, in the order in which they were added.
-pub(crate) type Observers<'o, const N: usize> = Vec<Box<dyn Observer<N> + 'o>>;
+pub(crate) type Observers<'o> = Vec<Box<dyn Observer + 'o>>;
 
 /// Takes the steps of a plan, from its start or from a resumed state. Steps after which no check and no observer is due
 /// are taken together; the checks, and then the observers, see the end of the last of them.
-pub(crate) fn integrate<const N: usize>(
-    plan: &Plan<'_, N>,
-    observers: &mut Observers<'_, N>,
+pub(crate) fn integrate(
+    plan: &Plan<'_>,
+    observers: &mut Observers<'_>,
     from: Option<&ResumeState>,
-) -> Result<Outcome<N>, InputError> {
+) -> Result<Outcome, InputError> {
     let mut run = Integration::new(plan, observers, from)?;
     run.start();
     while run.status.is_none() && !run.over {
@@ -35,11 +34,12 @@ pub(crate) fn integrate<const N: usize>(
         run.over = plan.steps.is_over(run.taken, run.stepper.time());
         let (stepper, taken, over) = (&mut *run.stepper, run.taken, run.over);
         let mut step = TakenSteps { stepper, before, first, taken, over };
-        let (before, is_full_check) = (step.single().copied(), step.are_fully_checked());
+        let is_full_check = step.are_fully_checked();
         if let Some(false_claim) = run.checks.check(&mut step) {
             run.status = Some(false_claim);
             break;
         }
+        let before = step.into_single();
         let at_rest = run.is_at_rest(is_full_check);
         run.over |= at_rest;
         run.observe(first, before, at_rest);
@@ -47,36 +47,36 @@ pub(crate) fn integrate<const N: usize>(
     Ok(run.outcome())
 }
 
-impl<const N: usize> Plan<'_, N> {
+impl Plan<'_> {
     /// Performs the run without observers.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper). A failure during the run is the outcome's status.
-    pub fn run(&self) -> Result<Outcome<N>, InputError> {
+    pub fn run(&self) -> Result<Outcome, InputError> {
         integrate(self, &mut Vec::new(), None)
     }
 }
 
 /// The state of a run in progress.
-struct Integration<'r, 'p, 'o, const N: usize> {
-    plan: &'r Plan<'p, N>,
-    observers: &'r mut Observers<'o, N>,
+struct Integration<'r, 'p, 'o> {
+    plan: &'r Plan<'p>,
+    observers: &'r mut Observers<'o>,
     info: RunInfo,
-    stepper: Box<dyn Stepper<N> + 'p>,
-    checks: Checks<'r, 'p, N>,
+    stepper: Box<dyn Stepper + 'p>,
+    checks: Checks<'r, 'p>,
     taken: usize,
     /// Whether the last step has been taken.
     over: bool,
     /// The status, if the run ended before its last step.
     status: Option<Status>,
     /// The time and the state at the end, if the run ended within a step.
-    end: Option<(f64, PhasePoint<N>)>,
+    end: Option<(f64, State)>,
 }
 
-impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
+impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
     fn new(
-        plan: &'r Plan<'p, N>,
-        observers: &'r mut Observers<'o, N>,
+        plan: &'r Plan<'p>,
+        observers: &'r mut Observers<'o>,
         from: Option<&ResumeState>,
     ) -> Result<Self, InputError> {
         let steps = &plan.steps;
@@ -88,6 +88,7 @@ impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
         // If the trial runs found an event that ends the run, the number of steps up to it.
         let expected = plan.ends_after.map_or(steps.count, |ended| steps.count.min(ended.saturating_add(1)));
         let info = RunInfo {
+            dimension: steps.problem.system.dimension(),
             t0: steps.problem.t0,
             t_end: plan.rests_until.unwrap_or(steps.t_end),
             h: (!in_transformed_time).then_some(steps.h),
@@ -164,7 +165,7 @@ impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
     }
 
     /// Calls the observers at the end of the last step, if they are due.
-    fn observe(&mut self, first: usize, before: Option<(f64, PhasePoint<N>)>, at_rest: bool) {
+    fn observe(&mut self, first: usize, before: Option<(f64, State)>, at_rest: bool) {
         if self.taken >= self.next_observed(first) || self.over {
             let (findings, last) = (self.checks.findings, self.over && !at_rest);
             let end = self.plan.view(&*self.stepper, before, findings, (self.taken, last));
@@ -182,10 +183,10 @@ impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
     }
 
     /// Ends the run if an observer stopped it.
-    fn stop(&mut self, stop: Option<Stop<N>>) {
+    fn stop(&mut self, stop: Option<Stop>) {
         let Some(Stop { by, cause, at }) = stop else { return };
         let step = self.taken;
-        let t = at.map_or(self.stepper.time(), |(t, _)| t);
+        let t = at.as_ref().map_or(self.stepper.time(), |(t, _)| *t);
         self.end = at;
         self.status = Some(match cause {
             Some(cause) => Status::Failed { step, t, cause },
@@ -193,10 +194,11 @@ impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
         });
     }
 
-    fn outcome(self) -> Outcome<N> {
+    fn outcome(self) -> Outcome {
         let Integration { plan, stepper, checks, taken, status, end, .. } = self;
         let steps = &plan.steps;
-        let (t, state, near) = (stepper.time(), stepper.state(), stepper.last_velocity());
+        let (t, state, velocity) = (stepper.time(), stepper.state(), stepper.last_velocity());
+        let near = velocity.as_ref();
         let error_estimate =
             plan.estimated.then(|| steps.error.unwrap_or_else(|| steps.distance_from_halves(taken, t, (&state, near))));
         let (t, state) = end.unwrap_or((t, state));
@@ -207,9 +209,9 @@ impl<'r, 'p, 'o, const N: usize> Integration<'r, 'p, 'o, N> {
             unresolved: crate::status::first(unresolved, checks.unresolved_by(&*stepper)),
             steps: taken,
             t,
+            v: steps.velocity(t, &state, near).ok(),
             q: state.q,
             p: state.p,
-            v: steps.velocity(t, &state, near).ok(),
             z: action.then_some(state.z),
             log_factor: conformal_factor.then_some(log_factor),
             error_estimate,

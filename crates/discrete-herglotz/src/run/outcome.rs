@@ -1,13 +1,12 @@
 //! The result of a run.
 
-use crate::Start;
-use crate::{Status, UnresolvedStep};
+use crate::{Start, State, Status, UnresolvedStep, Vector};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
 /// The result of a run: the final state, or the last state that was computed if the run ended early.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
     /// How the run ended.
     pub status: Status,
     /// The first unresolved step that was detected: the results after it may be wrong.
@@ -17,11 +16,11 @@ pub struct Outcome<const N: usize> {
     /// The final time.
     pub t: f64,
     /// The final position.
-    pub q: SVector<f64, N>,
+    pub q: Vector,
     /// The final momentum.
-    pub p: SVector<f64, N>,
+    pub p: Vector,
     /// The final velocity; `None` if no velocity has this momentum.
-    pub v: Option<SVector<f64, N>>,
+    pub v: Option<Vector>,
     /// The final action, if it was requested.
     pub z: Option<f64>,
     /// The logarithm of the conformal factor of the motion, if it was requested.
@@ -35,16 +34,19 @@ pub struct Outcome<const N: usize> {
     pub(crate) z_or_start: f64,
 }
 
-impl<const N: usize> Outcome<N> {
+impl Outcome {
     /// The state `(q, p, z)`; z is the initial action if the action was not requested.
-    pub fn state(&self) -> PhasePoint<N> {
-        PhasePoint { q: self.q, p: self.p, z: self.z_or_start }
+    pub fn state(&self) -> State {
+        State { q: self.q.clone(), p: self.p.clone(), z: self.z_or_start }
     }
 }
 
-/// The final state as the start of another problem.
-impl<const N: usize> From<&Outcome<N>> for Start<N> {
-    fn from(outcome: &Outcome<N>) -> Self {
-        Start::Momentum(outcome.state(), outcome.v.unwrap_or_else(SVector::zeros))
+/// The final state as the start of another problem. A problem with another number of coordinates refuses it: its action
+/// is then NaN.
+impl<const N: usize> From<&Outcome> for Start<N> {
+    fn from(outcome: &Outcome) -> Self {
+        let z = if outcome.q.len() == N { outcome.z_or_start } else { f64::NAN };
+        let state = PhasePoint { q: outcome.q.fixed(), p: outcome.p.fixed(), z };
+        Start::Momentum(state, outcome.v.as_ref().map_or_else(SVector::zeros, Vector::fixed))
     }
 }

@@ -6,8 +6,8 @@ use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
 use crate::run::observers::step_view::StepView;
 use crate::run::request::{Request, StepSelection};
-use crate::{InputError, MethodInfo, PlanEntry, Stepper};
-use contact_geom::{Defect, PhasePoint, Structure};
+use crate::{InputError, MethodInfo, PlanEntry, State, Stepper};
+use contact_geom::{Defect, Structure};
 use std::cell::Cell;
 use std::fmt::{Display, Formatter};
 
@@ -24,8 +24,8 @@ const NONHOLONOMIC: &str = "not contact, as the motion: sigma_d multiplies the e
 
 /// A run after the checks of its input, with its steps and its route; created by [`Run::plan`](crate::Run::plan). Its
 /// `Display` output lists what will be computed and what is skipped.
-pub struct Plan<'p, const N: usize> {
-    pub(crate) steps: Discretization<'p, N>,
+pub struct Plan<'p> {
+    pub(crate) steps: Discretization<'p>,
     /// The number of steps after which an observer is expected to end the run.
     pub(crate) ends_after: Option<usize>,
     work_summary: Vec<PlanEntry>,
@@ -36,12 +36,12 @@ pub struct Plan<'p, const N: usize> {
     /// The requested end time, if the run ends earlier because the motion comes to rest.
     pub(crate) rests_until: Option<f64>,
     /// A stepper at the start, for the first run of the plan.
-    start: Cell<Option<Box<dyn Stepper<N> + 'p>>>,
+    start: Cell<Option<Box<dyn Stepper + 'p>>>,
 }
 
-impl<'p, const N: usize> Plan<'p, N> {
+impl<'p> Plan<'p> {
     /// The plan of a request with its selected steps.
-    pub(crate) fn new(request: &Request<'p, N>, selection: &StepSelection<'p, N>) -> Result<Self, InputError> {
+    pub(crate) fn new(request: &Request<'p>, selection: &StepSelection<'p>) -> Result<Self, InputError> {
         let steps = Discretization::new(request, selection)?;
         let stepper = steps.stepper(steps.error.is_none())?;
         Ok(Plan {
@@ -83,23 +83,23 @@ impl<'p, const N: usize> Plan<'p, N> {
     ///
     /// # Errors
     /// Those of the creation of the stepper.
-    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+    pub fn stepper(&self) -> Result<Box<dyn Stepper + 'p>, InputError> {
         self.steps.stepper(false)
     }
 
     /// The stepper for a run of the plan; the first run takes the one that was created with the plan.
-    pub(crate) fn take_stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+    pub(crate) fn take_stepper(&self) -> Result<Box<dyn Stepper + 'p>, InputError> {
         self.start.take().map_or_else(|| self.steps.stepper(self.steps.error.is_none()), Ok)
     }
 
     /// The view of the observers after `k` steps.
     pub(crate) fn view<'r>(
         &'r self,
-        stepper: &'r dyn Stepper<N>,
-        before: Option<(f64, PhasePoint<N>)>,
+        stepper: &'r dyn Stepper,
+        before: Option<(f64, State)>,
         findings: Findings,
         (k, last): (usize, bool),
-    ) -> StepView<'r, N> {
+    ) -> StepView<'r> {
         let log_factor = self.steps.needs.conformal_factor.then_some(findings.log_factor);
         let (t, state, sigma, motion) = (stepper.time(), stepper.state(), stepper.sigma(), &self.steps);
         StepView { k, t, state, sigma, log_factor, last, findings, before, motion, stepper, in_failed_step: false }
@@ -110,21 +110,22 @@ impl<'p, const N: usize> Plan<'p, N> {
     /// # Errors
     /// [`InputError::FalseClaim`] with the first claim that is violated.
     pub(crate) fn check_first_steps(&self) -> Result<(), InputError> {
-        if self.steps.problem.lagrangian.hints().proved {
+        if self.steps.problem.system.hints().proved {
             return Ok(());
         }
-        let Discretization { problem, count, t_end, .. } = self.steps;
+        let Discretization { problem, count, t_end, .. } = &self.steps;
         let mut stepper = self.stepper()?;
         let mut taken = 0;
-        while taken < count.min(MAX_STEPS_CHECKED_FIRST) {
-            let steps = next_full_check(taken).min(count) - taken;
-            match stepper.advance_until(steps, t_end) {
+        while taken < MAX_STEPS_CHECKED_FIRST.min(*count) {
+            let steps = next_full_check(taken).min(*count) - taken;
+            match stepper.advance_until(steps, *t_end) {
                 Ok(done) if done > 0 => taken += done,
                 _ => break,
             }
-            let guess = stepper.last_velocity().unwrap_or(problem.start.v);
+            let near = stepper.last_velocity();
+            let guess = near.as_ref().unwrap_or(&problem.start.v);
             if let Some(Defect { claim, size }) =
-                violated_claim(problem.lagrangian, stepper.time(), &stepper.state(), &guess)
+                violated_claim(&*problem.system, stepper.time(), &stepper.state(), guess)
             {
                 return Err(InputError::FalseClaim { claim, size });
             }
@@ -153,21 +154,21 @@ impl<'p, const N: usize> Plan<'p, N> {
             (false, false) => PlanEntry::skipped(what, "not requested; each step checks that its sigma_d is positive"),
         });
         let what = "checks of the structure";
-        entries.push(if self.steps.problem.lagrangian.hints().proved {
+        entries.push(if self.steps.problem.system.hints().proved {
             PlanEntry::skipped(what, "the structure is proved from the formula of L")
         } else if structure == Structure::default() {
             PlanEntry::skipped(what, "L claims no property")
         } else {
             PlanEntry::computed(what, "the properties that L claims are checked at the start and along the run")
         });
-        if self.steps.problem.lagrangian.has_force() {
+        if self.steps.problem.system.has_force() {
             entries.push(PlanEntry::skipped("contact form", FORCED));
         }
         if !self.steps.info.contact {
             entries.push(PlanEntry::skipped("contact form", NONHOLONOMIC));
         }
         let (what, autonomous) = ("time at the stages", structure.autonomous);
-        let why = match (autonomous, self.steps.problem.lagrangian.has_force()) {
+        let why = match (autonomous, self.steps.problem.system.has_force()) {
             (true, _) => "L does not depend on t",
             (false, false) => "L depends on t",
             (false, true) => "L or the force may depend on t",
@@ -177,7 +178,7 @@ impl<'p, const N: usize> Plan<'p, N> {
     }
 }
 
-impl<const N: usize> Display for Plan<'_, N> {
+impl Display for Plan<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Discretization { problem, count, h, info, t_end, .. } = &self.steps;
         let (t0, entries) = (problem.t0, self.entries());

@@ -15,14 +15,10 @@ const CHECKED_TIMES: usize = 16;
 /// The same before trial runs, which check the equations of motion along the whole span.
 const CHECKED_TIMES_BEFORE_TRIAL_RUNS: usize = 4;
 
-impl<'p, const N: usize> Request<'p, N> {
+impl<'p> Request<'p> {
     /// The plan of the request, after all checks of its input.
-    pub(crate) fn plan(
-        &self,
-        length: StepControl<'p, N>,
-        terminal: Option<Terminal<'_, N>>,
-    ) -> Result<Plan<'p, N>, InputError> {
-        let Request { problem, span, .. } = *self;
+    pub(crate) fn plan(&self, length: StepControl<'p>, terminal: Option<Terminal<'_>>) -> Result<Plan<'p>, InputError> {
+        let (problem, span) = (&self.problem, self.span);
         if !span.is_finite() {
             return Err(InputError::Span { span });
         }
@@ -30,16 +26,16 @@ impl<'p, const N: usize> Request<'p, N> {
             return self.plan_of_the_start(length);
         }
         // After the motion has come to rest, errors relative to it are undefined.
-        if let StepControl::Accuracy(_, _, collocation) = length
-            && let Some(t_end) = self.time_of_rest(collocation)
+        if let StepControl::Accuracy(_, _, collocation) = &length
+            && let Some(t_end) = self.time_of_rest(collocation.clone())
         {
-            let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
+            let request = Request { t_end, span: t_end - problem.t0, ..self.clone() };
             let mut plan = request.plan(length, terminal)?;
             plan.rests_until = Some(self.t_end);
             return Ok(plan);
         }
         if let Some(integrator) = &self.integrator {
-            integrator.check(problem.lagrangian)?;
+            integrator.check()?;
             let info = integrator.info();
             if info.in_transformed_time {
                 self.dt_dtau()?;
@@ -51,7 +47,7 @@ impl<'p, const N: usize> Request<'p, N> {
         }
         let accuracy = matches!(length, StepControl::Accuracy(..));
         let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
-        check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
+        check_claims_over(&*problem.system, problem.t0, span, &problem.start, times)?;
         let selection = match length {
             StepControl::Accuracy(wanted, select_steps, collocation) => {
                 select_steps(self, wanted, collocation, terminal)?
@@ -69,7 +65,7 @@ impl<'p, const N: usize> Request<'p, N> {
     }
 
     /// The plan of a run that ends at its start time: no step is taken.
-    fn plan_of_the_start(&self, length: StepControl<'p, N>) -> Result<Plan<'p, N>, InputError> {
+    fn plan_of_the_start(&self, length: StepControl<'p>) -> Result<Plan<'p>, InputError> {
         let (integrator, error) = match (length, &self.integrator) {
             (StepControl::Accuracy(wanted, ..), _) if !(wanted > 0.0 && wanted.is_finite()) => {
                 return Err(InputError::Tolerance { wanted });
@@ -79,14 +75,14 @@ impl<'p, const N: usize> Request<'p, N> {
             (StepControl::Given(steps), _) => (self.given(steps)?.integrator, None),
             (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
         };
-        integrator.check(self.problem.lagrangian)?;
+        integrator.check()?;
         // The stepper needs a nonzero step size, although it takes no step.
         let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
         Plan::new(self, &StepSelection { integrator, count: 0, h, error, ended: None })
     }
 
     /// The given steps of the given integrator.
-    fn given(&self, steps: Steps) -> Result<StepSelection<'p, N>, InputError> {
+    fn given(&self, steps: Steps) -> Result<StepSelection<'p>, InputError> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
         let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
         let span = self.span;
@@ -114,7 +110,7 @@ impl<'p, const N: usize> Request<'p, N> {
 
     /// The rate of the Lagrangian's time transformation at the start.
     fn dt_dtau(&self) -> Result<f64, InputError> {
-        let rate = self.problem.lagrangian.dt_dtau(&self.problem.start.q);
+        let rate = self.problem.system.dt_dtau(&self.problem.start.q);
         if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::TimeTransformation { rate }) }
     }
 
@@ -125,7 +121,7 @@ impl<'p, const N: usize> Request<'p, N> {
 
     /// The same request without action and conformal factor.
     pub(crate) fn bare(&self) -> Self {
-        Request { needs: OutputRequest::default(), integrator: self.integrator.clone(), ..*self }
+        Request { needs: OutputRequest::default(), ..self.clone() }
     }
 }
 

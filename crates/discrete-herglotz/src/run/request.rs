@@ -1,11 +1,10 @@
 //! The request of a run: its span, its steps, its integrator and its outputs.
 
-use crate::InputError;
 use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
 use crate::switching::Collocation;
-use contact_geom::nalgebra::SVector;
+use crate::{InputError, Vector};
 
 /// The time steps of a run. If the run goes backward in time, so do its steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,46 +29,37 @@ pub enum Until {
 
 /// The step-size selection for an accuracy, as a function pointer: it is not compiled into programs that request no
 /// accuracy.
-pub(crate) type SelectSteps<'p, const N: usize> = for<'e> fn(
-    &Request<'p, N>,
-    f64,
-    Collocation<'p, N>,
-    Option<Terminal<'e, N>>,
-) -> Result<StepSelection<'p, N>, InputError>;
+pub(crate) type SelectSteps<'p> =
+    for<'e> fn(&Request<'p>, f64, Collocation<'p>, Option<Terminal<'e>>) -> Result<StepSelection<'p>, InputError>;
 
 /// How the steps of a run are determined.
-pub(crate) enum StepControl<'p, const N: usize> {
+#[derive(Clone)]
+pub(crate) enum StepControl<'p> {
     Given(Steps),
     /// This number of steps of exactly this size.
     Exactly(usize, f64),
     /// The steps that trial runs select for this error.
-    Accuracy(f64, SelectSteps<'p, N>, Collocation<'p, N>),
+    Accuracy(f64, SelectSteps<'p>, Collocation<'p>),
 }
-
-impl<const N: usize> Clone for StepControl<'_, N> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<const N: usize> Copy for StepControl<'_, N> {}
 
 /// The request of a run, without its observers.
-pub(crate) struct Request<'p, const N: usize> {
-    pub problem: SystemProblem<'p, N>,
+#[derive(Clone)]
+pub(crate) struct Request<'p> {
+    pub problem: SystemProblem<'p>,
     pub t_end: f64,
     pub span: f64,
-    pub integrator: Option<SharedIntegrator<'p, N>>,
+    pub integrator: Option<SharedIntegrator<'p>>,
     pub needs: OutputRequest,
     /// The scales of the coordinates for errors, if they are given.
-    pub scales: Option<SVector<f64, N>>,
+    pub scales: Option<Vector>,
     /// The collocation steppers of a Lagrangian with switching functions, for parts of steps.
-    pub parts: Option<Collocation<'p, N>>,
+    pub parts: Option<Collocation<'p>>,
 }
 
 /// The integrator and the steps that are selected for a run.
-pub(crate) struct StepSelection<'p, const N: usize> {
-    pub integrator: SharedIntegrator<'p, N>,
+#[derive(Clone)]
+pub(crate) struct StepSelection<'p> {
+    pub integrator: SharedIntegrator<'p>,
     pub count: usize,
     /// The step size; in transformed time, the step of tau.
     pub h: f64,
@@ -77,12 +67,6 @@ pub(crate) struct StepSelection<'p, const N: usize> {
     pub error: Option<f64>,
     /// The number of steps after which an observer is expected to end the run, if the steps fill a longer span.
     pub ended: Option<usize>,
-}
-
-impl<const N: usize> Clone for StepSelection<'_, N> {
-    fn clone(&self) -> Self {
-        StepSelection { integrator: self.integrator.clone(), ..*self }
-    }
 }
 
 /// The largest number of steps: up to it `t0 + k h` resolves times to a thousandth of a step.

@@ -13,7 +13,7 @@ use contact_geom::Parametric;
 /// Columns, with the rows and the zeros of switching functions on their way.
 pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
     pub problem: &'r Problem<'p, L, N>,
-    pub steps: &'r Discretization<'p, N>,
+    pub steps: &'r Discretization<'p>,
     pub engine: StepTangent<'p, N>,
     /// For shortened steps and parts of steps.
     pub row_engine: RowTangent<'p, N>,
@@ -26,7 +26,7 @@ pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
 impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
     pub fn new(
         problem: &'r Problem<'p, L, N>,
-        steps: &'r Discretization<'p, N>,
+        steps: &'r Discretization<'p>,
         engine: StepTangent<'p, N>,
         columns: Vec<Column<N>>,
         times: RowTimes,
@@ -36,7 +36,7 @@ impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
     }
 
     /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.
-    pub fn push(&mut self, step: &TakenStep<N>, end: f64, k: usize) -> Result<f64, SensitivityError> {
+    pub fn push(&mut self, step: &TakenStep, end: f64, k: usize) -> Result<f64, SensitivityError> {
         match step {
             TakenStep::Whole(step) => {
                 self.rows_within(step, end, None, k)?;
@@ -51,7 +51,7 @@ impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
     /// derivatives of the time of the start of a part.
     pub fn rows_within(
         &mut self,
-        step: &WholeStep<N>,
+        step: &WholeStep,
         end: f64,
         starts: Option<&[f64]>,
         k: usize,
@@ -67,7 +67,7 @@ impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
             let columns = self.columns.iter().enumerate();
             let mut columns: Vec<_> = columns.map(|(i, column)| column.to_fixed_time(start(i, column))).collect();
             self.row_engine.push(&mut self.engine, problem, &short, &mut columns).map_err(failed)?;
-            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
+            let state = EndState::at(t, &state, &v);
             self.rows.push(row(problem, state, &columns, |_| 0.0).map_err(failed)?);
         }
         Ok(())

@@ -58,10 +58,11 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     ) -> Result<OneSided<N>, StepError> {
         let lagrangian = self.problem.lagrangian;
         let mut of = ParameterDerivatives::new(lagrangian);
+        let PhasePoint { q, z, .. } = self.at.state.fixed::<N>();
         let zero = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
         let mut sum = OneSided { v: zero.x, gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
         for (weight, k) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
-            let (t, state) = (self.at.t, PhasePoint { q: self.at.state.q + toward * k, p, z: self.at.state.z });
+            let (t, state) = (self.at.t, PhasePoint { q: q + toward * k, p, z });
             let x = legendre_inverse(lagrangian, t, &state, guess)?;
             sum.v += x.v * weight;
             sum.gradient = sum.gradient.plus(lagrangian.gradient(t, &x).scale(weight));
@@ -89,12 +90,12 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     /// refracted. The second derivatives of the surface are found by differences.
     pub(super) fn corner(
         &self,
-        next: &PartPoint<N>,
+        next: &PartPoint,
         is_refracted: bool,
     ) -> Result<CornerDerivatives<N>, SensitivityError> {
         let undefined = || self.failed(StepError::NonFinite);
         let (lagrangian, count) = (self.problem.lagrangian, self.problem.lagrangian.parameter_count());
-        let gradient = self.normal(lagrangian, self.at.t, &self.at.point()).ok_or_else(undefined)?;
+        let gradient = self.normal(lagrangian, self.at.t, &self.point()).ok_or_else(undefined)?;
         let (normal, rate) = (SVector::<f64, N>::from_fn(|i, _| gradient[i]), gradient[N]);
         let second = |along: Argument| self.difference(along, |l, t, x| self.normal(l, t, x));
         let mut normal_q = SMatrix::<f64, N, N>::zeros();
@@ -112,11 +113,12 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         let side = if self.rising { -1.0 } else { 1.0 };
         let toward = normal * (side * length / normal.norm());
         let from = if is_refracted { -toward } else { toward };
-        let before = self.one_sided(self.at.state.p, &self.at.v, &toward).map_err(|cause| self.failed(cause))?;
-        let after = self.one_sided(next.state.p, &next.v, &from).map_err(|cause| self.failed(cause))?;
+        let [p_before, p_after] = [&self.at.state.p, &next.state.p].map(|p| p.fixed::<N>());
+        let before = self.one_sided(p_before, &self.at.v.fixed(), &toward).map_err(|cause| self.failed(cause))?;
+        let after = self.one_sided(p_after, &next.v.fixed(), &from).map_err(|cause| self.failed(cause))?;
         let (v_before, v_after) = (before.v, after.v);
 
-        let lambda = (next.state.p - self.at.state.p).dot(&normal) / normal.dot(&normal);
+        let lambda = (p_after - p_before).dot(&normal) / normal.dot(&normal);
         let divisor = v_after.dot(&normal) + rate;
         if !(divisor.abs() > 0.0 && lambda.is_finite()) {
             return Err(undefined());

@@ -1,8 +1,7 @@
 //! The state at the end of a run, losses of it, and their derivatives.
 
-use crate::Problem;
-use crate::StepError;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::{Problem, State, StepError, Vector};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, PhasePoint, Scalar, VelocityPoint};
 
@@ -68,6 +67,11 @@ impl<const N: usize> EndCovector<N> {
 }
 
 impl<const N: usize> EndState<N> {
+    /// The state at a time, with its velocity.
+    pub(crate) fn at(t: f64, state: &State, v: &Vector) -> Self {
+        EndState { t, q: state.q.fixed(), v: v.fixed(), p: state.p.fixed(), z: state.z }
+    }
+
     /// A loss of this state, with its partial derivatives.
     pub fn differentiate(&self, loss: &impl Loss<N>) -> (f64, EndCovector<N>) {
         let mut seeded = self.constant();

@@ -8,6 +8,7 @@ use crate::integration::{QuantityDerivatives, SolvedStages};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::columns::{Column, Covector};
+use crate::sensitivity::fixed_stages::FixedStages;
 use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
@@ -64,7 +65,7 @@ impl<'a, const N: usize> Engine<'a, N> {
     pub fn of_row<'e, L: Parametric<N>>(
         engine: &'e mut Option<Self>,
         problem: &Problem<'a, L, N>,
-        step: &SolvedStages<N>,
+        step: &SolvedStages,
         direction: Direction,
     ) -> &'e mut Self {
         let engine = engine.get_or_insert_with(|| Engine::new(problem, step.s, step.h, direction));
@@ -79,21 +80,21 @@ impl<'a, const N: usize> Engine<'a, N> {
     ///
     /// # Errors
     /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
-    pub fn push(&mut self, step: &SolvedStages<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
-        self.arch.dispatch(Push { engine: self, step, k, columns })
+    pub fn push(&mut self, step: &SolvedStages, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+        self.arch.dispatch(Push { engine: self, step: &FixedStages::of(step)?, k, columns })
     }
 
     /// Carries covectors from the end of a step, the k-th of the run, to its start.
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &SolvedStages<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
-        self.arch.dispatch(Pull { engine: self, step, k, covectors })
+    pub fn pull(&mut self, step: &SolvedStages, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+        self.arch.dispatch(Pull { engine: self, step: &FixedStages::of(step)?, k, covectors })
     }
 
     /// Evaluates the derivatives at the stages of a step.
     #[inline(always)]
-    fn prepare(&mut self, step: &SolvedStages<N>) -> Result<(), StepError> {
+    fn prepare(&mut self, step: &FixedStages<'_, N>) -> Result<(), StepError> {
         if self.actions.is_none() && !step.knows_l {
             let (t, x) =
                 (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
@@ -113,7 +114,7 @@ impl<'a, const N: usize> Engine<'a, N> {
     #[inline(always)]
     fn push_column<S: Simd>(
         &mut self,
-        step: &SolvedStages<N>,
+        step: &FixedStages<'_, N>,
         k: usize,
         column: &mut Column<N>,
     ) -> Result<(), StepError> {
@@ -157,7 +158,7 @@ impl<'a, const N: usize> Engine<'a, N> {
     }
 
     /// Sets the sources of a column: the derivatives of the rates with respect to its parameter and to the time.
-    fn set_sources(&mut self, step: &SolvedStages<N>, k: usize, column: &Column<N>) {
+    fn set_sources(&mut self, step: &FixedStages<'_, N>, k: usize, column: &Column<N>) {
         let given = &mut self.given;
         given.has_r = false;
         let start = column.dt0 + k as f64 * column.dh;
@@ -194,7 +195,7 @@ impl<'a, const N: usize> Engine<'a, N> {
     #[inline(always)]
     fn pull_covector<S: Simd>(
         &mut self,
-        step: &SolvedStages<N>,
+        step: &FixedStages<'_, N>,
         k: usize,
         covector: &mut Covector<N>,
     ) -> Result<(), StepError> {
@@ -225,10 +226,10 @@ impl<'a, const N: usize> Engine<'a, N> {
 
     /// Adds the derivatives with respect to parameters, time and step size over the step.
     #[inline(always)]
-    fn add_derivatives<S: Simd>(&mut self, step: &SolvedStages<N>, k: usize, covector: &mut Covector<N>) {
+    fn add_derivatives<S: Simd>(&mut self, step: &FixedStages<'_, N>, k: usize, covector: &mut Covector<N>) {
         let (w, at) = (&covector.rates, &self.at);
         // The pairing of the covector with the rates of the motion.
-        let mut stretch = product(&w.z, &step.rate);
+        let mut stretch = product(&w.z, step.rate);
         add_product(&mut stretch, &w.r, &at.l);
         for d in 0..N {
             add_product(&mut stretch, &w.q[d], &step.force[d]);
@@ -259,7 +260,7 @@ impl<'a, const N: usize> Engine<'a, N> {
 /// Columns over a step, compiled for one instruction set.
 struct Push<'e, 'a, const N: usize> {
     engine: &'e mut Engine<'a, N>,
-    step: &'e SolvedStages<N>,
+    step: &'e FixedStages<'e, N>,
     k: usize,
     columns: &'e mut [Column<N>],
 }
@@ -283,7 +284,7 @@ impl<const N: usize> WithSimd for Push<'_, '_, N> {
 /// Covectors over a step, compiled for one instruction set.
 struct Pull<'e, 'a, const N: usize> {
     engine: &'e mut Engine<'a, N>,
-    step: &'e SolvedStages<N>,
+    step: &'e FixedStages<'e, N>,
     k: usize,
     covectors: &'e mut [Covector<N>],
 }

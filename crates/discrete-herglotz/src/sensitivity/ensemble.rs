@@ -5,7 +5,7 @@ use crate::ensemble::shards;
 use crate::ensemble::single::Common;
 use crate::run::Interruption;
 use crate::sensitivity::{EndCovector, EndState, Loss, LossGradient, SensitivityError, Tangent, Variable};
-use crate::{Ensemble, InputError, Run, Until};
+use crate::{Ensemble, InputError, Problem, Run, Until};
 use contact_geom::Parametric;
 use std::ops::ControlFlow;
 
@@ -135,7 +135,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     fn each_run<R: Send>(
         &self,
         until: Until,
-        work: impl Fn(usize, Run<'_, '_, L, N>) -> Result<R, SensitivityError> + Sync,
+        work: impl for<'p, 'o> Fn(usize, Run<'p, 'o, Problem<'p, L, N>>) -> Result<R, SensitivityError> + Sync,
     ) -> Result<Vec<Result<R, SensitivityError>>, EnsembleError> {
         let (count, threads) = (self.count, self.some_threads()?);
         if count == 0 {

@@ -13,7 +13,7 @@ use crate::sensitivity::row_times::{check_times, is_same_time};
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::no_tangent;
-use crate::{InputError, Problem, Status, StepError, Stepper};
+use crate::{InputError, Problem, Status, StepError, Stepper, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
 use std::ops::Range;
@@ -46,7 +46,7 @@ pub struct Gradient<const N: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LossGradient<const N: usize> {
     /// The outcome of the run.
-    pub outcome: Outcome<N>,
+    pub outcome: Outcome,
     /// The value of the loss and its gradient; `None` if the run was not completed, for the reason that the status of
     /// the outcome gives.
     pub loss: Option<(f64, Gradient<N>)>,
@@ -58,12 +58,12 @@ pub struct LossGradient<const N: usize> {
 /// again, so that the stages are bitwise those of the run.
 pub struct RecordedRun<'p, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
-    plan: Plan<'p, N>,
-    outcome: Outcome<N>,
+    plan: Plan<'p>,
+    outcome: Outcome,
     kept: KeptStates,
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// Performs the run and keeps what its gradients need.
     ///
     /// # Errors
@@ -119,18 +119,17 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         until: Until,
     ) -> Result<LossGradient<N>, SensitivityError> {
         let recorded = self.record(until)?;
-        let outcome = recorded.outcome;
-        let Some(end) = recorded.end() else { return Ok(LossGradient { outcome, loss: None }) };
+        let Some(end) = recorded.end() else { return Ok(LossGradient { outcome: recorded.outcome, loss: None }) };
         let (value, covector) = loss(&end);
         if !(value.is_finite() && covector.is_finite()) {
             return Err(SensitivityError::Loss { value });
         }
         let gradient = recorded.pullback(&covector)?;
-        Ok(LossGradient { outcome, loss: Some((value, gradient)) })
+        Ok(LossGradient { outcome: recorded.outcome, loss: Some((value, gradient)) })
     }
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// The same for a loss of the states at these times, which are in the order of the run: a function with its partial
     /// derivatives in each of them. The times are fixed, except the end of the run.
     ///
@@ -150,13 +149,13 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;
         let (kept, rows) = both;
-        let recorded = RecordedRun { problem, plan, outcome, kept };
         if outcome.status != Status::Completed {
             return Ok(LossGradient { outcome, loss: None });
         }
-        let state = |row: &Row<N>| {
-            let v = row.v.unwrap_or_else(|| SVector::from_element(f64::NAN));
-            EndState { t: row.t, q: row.q, v, p: row.p, z: row.z.unwrap_or(f64::NAN) }
+        let recorded = RecordedRun { problem, plan, outcome, kept };
+        let state = |row: &Row| {
+            let v = row.v.as_ref().map_or_else(|| SVector::from_element(f64::NAN), Vector::fixed);
+            EndState { t: row.t, q: row.q.fixed(), v, p: row.p.fixed(), z: row.z.unwrap_or(f64::NAN) }
         };
         let states: Vec<EndState<N>> = rows.rows.iter().map(state).collect();
         let (value, covectors) = loss(&states);
@@ -164,21 +163,21 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
             return Err(SensitivityError::Loss { value });
         }
         let gradient = recorded.pullback_at(times, &covectors)?;
-        Ok(LossGradient { outcome, loss: Some((value, gradient)) })
+        Ok(LossGradient { outcome: recorded.outcome, loss: Some((value, gradient)) })
     }
 }
 
 impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     /// The outcome of the run.
-    pub fn outcome(&self) -> &Outcome<N> {
+    pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }
 
     /// The end of a completed run; `None` if it was not completed.
     pub fn end(&self) -> Option<EndState<N>> {
-        let Outcome { status, t, q, p, v, z_or_start: z, .. } = self.outcome;
-        let v = v.filter(|_| status == Status::Completed)?;
-        Some(EndState { t, q, v, p, z })
+        let Outcome { status, t, v, .. } = &self.outcome;
+        let v = v.as_ref().filter(|_| *status == Status::Completed)?;
+        Some(EndState::at(*t, &self.outcome.state(), v))
     }
 
     /// The gradient of a number with these partial derivatives in the end state.
@@ -247,8 +246,8 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
         let mut rows = RowCovectors { problem, steps, times, of_rows, tangent: RowTangent::new() };
         let mut stepper = self.plan.stepper()?;
         let mut of_parts = PartCovectors { problem, steps, tangent: RowTangent::new() };
-        let mut block: Vec<TakenStep<N>> = Vec::with_capacity(BLOCK);
-        let mut work = |stepper: &mut dyn Stepper<N>, range: Range<usize>| {
+        let mut block: Vec<TakenStep> = Vec::with_capacity(BLOCK);
+        let mut work = |stepper: &mut dyn Stepper, range: Range<usize>| {
             block.clear();
             for k in range.clone() {
                 let before = (stepper.time(), stepper.state());
@@ -280,7 +279,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
 /// The covectors of rows that are not yet added, from the last to the first.
 pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
     problem: &'r Problem<'p, L, N>,
-    steps: &'r Discretization<'p, N>,
+    steps: &'r Discretization<'p>,
     times: &'r [f64],
     of_rows: &'r [EndCovector<N>],
     tangent: RowTangent<'p, N>,
@@ -292,14 +291,17 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     fn add(
         &mut self,
         engine: &mut StepTangent<'p, N>,
-        step: &WholeStep<N>,
+        step: &WholeStep,
         k: usize,
         to: &mut Covector<N>,
     ) -> Result<(), StepError> {
         let of_start = self.add_within(engine, step, to)?;
         to.add_time(of_start, k);
         let (t, state) = step.start();
-        self.add_at_start(&PartPoint { t, state: *state, v: step.velocity() }, k, to)
+        if !self.is_next(t) {
+            return Ok(());
+        }
+        self.add_at_start(&PartPoint { t, state: state.clone(), v: step.velocity() }, k, to)
     }
 
     /// Adds the covectors of the rows after the start of a step, or of a part of one, to that at its start. Returns the
@@ -307,7 +309,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     pub fn add_within(
         &mut self,
         engine: &mut StepTangent<'p, N>,
-        step: &WholeStep<N>,
+        step: &WholeStep,
         to: &mut Covector<N>,
     ) -> Result<f64, StepError> {
         let problem = self.problem;
@@ -329,32 +331,37 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
         Ok(of_start)
     }
 
+    /// Whether a time is that of the last row that is not yet added.
+    fn is_next(&self, t: f64) -> bool {
+        self.times.last().is_some_and(|row| is_same_time(*row, t))
+    }
+
     /// Adds the covector of a row at the start of a step, the k-th of the run.
-    pub fn add_at_start(&mut self, at: &PartPoint<N>, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
-        if !self.times.last().is_some_and(|t| is_same_time(*t, at.t)) {
+    pub fn add_at_start(&mut self, at: &PartPoint, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+        if !self.is_next(at.t) {
             return Ok(());
         }
-        let v = self.steps.velocity(at.t, &at.state, Some(at.v))?;
-        let at = PartPoint { v, ..*at };
+        let v = self.steps.velocity(at.t, &at.state, Some(&at.v))?;
+        let at = PartPoint { t: at.t, state: at.state.clone(), v };
         let Some(row) = self.take(&at)? else { return Ok(()) };
-        let rates = self.steps.rates(at.t, &at.state, Some(v))?;
-        to.add_at_fixed_time(&row.state(), &row.parameters, &rates, k);
+        let rates = self.steps.rates(at.t, &at.state, Some(&at.v))?;
+        to.add_at_fixed_time(&row.state(), &row.parameters, &rates.fixed(), k);
         Ok(())
     }
 
     /// The covector of a row at a point, if there is one at its time.
-    pub fn take_at(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
-        if self.times.last().is_some_and(|t| is_same_time(*t, at.t)) { self.take(at) } else { Ok(None) }
+    pub fn take_at(&mut self, at: &PartPoint) -> Result<Option<Covector<N>>, StepError> {
+        if self.is_next(at.t) { self.take(at) } else { Ok(None) }
     }
 
     /// The covector of the last row, at its point.
-    fn take(&mut self, at: &PartPoint<N>) -> Result<Option<Covector<N>>, StepError> {
+    fn take(&mut self, at: &PartPoint) -> Result<Option<Covector<N>>, StepError> {
         let (Some((_, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) else {
             return Ok(None);
         };
         (self.times, self.of_rows) = (times, of_rows);
         let (of_state, parameters, _) =
-            VelocityDependence::at(self.problem, at.t, &at.point(), &at.state.p)?.pull(covector);
+            VelocityDependence::at(self.problem, at.t, &at.point().fixed(), &at.state.p.fixed())?.pull(covector);
         Ok(Some(Covector::new(&of_state, parameters)))
     }
 }

@@ -20,7 +20,7 @@ use contact_geom::{ChartVector, Parametric};
 /// Carries covectors over the parts of steps.
 pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
     pub problem: &'r Problem<'p, L, N>,
-    pub steps: &'r Discretization<'p, N>,
+    pub steps: &'r Discretization<'p>,
     pub tangent: RowTangent<'p, N>,
 }
 
@@ -30,7 +30,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     pub fn pull(
         &mut self,
         engine: &mut StepTangent<'p, N>,
-        (parts, k): (&[SolvedPart<N>], usize),
+        (parts, k): (&[SolvedPart], usize),
         all: &mut [Covector<N>],
         rows: &mut RowCovectors<'_, 'p, L, N>,
     ) -> Result<(), SensitivityError> {
@@ -38,7 +38,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
         // The derivatives in the time of the end of a part.
         let mut times = vec![0.0; all.len()];
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.next.rates(self.steps).map_err(failed)?;
+            let rates = last.next.rates(self.steps).map_err(failed)?.fixed();
             for (covector, time) in all.iter_mut().zip(&mut times) {
                 let along = covector.state().dot(&rates);
                 covector.add_time(along, k + 1);
@@ -73,7 +73,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     fn pull_part(
         &mut self,
         engine: &mut StepTangent<'p, N>,
-        (part, k): (&SolvedPart<N>, usize),
+        (part, k): (&SolvedPart, usize),
         all: &mut [Covector<N>],
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
@@ -131,7 +131,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     fn pull_over(
         &mut self,
         engine: &mut StepTangent<'p, N>,
-        part: &SolvedPart<N>,
+        part: &SolvedPart,
         all: &mut [Covector<N>],
     ) -> Result<(), StepError> {
         match &part.step {
@@ -141,7 +141,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
                 self.tangent.pull(engine, self.problem, step, all)
             }
             None => {
-                let rates = part.from.rates(self.steps)?;
+                let rates = part.from.rates(self.steps)?.fixed();
                 all.iter_mut().for_each(|covector| covector.pull_at_once(&rates));
                 Ok(())
             }

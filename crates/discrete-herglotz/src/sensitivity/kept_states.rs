@@ -36,7 +36,7 @@ impl KeptStates {
             .filter(|(r, _)| !r.is_empty())
     }
 
-    fn keep<const N: usize>(&mut self, at: &StepView<'_, N>) {
+    fn keep(&mut self, at: &StepView<'_>) {
         self.taken = at.k;
         if !at.k.is_multiple_of(self.interval) || at.k != self.states.len() * self.interval {
             return;
@@ -54,7 +54,7 @@ impl KeptStates {
     }
 }
 
-impl<const N: usize> Observer<N> for KeptStates {
+impl Observer for KeptStates {
     fn needs(&self) -> OutputRequest {
         OutputRequest { saved: true, ..OutputRequest::ACTION }
     }
@@ -63,12 +63,12 @@ impl<const N: usize> Observer<N> for KeptStates {
         (taken / self.interval + 1) * self.interval
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.keep(at);
         ControlFlow::Continue(())
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.keep(at);
         ControlFlow::Continue(())
     }
@@ -77,11 +77,11 @@ impl<const N: usize> Observer<N> for KeptStates {
 /// Takes the steps of an interval again, in blocks from the last to the first, and calls a function with the stepper at
 /// the start of each block. An interval of many blocks is halved, so that the number of states in memory grows like the
 /// logarithm of its length.
-pub(crate) fn for_each_block<const N: usize, E>(
-    stepper: &mut dyn Stepper<N>,
+pub(crate) fn for_each_block<E>(
+    stepper: &mut dyn Stepper,
     steps: Range<usize>,
     words: &[u64],
-    work: &mut impl FnMut(&mut dyn Stepper<N>, Range<usize>) -> Result<(), E>,
+    work: &mut impl FnMut(&mut dyn Stepper, Range<usize>) -> Result<(), E>,
     fail: &impl Fn(usize, StepError) -> E,
 ) -> Result<(), E> {
     if !stepper.restore(words) {

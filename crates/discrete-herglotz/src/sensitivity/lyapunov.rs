@@ -9,10 +9,10 @@ use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::tangent::no_tangent;
-use crate::{InputError, StepError};
+use crate::{InputError, Problem, State, StepError};
+use contact_geom::Parametric;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
-use contact_geom::{Parametric, PhasePoint};
 use std::ops::ControlFlow;
 
 /// The Lyapunov exponents of a run: the mean growth rates of its tangent in `(q, p, z)`.
@@ -24,9 +24,9 @@ use std::ops::ControlFlow;
 /// The tangent is carried across kinks, jumps and impacts. Steps that meet an elastic impact have these sums up to their error,
 /// and those that meet another reset do not have them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LyapunovExponents<const N: usize> {
+pub struct LyapunovExponents {
     /// The outcome of the run. Where it ended early, the exponents are those of its whole steps.
-    pub outcome: Outcome<N>,
+    pub outcome: Outcome,
     /// The `2n + 1` exponents, in descending order; NaN if no step was taken.
     pub exponents: Vec<f64>,
     /// The same of the second half of the run, in the same order: its difference is an estimate of the error of a run
@@ -39,7 +39,7 @@ pub struct LyapunovExponents<const N: usize> {
     pub rate: f64,
 }
 
-impl<const N: usize> LyapunovExponents<N> {
+impl LyapunovExponents {
     /// The largest distance of the sum of a pair from the rate.
     pub fn pairing_defect(&self) -> f64 {
         max_abs_or_nan(self.pairs.iter().map(|[a, b]| a + b - self.rate))
@@ -54,13 +54,13 @@ impl<const N: usize> LyapunovExponents<N> {
 
 /// A frame of tangents that is carried along a run, and made orthonormal after each step.
 struct Frame<'r, 'p, L, const N: usize> {
-    plan: &'r Plan<'p, N>,
+    plan: &'r Plan<'p>,
     carried: CarriedColumns<'r, 'p, L, N>,
     /// The logarithms of the factors by which the frame was stretched.
     logarithms: Vec<f64>,
     /// The time and the logarithms in the middle of the run.
     middle: Option<(f64, Vec<f64>)>,
-    before: (f64, PhasePoint<N>),
+    before: (f64, State),
     taken: usize,
     failure: Option<SensitivityError>,
 }
@@ -100,9 +100,9 @@ fn orthonormalise<const N: usize>(columns: &mut [Column<N>], logarithms: &mut [f
 }
 
 impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
-    fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+    fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
-        let before = std::mem::replace(&mut self.before, (at.t, at.state));
+        let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
         let step = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
         let step = step.ok_or_else(|| no_tangent(self.plan, ""))?;
         let failed = |cause| SensitivityError::Step { step: k, cause };
@@ -117,17 +117,17 @@ impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Observer<N> for Frame<'_, '_, L, N> {
+impl<L: Parametric<N>, const N: usize> Observer for Frame<'_, '_, L, N> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        self.before = (at.t, at.state);
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        self.before = (at.t, at.state.clone());
         ControlFlow::Continue(())
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         // A part of a step, where a run ends within it, is not carried over.
         if at.in_failed_step || at.k <= self.taken {
             return ControlFlow::Continue(());
@@ -142,7 +142,7 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Frame<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// Performs the run and computes its Lyapunov exponents by the method of Benettin and others (1980): the tangent of
     /// the discrete run, made orthonormal after each step.
     ///
@@ -163,7 +163,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
     /// Those of [`run`](Self::run), [`SensitivityError::NoTangent`], [`SensitivityError::UnderConstraints`], and
     /// [`SensitivityError::Step`] where the tangent of a
     /// step cannot be computed. A run that ends early is reported as the status of the outcome.
-    pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents<N>, SensitivityError> {
+    pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents, SensitivityError> {
         self.lyapunov_exponents_within(N, until)
     }
 
@@ -177,7 +177,7 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
         self,
         coordinates: usize,
         until: Until,
-    ) -> Result<LyapunovExponents<N>, SensitivityError> {
+    ) -> Result<LyapunovExponents, SensitivityError> {
         match coordinates {
             0 => return Err(InputError::Count { what: "the number of coordinates", least: 1, found: 0 }.into()),
             n if n > N => return Err(SensitivityError::Coordinate { index: n - 1, count: N }),
@@ -193,13 +193,13 @@ impl<L: Parametric<N>, const N: usize> Run<'_, '_, L, N> {
         }
         let engine = StepTangent::new(problem, &plan.steps, Direction::Forward)?;
         let columns = initial_frame(coordinates);
-        let (t0, state) = (problem.t0, problem.state);
+        let t0 = problem.t0;
         let mut frame = Frame {
             plan: &plan,
             logarithms: vec![0.0; columns.len()],
             carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(&[])),
             middle: None,
-            before: (t0, state),
+            before: (t0, problem.state.into()),
             taken: 0,
             failure: None,
         };

@@ -21,6 +21,7 @@ mod engine;
 mod ensemble;
 mod error;
 mod event_time;
+mod fixed_stages;
 pub(crate) mod flows;
 mod gradient;
 mod gradient_parts;

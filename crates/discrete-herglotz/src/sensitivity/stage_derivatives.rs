@@ -6,10 +6,12 @@
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::tables::coefficients::MAX_STAGES;
-use crate::integration::{SolvedStages, depends_on_action};
+use crate::integration::depends_on_action;
 use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{StageMap, Stages, blocks};
+use crate::sensitivity::fixed_stages::FixedStages;
 use crate::sensitivity::step_maps::StepMaps;
+use crate::system::OfTyped;
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{KernelDual, linear};
@@ -103,7 +105,7 @@ impl<const N: usize> StageDerivatives<N> {
             force: const { L::HINTS.forced }.then(|| Box::new(force)),
             form: Form {
                 separable: structure.separable,
-                affine: !depends_on_action(problem.lagrangian, structure),
+                affine: !depends_on_action(&OfTyped::<N>(problem.lagrangian), structure),
                 inverse_mass: if constant_mass { w().try_inverse().map(Box::new) } else { None },
             },
         }
@@ -119,22 +121,22 @@ impl<const N: usize> StageDerivatives<N> {
         &mut self,
         lagrangian: &L,
         forward: &StepMaps,
-        step: &SolvedStages<N>,
+        step: &FixedStages<'_, N>,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError> {
         let s = step.s;
         self.s = s;
         self.times = forward.times.map(|time| step.t + time);
-        self.v = step.v;
+        self.v = *step.v;
         for d in 0..N {
             let last = self.v[d].0[s - 1];
             self.v[d].0[s..].fill(last);
             self.q[d] = stage_values::<S>(forward, &step.v[d], step.start.q[d]);
         }
-        self.z = if step.knows_l { stage_values::<S>(forward, &step.l, step.start.z) } else { Stages::ZERO };
-        let fallen = stage_values::<S>(forward, &step.rate, 0.0);
+        self.z = if step.knows_l { stage_values::<S>(forward, step.l, step.start.z) } else { Stages::ZERO };
+        let fallen = stage_values::<S>(forward, step.rate, 0.0);
         self.rho = fallen.map(|fallen| 1.0 - fallen);
-        self.end_rho = 1.0 - end_value::<S>(forward, &step.rate);
+        self.end_rho = 1.0 - end_value::<S>(forward, step.rate);
         for d in 0..N {
             self.end_p[d] = (step.start.p[d] + end_value::<S>(forward, &step.force[d])) / self.end_rho;
         }

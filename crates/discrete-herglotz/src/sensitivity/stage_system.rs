@@ -1,9 +1,10 @@
 //! The derivatives of a system that the tangent of a collocation step needs.
 
 use crate::StepError;
-use crate::integration::{QuantityDerivatives, SolvedStages};
+use crate::integration::QuantityDerivatives;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
+use crate::sensitivity::fixed_stages::FixedStages;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
@@ -24,7 +25,7 @@ pub(crate) trait StageSystem<const N: usize> {
         arch: Instructions,
         at: &mut StageDerivatives<N>,
         forward: &StepMaps,
-        step: &SolvedStages<N>,
+        step: &FixedStages<'_, N>,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError>;
 
@@ -58,7 +59,7 @@ impl<L: Parametric<N>, const N: usize> StageSystem<N> for L {
         arch: Instructions,
         at: &mut StageDerivatives<N>,
         forward: &StepMaps,
-        step: &SolvedStages<N>,
+        step: &FixedStages<'_, N>,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError> {
         arch.dispatch(Evaluation { lagrangian: self, at, forward, step, actions })
@@ -102,7 +103,7 @@ struct Evaluation<'e, L, const N: usize> {
     lagrangian: &'e L,
     at: &'e mut StageDerivatives<N>,
     forward: &'e StepMaps,
-    step: &'e SolvedStages<N>,
+    step: &'e FixedStages<'e, N>,
     actions: Option<&'e StageMap>,
 }
 

@@ -8,15 +8,15 @@ use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::engine::Engine;
 use crate::sensitivity::flows::FlowEngine;
 use crate::sensitivity::step_maps::Direction;
-use crate::{Problem, StepError, Stepper};
-use contact_geom::{Parametric, PhasePoint};
+use crate::{Problem, State, StepError, Stepper};
+use contact_geom::Parametric;
 
 /// A step that was taken, with what its tangent needs.
 #[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
-pub(crate) enum TakenStep<const N: usize> {
-    Whole(WholeStep<N>),
+pub(crate) enum TakenStep {
+    Whole(WholeStep),
     /// The parts of a step that ends parts at zeros of switching functions and at breaks.
-    Parts(Vec<SolvedPart<N>>),
+    Parts(Vec<SolvedPart>),
 }
 
 /// The tangent of the steps of an integrator, forward or as its adjoint.
@@ -34,7 +34,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     /// [`SensitivityError::NoTangent`] and [`SensitivityError::UnderConstraints`] for an integrator without tangent; those of the steps of a splitting.
     pub fn new<L: Parametric<N>>(
         problem: &Problem<'a, L, N>,
-        steps: &Discretization<'a, N>,
+        steps: &Discretization<'a>,
         direction: Direction,
     ) -> Result<Self, SensitivityError> {
         let info = &steps.info;
@@ -61,7 +61,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     }
 
     /// The last step of a stepper, which started at the given time and state; `None` where its stages are not known.
-    pub fn taken(&self, stepper: &dyn Stepper<N>, h: f64, (t, start): (f64, PhasePoint<N>)) -> Option<TakenStep<N>> {
+    pub fn taken(&self, stepper: &dyn Stepper, h: f64, (t, start): (f64, State)) -> Option<TakenStep> {
         match self {
             StepTangent::Collocation(_) => match stepper.solved_stages() {
                 Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(stages))),
@@ -90,7 +90,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     ///
     /// # Errors
     /// [`StepError`] where the equations of the tangent cannot be solved.
-    pub fn push(&mut self, step: &WholeStep<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+    pub fn push(&mut self, step: &WholeStep, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
         match (self, step) {
             (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.push(step, k, columns),
             (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.push(step, k, columns),
@@ -102,7 +102,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &WholeStep<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+    pub fn pull(&mut self, step: &WholeStep, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
         match (self, step) {
             (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.pull(step, k, covectors),
             (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.pull(step, k, covectors),
@@ -129,7 +129,7 @@ impl<'a, const N: usize> RowTangent<'a, N> {
         &mut self,
         steps: &mut StepTangent<'a, N>,
         problem: &Problem<'a, L, N>,
-        step: &WholeStep<N>,
+        step: &WholeStep,
         columns: &mut [Column<N>],
     ) -> Result<(), StepError> {
         match step {
@@ -151,7 +151,7 @@ impl<'a, const N: usize> RowTangent<'a, N> {
         &mut self,
         steps: &mut StepTangent<'a, N>,
         problem: &Problem<'a, L, N>,
-        step: &WholeStep<N>,
+        step: &WholeStep,
         covectors: &mut [Covector<N>],
     ) -> Result<(), StepError> {
         match step {

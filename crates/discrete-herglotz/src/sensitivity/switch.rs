@@ -44,7 +44,7 @@ pub(crate) struct Switch<'s, 'p, L, const N: usize> {
     pub problem: &'s Problem<'p, L, N>,
     pub index: usize,
     pub rising: bool,
-    pub at: &'s PartPoint<N>,
+    pub at: &'s PartPoint,
     /// The number of the step.
     pub step: usize,
     /// The step size.
@@ -81,10 +81,21 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         SensitivityError::Passage { t: self.at.t, index: self.index, cause }
     }
 
+    /// The point of the motion.
+    pub(super) fn point(&self) -> VelocityPoint<N> {
+        self.at.point().fixed()
+    }
+
+    /// The dependence of the velocity on the state there.
+    fn velocity_dependence(&self) -> Result<VelocityDependence<N>, SensitivityError> {
+        VelocityDependence::at(self.problem, self.at.t, &self.point(), &self.at.state.p.fixed())
+            .map_err(|cause| self.failed(cause))
+    }
+
     /// The parameters, the time and the point, moving along an argument.
     pub(super) fn moving(&self, along: Argument) -> (Vec<Along>, Along, VelocityPoint<N, Along>) {
         let unit = |is: bool| f64::from(u8::from(is));
-        let x = self.at.point();
+        let x = self.point();
         let theta = self.problem.lagrangian.parameters().into_iter().enumerate();
         let theta = theta.map(|(k, value)| moving(value, unit(along == Argument::Parameter(k)))).collect();
         let q = SVector::from_fn(|i, _| moving(x.q[i], unit(along == Argument::Position(i))));
@@ -99,7 +110,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         along: Argument,
         f: impl Fn(&L, f64, &VelocityPoint<N>) -> Option<Vec<f64>>,
     ) -> Result<Vec<f64>, SensitivityError> {
-        let (lagrangian, x) = (self.problem.lagrangian, self.at.point());
+        let (lagrangian, x) = (self.problem.lagrangian, self.point());
         let found = difference(along, (lagrangian, self.at.t, &x), self.h, f);
         found.ok_or_else(|| self.unknown("it cannot be evaluated at nearby states, times and parameters"))
     }
@@ -120,7 +131,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
 
     /// The derivatives of the switching function.
     pub fn gradient(&self) -> Result<SwitchGradient<N>, SensitivityError> {
-        let (lagrangian, x, t) = (self.problem.lagrangian, self.at.point(), self.at.t);
+        let (lagrangian, x, t) = (self.problem.lagrangian, self.point(), self.at.t);
         let (mut of, mut explicit) = (EndCovector::<N>::zero(), Vec::new());
         for along in arguments(N, lagrangian.parameter_count()) {
             let g = self.function_along(along)?;
@@ -133,9 +144,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
             }
         }
         let field = herglotz_field(lagrangian, t, &x).map_err(|_| self.failed(StepError::NonFinite))?;
-        let of_velocity =
-            VelocityDependence::at(self.problem, t, &x, &self.at.state.p).map_err(|cause| self.failed(cause))?;
-        let (state, mut parameters, time) = of_velocity.pull(&of);
+        let (state, mut parameters, time) = self.velocity_dependence()?.pull(&of);
         parameters.iter_mut().zip(explicit).for_each(|(sum, explicit)| *sum += explicit);
         Ok(SwitchGradient {
             state,
@@ -163,7 +172,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     pub fn passage(
         &self,
         passage: Passage,
-        next: &PartPoint<N>,
+        next: &PartPoint,
     ) -> Result<Option<PassageDerivatives<N>>, SensitivityError> {
         match passage {
             Passage::Continuous => Ok(None),
@@ -179,9 +188,8 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         let (lagrangian, t) = (self.problem.lagrangian, self.at.t);
         let images = arguments(N, lagrangian.parameter_count()).map(|along| self.state_along(along));
         let images = images.collect::<Result<Vec<_>, _>>()?;
-        let before = VelocityDependence::at(self.problem, t, &self.at.point(), &self.at.state.p)
-            .map_err(|cause| self.failed(cause))?;
-        let to = replaced(lagrangian.at_switch(self.index, t, &self.at.point(), self.rising));
+        let before = self.velocity_dependence()?;
+        let to = replaced(lagrangian.at_switch(self.index, t, &self.point(), self.rising));
         let to = to.ok_or_else(|| self.unknown("the state is not replaced there"))?;
         let mut of = ParameterDerivatives::new(lagrangian);
         let parameters =

@@ -10,10 +10,10 @@ use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::variable::Variable;
 use crate::sensitivity::{EndCovector, EndState, SensitivityError};
-use crate::{InputError, Problem, Status, StepError};
+use crate::{InputError, Problem, State, Status, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{Parametric, PhasePoint, VelocityPoint};
+use contact_geom::{Parametric, VelocityPoint};
 use std::ops::ControlFlow;
 
 /// The derivatives of the final state of a run with respect to variables, one column for each.
@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 pub struct Tangent<const N: usize> {
     /// The outcome of the run. Where it ended early, the columns are those of the state that was reached after its last
     /// whole step.
-    pub outcome: Outcome<N>,
+    pub outcome: Outcome,
     /// The derivatives, in the order of the variables.
     pub columns: Vec<StateDerivative<N>>,
     /// The states at the requested times, each with its derivatives.
@@ -69,10 +69,10 @@ pub struct StateDerivative<const N: usize> {
 
 /// Carries columns along a run.
 struct Columns<'r, 'p, L, const N: usize> {
-    plan: &'r Plan<'p, N>,
+    plan: &'r Plan<'p>,
     carried: CarriedColumns<'r, 'p, L, N>,
     /// The time and the state at the start of the next step.
-    before: (f64, PhasePoint<N>),
+    before: (f64, State),
     largest: f64,
     taken: usize,
     failure: Option<SensitivityError>,
@@ -86,9 +86,9 @@ impl<const N: usize> StateDerivative<N> {
 }
 
 impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
-    fn push(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+    fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
-        let before = std::mem::replace(&mut self.before, (at.t, at.state));
+        let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
         let taken = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
         let step = taken.ok_or_else(|| no_tangent(self.plan, ""))?;
         let largest = self.carried.push(&step, at.t, k)?;
@@ -98,21 +98,20 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     }
 
     /// The row at the end of the last step, if its time is requested.
-    fn row_at_end(&mut self, at: &StepView<'_, N>) -> Result<(), SensitivityError> {
+    fn row_at_end(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         if self.carried.times.next_at(at.t, at.last).is_none() {
             return Ok(());
         }
         let failed = |cause| SensitivityError::Step { step: at.k, cause };
         let v = at.velocity().map_err(failed)?;
-        let PhasePoint { q, p, z } = at.state;
-        let state = EndState { t: at.t, q, v, p, z };
+        let state = EndState::at(at.t, &at.state, &v);
         let problem = self.carried.problem;
         self.carried.rows.push(
             if at.last && at.k > 0 {
                 row(problem, state, &self.carried.columns, |column| column.time_after(at.k))
             } else {
                 // The end of the step moves with the times of the run, but not the row.
-                let rates = self.plan.steps.rates(at.t, &at.state, Some(v)).map_err(failed)?;
+                let rates = self.plan.steps.rates(at.t, &at.state, Some(&v)).map_err(failed)?.fixed();
                 let columns: Vec<_> =
                     self.carried.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
                 row(problem, state, &columns, |_| 0.0)
@@ -123,7 +122,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
+impl<L: Parametric<N>, const N: usize> Observer for Columns<'_, '_, L, N> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }
@@ -132,13 +131,13 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
         self.carried.times.check(info)
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        self.before = (at.t, at.state);
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        self.before = (at.t, at.state.clone());
         let row = self.row_at_end(at);
         self.end_on_failure(row)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         // A part of a step, where a run ends within it, is not carried over.
         if at.in_failed_step || at.k <= self.taken {
             return ControlFlow::Continue(());
@@ -149,7 +148,7 @@ impl<L: Parametric<N>, const N: usize> Observer<N> for Columns<'_, '_, L, N> {
 }
 
 impl<L, const N: usize> Columns<'_, '_, L, N> {
-    fn end_on_failure(&mut self, result: Result<(), SensitivityError>) -> ControlFlow<Stop<N>> {
+    fn end_on_failure(&mut self, result: Result<(), SensitivityError>) -> ControlFlow<Stop> {
         match result {
             Ok(()) => ControlFlow::Continue(()),
             Err(failure) => {
@@ -176,7 +175,7 @@ pub(super) fn row<L: Parametric<N>, const N: usize>(
     Ok(TangentRow { state, columns: columns.iter().map(derivative).collect() })
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
+impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// Performs the run, and differentiates its final state with respect to variables. The derivatives are those of the
     /// discrete run, to round-off: of the steps that were given, or that were chosen for an accuracy, which are not
     /// differentiated themselves.
@@ -230,7 +229,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
         let mut observer = Columns {
             plan: &plan,
             carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(times)),
-            before: (problem.t0, problem.state),
+            before: (problem.t0, problem.state.into()),
             largest: 0.0,
             taken: 0,
             failure: None,
@@ -246,16 +245,16 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, L, N> {
 
 fn tangent<L: Parametric<N>, const N: usize>(
     problem: &Problem<'_, L, N>,
-    outcome: Outcome<N>,
+    outcome: Outcome,
     columns: &[Column<N>],
     rows: Vec<TangentRow<N>>,
     largest: f64,
 ) -> Tangent<N> {
     let nan = SVector::from_element(f64::NAN);
-    let Outcome { status, t, q, p, z_or_start: z, .. } = outcome;
     let of_state = |column: &Column<N>| StateDerivative { q: column.q, v: nan, p: column.p, z: column.z };
-    let last = outcome.v.filter(|_| status == Status::Completed).and_then(|v| {
-        row(problem, EndState { t, q, v, p, z }, columns, |column| column.time_after(outcome.steps)).ok()
+    let last = outcome.v.as_ref().filter(|_| outcome.status == Status::Completed).and_then(|v| {
+        let state = EndState::at(outcome.t, &outcome.state(), v);
+        row(problem, state, columns, |column| column.time_after(outcome.steps)).ok()
     });
     let size = columns.iter().fold(0.0, |m, column| max_or_nan(m, column.size()));
     Tangent {
@@ -268,6 +267,6 @@ fn tangent<L: Parametric<N>, const N: usize>(
 }
 
 /// The error of a run whose integrator has no tangent.
-pub(crate) fn no_tangent<const N: usize>(plan: &Plan<'_, N>, case: &'static str) -> SensitivityError {
+pub(crate) fn no_tangent(plan: &Plan<'_>, case: &'static str) -> SensitivityError {
     SensitivityError::NoTangent { method: plan.steps.info.name.clone(), case }
 }

@@ -16,7 +16,7 @@ use contact_geom::numbers::max_or_nan;
 
 impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
     /// Carries the columns over the parts of a step, the k-th of the run; returns their largest component.
-    pub(super) fn push_parts(&mut self, parts: &[SolvedPart<N>], k: usize) -> Result<f64, SensitivityError> {
+    pub(super) fn push_parts(&mut self, parts: &[SolvedPart], k: usize) -> Result<f64, SensitivityError> {
         // The derivatives of the time at the start of each part.
         let mut times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
         for (i, part) in parts.iter().enumerate() {
@@ -25,7 +25,7 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
         // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
             let rates = last.next.rates(self.steps);
-            let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?;
+            let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?.fixed();
             for (column, dt) in self.columns.iter_mut().zip(&times) {
                 let dh = column.time_after(k + 1) - dt;
                 column.set_state(&column.state().plus(rates.scale(dh)));
@@ -36,7 +36,7 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
 
     fn push_part(
         &mut self,
-        part: &SolvedPart<N>,
+        part: &SolvedPart,
         (k, is_last): (usize, bool),
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
@@ -51,14 +51,14 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
         match &part.step {
             Some(step) => self.row_engine.push(&mut self.engine, problem, step, &mut fixed).map_err(failed)?,
             None => {
-                let rates = part.from.rates(steps).map_err(failed)?;
+                let rates = part.from.rates(steps).map_err(failed)?.fixed();
                 fixed.iter_mut().for_each(|column| column.push_at_once(&rates));
             }
         }
         let Some(along_length) = fixed.pop().map(|column| column.state()) else { return Ok(()) };
-        let PartPoint { t, state, v } = part.to;
+        let PartPoint { t, ref state, ref v } = part.to;
         if !is_last && self.times.next_at(t, false).is_some() {
-            let state = EndState { t, q: state.q, v, p: state.p, z: state.z };
+            let state = EndState::at(t, state, v);
             self.rows.push(row(problem, state, &fixed, |_| 0.0).map_err(failed)?);
         }
         let mut change = None;

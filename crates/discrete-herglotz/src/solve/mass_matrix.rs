@@ -1,8 +1,8 @@
 //! The mass matrix `W = L_vv` and its inverse.
 
-use crate::System;
+use crate::TypedSystem;
 use contact_geom::VelocityPoint;
-use contact_geom::nalgebra::SMatrix;
+use contact_geom::nalgebra::{DMatrix, SMatrix};
 use contact_geom::support::linear::{self, SingularMatrix};
 
 /// The largest number of directional derivatives that are computed at once. More are computed in blocks, so that the
@@ -11,8 +11,32 @@ pub(crate) const BLOCK: usize = 8;
 
 /// The mass matrix W. For many coordinates it is computed alone; for few it is taken from the full Hessian, which is
 /// compiled in any case.
-pub(crate) fn mass_matrix<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> SMatrix<f64, N, N> {
+pub(crate) fn mass_matrix<const N: usize>(
+    system: &dyn TypedSystem<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> SMatrix<f64, N, N> {
     if const { N > BLOCK } { system.mass_matrix(t, x) } else { system.hessian(t, x).vv }
+}
+
+/// The largest number of coordinates for which a matrix is inverted column by column, without an allocation.
+pub(crate) const MAX_BY_COLUMNS: usize = 16;
+
+/// The inverse of a matrix whose size is known at run time.
+///
+/// # Errors
+/// [`SingularMatrix`].
+pub(crate) fn inverse(m: &DMatrix<f64>) -> Result<DMatrix<f64>, SingularMatrix> {
+    let n = m.nrows();
+    if n > MAX_BY_COLUMNS {
+        return m.clone().try_inverse().ok_or(SingularMatrix { pivot: 0.0 });
+    }
+    let (mut inverse, mut copy) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
+    for mut column in inverse.column_iter_mut() {
+        copy.copy_from(m);
+        linear::solve(&mut copy, &mut column)?;
+    }
+    Ok(inverse)
 }
 
 /// Whether a matrix is the identity; compared entry by entry, to save stack space.
@@ -23,7 +47,7 @@ pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
 /// The mass matrix W on the heap, to be kept.
 #[inline(never)]
 pub(crate) fn kept_mass_matrix<const N: usize>(
-    system: &dyn System<N>,
+    system: &dyn TypedSystem<N>,
     t: f64,
     x: &VelocityPoint<N>,
 ) -> Box<SMatrix<f64, N, N>> {

@@ -46,7 +46,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         problem: &Problem<'a, L, N>,
         h: f64,
         StepperOptions { action, check_resolution }: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();

@@ -6,7 +6,7 @@ use super::separable::SeparableForm;
 use crate::integration::plan_entry::DECOUPLED;
 use crate::numbers::state_words::Saved;
 use crate::{
-    InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
 };
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -153,7 +153,7 @@ impl SubstepTable {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Stepper for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let Splitting { form, drag, table, progress, action, compensated, check_resolution } = self;
         let maps = StepMaps { form, drag, table, checked: *check_resolution };
@@ -165,8 +165,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
         }
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.progress.state
+    fn state(&self) -> State {
+        self.progress.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -206,7 +206,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
         self.progress.monitor.steps.first
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         self.progress.monitor.suspect.take()
     }
 }

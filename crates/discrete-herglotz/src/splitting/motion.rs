@@ -2,7 +2,7 @@
 
 use crate::numbers::state_words::saved;
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
-use crate::{StepError, StepFailure, integration::SuspectInterval};
+use crate::{StepError, StepFailure};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, PhasePoint, numbers::max_or_nan};
 
@@ -139,12 +139,12 @@ pub(super) struct SplittingRun<const N: usize> {
     /// The state after the steps taken: the motion, completed by the part of the last step that is combined with the
     /// next.
     pub(super) state: PhasePoint<N>,
-    pub(super) monitor: ResolutionMonitor<N>,
+    pub(super) monitor: ResolutionMonitor,
 }
 
 impl<const N: usize> SplittingRun<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
-        let monitor = ResolutionMonitor::new(&state.q, &SVector::zeros(), h);
+        let monitor = ResolutionMonitor::new(state.q.as_slice(), &[0.0; N], h);
         SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, monitor }
     }
 
@@ -191,8 +191,8 @@ impl<const N: usize> SplittingRun<N> {
                 self.monitor.steps.note(self.taken, defect);
                 longest = MAX_UNCHECKED_STEPS;
             } else if sharper {
-                let (t, from) = (self.time_after(0), self.state);
-                self.monitor.suspect(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
+                let t = self.time_after(0);
+                self.monitor.suspect(sharpest, (self.taken, 1, t), [&self.state, &state]);
                 longest = MAX_UNCHECKED_STEPS;
             }
             (self.motion, self.state) = (motion, state);

@@ -5,7 +5,7 @@ use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::numbers::state_words::Saved;
 use crate::{
-    InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
@@ -120,7 +120,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
     }
 }
 
-impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplitting<'_, L, F, N> {
+impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper for ActionSplitting<'_, L, F, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let ActionSplitting { form, table, progress, compensated, with_suspects } = self;
         match (*compensated, *with_suspects) {
@@ -131,8 +131,8 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
         }
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.progress.state
+    fn state(&self) -> State {
+        self.progress.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -165,7 +165,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
         self.progress.monitor.steps.first
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         self.progress.monitor.suspect.take()
     }
 }

@@ -3,6 +3,7 @@
 use crate::integration::check_claims::MAX_CLAIM_DEFECT;
 use crate::integration::check_kicks;
 use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
+use crate::system::OfTyped;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -23,7 +24,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Evaluates M, and verifies the claims of the Lagrangian at a state and at a point near it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        check_kicks(&lagrangian, "a splitting without drag of the velocity")?;
+        check_kicks(&OfTyped(&lagrangian), "a splitting without drag of the velocity")?;
         Self::read_of(lagrangian, h, t, state, L::HINTS.proved)
     }
 
@@ -42,7 +43,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        crate::integration::problem::check_time(t)?;
+        crate::integration::system_problem::check_time(t)?;
         state.check()?;
         let structure = lagrangian.structure();
         if !structure.separable {
@@ -205,7 +206,7 @@ mod tests {
                 let steps = Steps::Count(count as usize);
                 let problem = Problem::new(&system, 0.0, start).unwrap();
                 let end = problem.by(scheme).steps(steps).run(Until::Time(t)).unwrap();
-                let mut ends = vec![(end.q, end.p)];
+                let mut ends = vec![(end.q.fixed(), end.p.fixed())];
                 let ensemble = Ensemble::new(&system, 0.0, 3, |_| start).by(scheme).steps(steps);
                 ensemble
                     .run(Until::Time(t), |member| {

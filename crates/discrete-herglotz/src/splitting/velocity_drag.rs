@@ -7,7 +7,7 @@ use crate::integration::plan_entry::DECOUPLED;
 use crate::numbers::state_words::Saved;
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::{
-    InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
     splitting::drag::Drift,
 };
 use contact_geom::nalgebra::SVector;
@@ -121,7 +121,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> DragSplitting<'a, L, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Stepper<N> for DragSplitting<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Stepper for DragSplitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let DragSplitting { form, table, progress, action, check_resolution, .. } = self;
         match (*action, *check_resolution) {
@@ -132,8 +132,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for DragSplitting<'_, L, N> {
         }
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.progress.state
+    fn state(&self) -> State {
+        self.progress.state.into()
     }
 
     fn time(&self) -> f64 {
@@ -170,7 +170,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for DragSplitting<'_, L, N> {
         self.progress.monitor.steps.first
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         self.progress.monitor.suspect.take()
     }
 }

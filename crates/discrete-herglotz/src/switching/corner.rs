@@ -1,10 +1,9 @@
 //! The corner conditions at a jump of the Lagrangian.
 
 use super::surfaces::{Surfaces, TimedState};
-use crate::{StepError, System};
-use contact_geom::nalgebra::{SMatrix, SVector};
+use crate::{Point, StepError, System, Vector};
+use contact_geom::nalgebra::{DMatrix, DVectorViewMut};
 use contact_geom::{
-    VelocityPoint,
     numbers::{max_abs_or_nan, max_or_nan},
     support::linear,
 };
@@ -36,59 +35,60 @@ const DIFFERENCE_STEP: f64 = 1e-3;
 const MAX_ITERATIONS: usize = 60;
 
 /// The behaviour of a motion at a zero of a switching function.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Corner<const N: usize> {
+#[derive(Clone, Debug)]
+pub(super) enum Corner {
     /// It crosses the surface with the same momentum, since L is continuous.
     Continuous,
     /// It crosses the surface with this momentum.
-    Refracted(SVector<f64, N>),
+    Refracted(Vector),
     /// It stays on its side with this momentum, since its energy does not suffice on the other side.
-    Reflected(SVector<f64, N>),
+    Reflected(Vector),
 }
 
 /// The one-sided limit of L at a surface, extrapolated from three points on that side with an error of third order in
 /// their distance.
-struct OneSided<'a, const N: usize> {
-    lagrangian: &'a dyn System<N>,
+struct OneSided<'a> {
+    system: &'a dyn System,
     t: f64,
     z: f64,
-    points: [SVector<f64, N>; 3],
+    points: [Vector; 3],
 }
 
 /// The weights of the extrapolation from the distances 1, 2, 3 to 0.
 const WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
 
-impl<'a, const N: usize> OneSided<'a, N> {
-    fn new(lagrangian: &'a dyn System<N>, at: &TimedState<N>, toward: &SVector<f64, N>) -> Self {
-        let points = [1.0, 2.0, 3.0].map(|k| at.state.q + toward * k);
-        OneSided { lagrangian, t: at.t, z: at.state.z, points }
+impl<'a> OneSided<'a> {
+    fn new(system: &'a dyn System, at: &TimedState, toward: &Vector) -> Self {
+        let points = [1.0, 2.0, 3.0].map(|k| &at.state.q + toward * k);
+        OneSided { system, t: at.t, z: at.state.z, points }
     }
 
-    fn points<'s>(&'s self, v: &'s SVector<f64, N>) -> impl Iterator<Item = (f64, VelocityPoint<N>)> + 's {
-        WEIGHTS.into_iter().zip(self.points).map(|(weight, q)| (weight, VelocityPoint { q, v: *v, z: self.z }))
+    fn points<'s>(&'s self, v: &'s Vector) -> impl Iterator<Item = (f64, Point)> + 's {
+        let point = |q: &Vector| Point { q: q.clone(), v: v.clone(), z: self.z };
+        WEIGHTS.into_iter().zip(&self.points).map(move |(weight, q)| (weight, point(q)))
     }
 
-    fn value(&self, v: &SVector<f64, N>) -> f64 {
-        self.points(v).map(|(weight, x)| weight * self.lagrangian.value(self.t, &x)).sum()
+    fn value(&self, v: &Vector) -> f64 {
+        self.points(v).map(|(weight, x)| weight * self.system.value(self.t, &x)).sum()
     }
 
-    fn momentum(&self, v: &SVector<f64, N>) -> SVector<f64, N> {
-        let of = |(weight, x): (f64, VelocityPoint<N>)| self.lagrangian.gradient(self.t, &x).y * weight;
-        self.points(v).map(of).fold(SVector::zeros(), |sum, p| sum + p)
+    fn momentum(&self, v: &Vector) -> Vector {
+        let of = |(weight, x): (f64, Point)| self.system.gradient(self.t, &x).y * weight;
+        self.points(v).map(of).fold(Vector::zeros(v.len()), |sum, p| sum + p)
     }
 
-    fn mass(&self, v: &SVector<f64, N>) -> SMatrix<f64, N, N> {
-        let of = |(weight, x): (f64, VelocityPoint<N>)| self.lagrangian.hessian(self.t, &x).vv * weight;
-        self.points(v).map(of).fold(SMatrix::zeros(), |sum, w| sum + w)
+    fn mass(&self, v: &Vector) -> DMatrix<f64> {
+        let of = |(weight, x): (f64, Point)| self.system.hessian(self.t, &x).vv * weight;
+        self.points(v).map(of).fold(DMatrix::zeros(v.len(), v.len()), |sum, w| sum + w)
     }
 
     /// The velocity of a momentum, by Newton's method from a guess, and the energy.
-    fn velocity(&self, p: &SVector<f64, N>, guess: &SVector<f64, N>) -> Result<(SVector<f64, N>, f64), StepError> {
-        let (mut v, mut before) = (*guess, f64::INFINITY);
+    fn velocity(&self, p: &Vector, guess: &Vector) -> Result<(Vector, f64), StepError> {
+        let (mut v, mut before) = (guess.clone(), f64::INFINITY);
         for _ in 0..MAX_ITERATIONS {
             let mut change = self.momentum(&v) - p;
-            linear::solve(&mut self.mass(&v), &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
-            v -= change;
+            solve(self.mass(&v), &mut change)?;
+            v -= &change;
             let size = max_abs_or_nan(change.iter().copied());
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
@@ -97,7 +97,8 @@ impl<'a, const N: usize> OneSided<'a, N> {
             if size <= f64::EPSILON * max_abs_or_nan(v.iter().copied())
                 || (size >= before && size <= STAGNATION_ROUND_OFF * max_abs_or_nan(v.iter().copied()))
             {
-                return Ok((v, p.dot(&v) - self.value(&v)));
+                let energy = p.dot(&v) - self.value(&v);
+                return Ok((v, energy));
             }
             before = size;
         }
@@ -105,18 +106,25 @@ impl<'a, const N: usize> OneSided<'a, N> {
     }
 }
 
+/// Solves a linear system; the solution overwrites the right-hand side.
+fn solve(mut w: DMatrix<f64>, x: &mut Vector) -> Result<(), StepError> {
+    let n = x.len();
+    linear::solve(&mut w, &mut DVectorViewMut::from_slice(x, n)).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+    Ok(())
+}
+
 /// The derivative of a switching function along a direction in time, position and velocity, by central differences of
 /// order six.
-fn slope<const N: usize>(
-    lagrangian: &dyn System<N>,
+fn slope(
+    system: &dyn System,
     surfaces: &mut Surfaces,
     index: usize,
-    along: impl Fn(f64) -> (f64, VelocityPoint<N>),
+    along: impl Fn(f64) -> (f64, Point),
     distance: f64,
 ) -> f64 {
     let mut difference = |k: f64| {
         let [(t, x), (s, y)] = [k * distance, -k * distance].map(&along);
-        surfaces.value(lagrangian, index, (t, &x)) - surfaces.value(lagrangian, index, (s, &y))
+        surfaces.value(system, index, (t, &x)) - surfaces.value(system, index, (s, &y))
     };
     let differences = [difference(1.0), difference(2.0), difference(3.0)];
     (45.0 * differences[0] - 9.0 * differences[1] + differences[2]) / (60.0 * distance)
@@ -128,40 +136,43 @@ fn slope<const N: usize>(
 /// # Errors
 /// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z, or where the motion
 /// can neither cross the surface nor be reflected; those of the inverse Legendre transformation on either side.
-pub(super) fn corner<const N: usize>(
-    lagrangian: &dyn System<N>,
+pub(super) fn corner(
+    system: &dyn System,
     surfaces: &mut Surfaces,
     index: usize,
-    at: &TimedState<N>,
+    at: &TimedState,
     max_displacement: f64,
-) -> Result<Corner<N>, StepError> {
-    let (x, side) = (at.point(), surfaces.side(index));
+) -> Result<Corner, StepError> {
+    let (x, side, n) = (at.point(), surfaces.side(index), at.v.len());
     let scale =
         |q: f64| if max_or_nan(q.abs(), max_displacement) > 0.0 { max_or_nan(q.abs(), max_displacement) } else { 1.0 };
-    let mut of = |along: &dyn Fn(f64) -> (f64, VelocityPoint<N>), distance: f64| {
-        slope(lagrangian, surfaces, index, along, distance)
+    let mut of = |along: &dyn Fn(f64) -> (f64, Point), distance: f64| slope(system, surfaces, index, along, distance);
+    let moved = |i: usize, by: f64| {
+        let mut moved = x.clone();
+        moved.q[i] += by;
+        moved
     };
-    let moved =
-        |i: usize, by: f64| VelocityPoint { q: SVector::from_fn(|j, _| x.q[j] + if i == j { by } else { 0.0 }), ..x };
-    let normal: SVector<f64, N> =
-        SVector::from_fn(|i, _| of(&|by| (at.t, moved(i, by)), DIFFERENCE_STEP * scale(x.q[i])));
-    let faster =
-        |i: usize, by: f64| VelocityPoint { v: SVector::from_fn(|j, _| x.v[j] + if i == j { by } else { 0.0 }), ..x };
+    let normal = Vector::from_fn(n, |i| of(&|by| (at.t, moved(i, by)), DIFFERENCE_STEP * scale(x.q[i])));
+    let faster = |i: usize, by: f64| {
+        let mut faster = x.clone();
+        faster.v[i] += by;
+        faster
+    };
     let unit = |v: f64| if v == 0.0 { 1.0 } else { v.abs() };
-    let along_v = max_abs_or_nan((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE_STEP * unit(x.v[i]))));
-    let along_z = of(&|by| (at.t, VelocityPoint { z: x.z + by, ..x }), DIFFERENCE_STEP * unit(x.z));
-    let rate_t = of(&|by| (at.t + by, x), DIFFERENCE_STEP * unit(at.t));
+    let along_v = max_abs_or_nan((0..n).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE_STEP * unit(x.v[i]))));
+    let along_z = of(&|by| (at.t, Point { z: x.z + by, ..x.clone() }), DIFFERENCE_STEP * unit(x.z));
+    let rate_t = of(&|by| (at.t + by, x.clone()), DIFFERENCE_STEP * unit(at.t));
 
     let size = normal.norm();
     let one_sided = |toward: f64, of: f64| {
         let length = SURFACE_DISTANCE * scale(max_abs_or_nan(x.q.iter().copied()));
-        OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
+        OneSided::new(system, at, &(&normal * (toward * side * length * of / size)))
     };
     if size == 0.0 {
         // The surface does not depend on the position. If it depends on time alone, z and the momentum are continuous;
         // if it depends on the velocity or z, both sides are compared along these.
         let depends = along_v != 0.0 || along_z != 0.0;
-        return if depends && jumps_along(lagrangian, at, index, surfaces) {
+        return if depends && jumps_along(system, at, index, surfaces) {
             Err(StepError::JumpAlong { t: at.t })
         } else {
             Ok(Corner::Continuous)
@@ -185,11 +196,10 @@ pub(super) fn corner<const N: usize>(
     match conditions(&new, at, (&normal, rate_t), energy, (0.0, &v), approach)? {
         Some(p) => Ok(Corner::Refracted(p)),
         None => {
-            let mut w = old.mass(&v);
-            let mut across = normal;
-            linear::solve(&mut w, &mut across).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+            let mut across = normal.clone();
+            solve(old.mass(&v), &mut across)?;
             let back = -2.0 * approach / normal.dot(&across);
-            let mirrored = v + across * back;
+            let mirrored = &v + across * back;
             match conditions(&old, at, (&normal, rate_t), energy, (back, &mirrored), -approach)? {
                 Some(p) => Ok(Corner::Reflected(p)),
                 None => Err(StepError::JumpAlong { t: at.t }),
@@ -203,17 +213,17 @@ pub(super) fn corner<const N: usize>(
 ///
 /// The energy is convex in lambda, and its slope is the rate of the switching function. Newton's method from outside
 /// therefore either finds the root or passes the minimum of the energy, where the rate changes its sign.
-fn conditions<const N: usize>(
-    side: &OneSided<'_, N>,
-    at: &TimedState<N>,
-    (normal, rate_t): (&SVector<f64, N>, f64),
+fn conditions(
+    side: &OneSided<'_>,
+    at: &TimedState,
+    (normal, rate_t): (&Vector, f64),
     energy: f64,
-    (mut lambda, guess): (f64, &SVector<f64, N>),
+    (mut lambda, guess): (f64, &Vector),
     approach: f64,
-) -> Result<Option<SVector<f64, N>>, StepError> {
-    let (mut v, mut before) = (*guess, f64::INFINITY);
+) -> Result<Option<Vector>, StepError> {
+    let (mut v, mut before) = (guess.clone(), f64::INFINITY);
     for _ in 0..MAX_ITERATIONS {
-        let p = at.state.p + normal * lambda;
+        let p = &at.state.p + normal * lambda;
         let energy_here;
         (v, energy_here) = side.velocity(&p, &v)?;
         let rate = normal.dot(&v) + rate_t;
@@ -225,7 +235,7 @@ fn conditions<const N: usize>(
         lambda -= change;
         let scale = max_or_nan(max_abs_or_nan(p.iter().copied()), (lambda * normal.norm()).abs());
         if size <= f64::EPSILON * scale || (size >= before && size <= STAGNATION_ROUND_OFF * scale) {
-            return Ok(Some(at.state.p + normal * lambda));
+            return Ok(Some(&at.state.p + normal * lambda));
         }
         before = size;
     }
@@ -234,24 +244,19 @@ fn conditions<const N: usize>(
 }
 
 /// Whether L or its momenta jump across a surface that does not depend on the position but on the velocity or z.
-fn jumps_along<const N: usize>(
-    lagrangian: &dyn System<N>,
-    at: &TimedState<N>,
-    index: usize,
-    surfaces: &mut Surfaces,
-) -> bool {
+fn jumps_along(system: &dyn System, at: &TimedState, index: usize, surfaces: &mut Surfaces) -> bool {
     let x = at.point();
     let speed = max_abs_or_nan(x.v.iter().copied());
     let length = |of: f64| SURFACE_DISTANCE * of * if speed > 0.0 { speed } else { 1.0 };
-    let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
-    let here = |by: f64| lagrangian.value(at.t, &moved(by));
-    let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(lagrangian, index, (at.t, &moved(by)));
+    let moved = |by: f64| Point { v: x.v.map(|v| v + by), z: x.z + by, q: x.q.clone() };
+    let here = |by: f64| system.value(at.t, &moved(by));
+    let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(system, index, (at.t, &moved(by)));
     // A jump is looked for only if the function changes its sign along the diagonal of the velocities and z.
     if crossed(surfaces, length(1.0)) * crossed(surfaces, -length(1.0)) >= 0.0 {
         return false;
     }
     let jump = |of: f64| {
-        let [a, b] = [length(of), -length(of)].map(|by| lagrangian.gradient(at.t, &moved(by)).y);
+        let [a, b] = [length(of), -length(of)].map(|by| system.gradient(at.t, &moved(by)).y);
         max_or_nan(max_abs_or_nan((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
     };
     let (wide, near) = (jump(1.0), jump(NEAR_DISTANCE));

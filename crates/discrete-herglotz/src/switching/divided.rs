@@ -2,12 +2,13 @@
 
 use crate::gauss::info;
 use crate::integration::SystemProblem;
-use crate::switching::Collocation;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;
+use crate::switching::{Collocation, CollocationOf};
 use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
+use std::sync::Arc;
 
 /// Contact Gauss collocation with adaptive subdivision of its steps.
 ///
@@ -44,14 +45,14 @@ impl DividedGauss {
     }
 
     /// The stepper, whose parts also end on kinks and jumps.
-    pub(crate) fn run<'a, const N: usize>(
+    pub(crate) fn run<'a>(
         self,
-        collocation: Collocation<'a, N>,
-        problem: &SystemProblem<'a, N>,
+        collocation: Collocation<'a>,
+        problem: &SystemProblem<'a>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<SwitchingStepper<'a, N>, InputError> {
-        let make = move |problem: &SystemProblem<'a, N>, h: f64, _: bool| {
+    ) -> Result<SwitchingStepper<'a>, InputError> {
+        let make = move |problem: &SystemProblem<'a>, h: f64, _: bool| {
             collocation.stepper(problem, self.stages, h, options).map(PartStepper::Collocation)
         };
         let stepper = SwitchingStepper::new(problem, h, EvaluationRange::Within, Box::new(make))?;
@@ -79,7 +80,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         problem: &Problem<'a, L, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        Ok(Box::new(self.run(problem.lagrangian, &problem.of_system(), h, options)?))
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        Ok(Box::new(self.run(Arc::new(CollocationOf(problem.lagrangian)), &problem.of_system(), h, options)?))
     }
 }

@@ -13,7 +13,7 @@ mod jumps;
 pub(crate) mod stepper;
 mod surfaces;
 
-pub(crate) use collocation::Collocation;
+pub(crate) use collocation::{Collocation, CollocationByPoints, CollocationOf, CollocationSteppers};
 pub use divided::DividedGauss;
 pub use jumps::jumps_between;
 pub(crate) use surfaces::has_switching_functions;

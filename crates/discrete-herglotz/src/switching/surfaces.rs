@@ -5,9 +5,7 @@ use crate::solve::chebyshev::{Samples, node};
 use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
-use crate::{DenseStep, InputError, System};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, VelocityPoint};
+use crate::{DenseStep, InputError, Point, State, System, Vector};
 use std::convert::Infallible;
 
 /// The number of equal parts in which a curve without dense output is searched for jumps.
@@ -46,45 +44,41 @@ const FAR: f64 = 64.0;
 ///
 /// # Errors
 /// [`InputError::SwitchingUnstated`] where it has some that its `HINTS` do not state.
-pub(crate) fn has_switching_functions<const N: usize>(
-    lagrangian: &dyn System<N>,
-    t: f64,
-    x: &VelocityPoint<N>,
-) -> Result<bool, InputError> {
+pub(crate) fn has_switching_functions(system: &dyn System, t: f64, x: &Point) -> Result<bool, InputError> {
     let mut values = Vec::new();
-    lagrangian.switching_functions(t, x, &mut values);
-    match values.is_empty() && lagrangian.breaks().is_empty() {
+    system.switching_functions(t, x, &mut values);
+    match values.is_empty() && system.breaks().is_empty() {
         true => Ok(false),
-        false if lagrangian.hints().switching_functions => Ok(true),
+        false if system.hints().switching_functions => Ok(true),
         false => Err(InputError::SwitchingUnstated),
     }
 }
 
 /// A time and a state of the motion, with its velocity.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TimedState<const N: usize> {
+#[derive(Clone, Debug)]
+pub(super) struct TimedState {
     pub t: f64,
-    pub state: PhasePoint<N>,
-    pub v: SVector<f64, N>,
+    pub state: State,
+    pub v: Vector,
     /// The compensation terms of the sums of the stepper, beyond the last digits of the state.
-    pub rests: StepStart<N>,
+    pub rests: StepStart,
 }
 
-impl<const N: usize> TimedState<N> {
-    pub fn point(&self) -> VelocityPoint<N> {
-        VelocityPoint { q: self.state.q, v: self.v, z: self.state.z }
+impl TimedState {
+    pub fn point(&self) -> Point {
+        Point { q: self.state.q.clone(), v: self.v.clone(), z: self.state.z }
     }
 }
 
 /// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their
 /// velocities.
-pub(super) struct StepCurve<const N: usize> {
-    pub from: TimedState<N>,
-    pub to: TimedState<N>,
-    pub dense: Option<DenseStep<N>>,
+pub(super) struct StepCurve {
+    pub from: TimedState,
+    pub to: TimedState,
+    pub dense: Option<DenseStep>,
 }
 
-impl<const N: usize> StepCurve<N> {
+impl StepCurve {
     pub(super) fn parts(&self) -> usize {
         DEFAULT_PARTS
     }
@@ -96,7 +90,7 @@ impl<const N: usize> StepCurve<N> {
     }
 
     /// The collocation polynomial, if it is the more accurate curve.
-    fn collocation(&self) -> Option<&DenseStep<N>> {
+    fn collocation(&self) -> Option<&DenseStep> {
         self.dense.as_ref().filter(|dense| dense.stages() > MAX_HERMITE_STAGES)
     }
 
@@ -104,7 +98,7 @@ impl<const N: usize> StepCurve<N> {
         self.to.t - self.from.t
     }
 
-    pub(super) fn at(&self, fraction: f64) -> (f64, VelocityPoint<N>) {
+    pub(super) fn at(&self, fraction: f64) -> (f64, Point) {
         let t = self.from.t + fraction * self.span();
         if fraction == 1.0 {
             return (self.to.t, self.to.point());
@@ -112,7 +106,7 @@ impl<const N: usize> StepCurve<N> {
         let x = match self.collocation() {
             Some(dense) => {
                 let x = dense.at_fraction(fraction);
-                VelocityPoint { q: x.q, v: dense.velocity(t), z: x.z }
+                Point { q: x.q, v: dense.velocity(t), z: x.z }
             }
             None => hermite(&self.from.point(), &self.to.point(), self.span(), fraction * self.span()),
         };
@@ -153,30 +147,30 @@ pub(super) struct Surfaces {
 impl Surfaces {
     /// The sides of a point from which a motion starts with a time step h. A function that is zero up to round-off has
     /// the sign that it takes next along the motion.
-    pub fn at<const N: usize>(lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>, h: f64) -> Self {
+    pub fn at(system: &dyn System, t: f64, x: &Point, h: f64) -> Self {
         let mut values = Vec::new();
-        lagrangian.switching_functions(t, x, &mut values);
+        system.switching_functions(t, x, &mut values);
         let sides = values.iter().map(|g| sign(*g)).collect();
         let mut surfaces = Surfaces { sides, values };
-        surfaces.leave(lagrangian, t, x, h);
+        surfaces.leave(system, t, x, h);
         surfaces
     }
 
     /// The sides after a reset from one point to another at the surface `index`, which the motion leaves as given. The
     /// motion stays on its side of every other surface on which the reset leaves it.
-    pub fn reset<const N: usize>(
+    pub fn reset(
         &mut self,
-        lagrangian: &dyn System<N>,
+        system: &dyn System,
         (index, departure): (usize, Option<Departure>),
         t: f64,
-        [from, to]: [&VelocityPoint<N>; 2],
+        [from, to]: [&Point; 2],
         h: f64,
     ) {
         let old = self.clone();
-        *self = Surfaces::at(lagrangian, t, to, h);
+        *self = Surfaces::at(system, t, to, h);
         for i in 0..self.sides.len() {
             let side = if i == index { departure.map(|departure| departure.side) } else { None };
-            let stays = i != index && [from, to].into_iter().all(|x| self.is_on(lagrangian, i, (t, x), h));
+            let stays = i != index && [from, to].into_iter().all(|x| self.is_on(system, i, (t, x), h));
             if let Some(of) = self.sides.get_mut(i) {
                 *of = side.unwrap_or(if stays { old.side(i) } else { *of });
             }
@@ -185,38 +179,34 @@ impl Surfaces {
 
     /// The round-off of a function at a point that is reached by steps of length h: its change when each number of the
     /// point, and the time along the motion, change by their round-off.
-    pub fn rounding<const N: usize>(
-        &mut self,
-        lagrangian: &dyn System<N>,
-        index: usize,
-        (t, x): (f64, &VelocityPoint<N>),
-        h: f64,
-    ) -> f64 {
-        let here = self.value(lagrangian, index, (t, x));
-        let mut change = |t: f64, x: VelocityPoint<N>| {
-            let there = self.value(lagrangian, index, (t, &x));
+    pub fn rounding(&mut self, system: &dyn System, index: usize, (t, x): (f64, &Point), h: f64) -> f64 {
+        let (here, n) = (self.value(system, index, (t, x)), x.q.len());
+        let mut change = |t: f64, x: &Point| {
+            let there = self.value(system, index, (t, x));
             if there.is_finite() { (there - here).abs() } else { 0.0 }
         };
-        let acceleration = lagrangian.rates(t, x).map_or(SVector::zeros(), |(field, _)| field.y);
+        let acceleration = system.rates(t, x).map_or_else(|_| Vector::zeros(n), |(field, _)| field.y);
         let dt = POINT_ROUND_OFF * t.abs().max(h.abs());
-        let v = POINT_ROUND_OFF * x.v.amax().max((acceleration * h).amax());
-        let q = POINT_ROUND_OFF * x.q.amax().max((x.v * h).amax());
-        let mut sum = change(t + dt, VelocityPoint { q: x.q + x.v * dt, v: x.v + acceleration * dt, z: x.z })
-            + change(t, VelocityPoint { z: x.z * (1.0 + POINT_ROUND_OFF), ..*x });
-        for i in 0..N {
-            let mut moved = *x;
-            moved.q[i] += q;
-            sum += change(t, moved);
-            let mut moved = *x;
-            moved.v[i] += v;
-            sum += change(t, moved);
+        let v = POINT_ROUND_OFF * x.v.amax().max((&acceleration * h).amax());
+        let q = POINT_ROUND_OFF * x.q.amax().max((&x.v * h).amax());
+        let mut moved = Point { z: x.z * (1.0 + POINT_ROUND_OFF), ..x.clone() };
+        let mut sum =
+            change(t + dt, &Point { q: &x.q + &x.v * dt, v: &x.v + acceleration * dt, z: x.z }) + change(t, &moved);
+        moved.z = x.z;
+        for i in 0..n {
+            moved.q[i] = x.q[i] + q;
+            sum += change(t, &moved);
+            moved.q[i] = x.q[i];
+            moved.v[i] = x.v[i] + v;
+            sum += change(t, &moved);
+            moved.v[i] = x.v[i];
         }
         sum
     }
 
     /// Gives each function that is zero up to round-off the sign that it takes next along the motion. Two evaluations of
     /// all functions show which of them are far from zero; the others are examined one by one.
-    fn leave<const N: usize>(&mut self, lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>, h: f64) {
+    fn leave(&mut self, system: &dyn System, t: f64, x: &Point, h: f64) {
         if self.sides.is_empty() {
             return;
         }
@@ -224,13 +214,13 @@ impl Surfaces {
         let dt = DEPARTURE * h;
         let grown = 1.0 + POINT_ROUND_OFF;
         let points = [
-            (t + dt, VelocityPoint { q: x.q + x.v * dt, ..*x }),
-            (t, VelocityPoint { q: x.q * grown, v: x.v * grown, z: x.z * grown }),
+            (t + dt, Point { q: &x.q + &x.v * dt, ..x.clone() }),
+            (t, Point { q: &x.q * grown, v: &x.v * grown, z: x.z * grown }),
         ];
         let mut changes = vec![0.0; here.len()];
         for (t, x) in points {
             self.values.clear();
-            lagrangian.switching_functions(t, &x, &mut self.values);
+            system.switching_functions(t, &x, &mut self.values);
             for ((change, before), after) in changes.iter_mut().zip(&here).zip(&self.values) {
                 *change += (after - before).abs();
             }
@@ -240,8 +230,8 @@ impl Surfaces {
             if value.abs() > FAR * change {
                 continue;
             }
-            let tolerance = self.rounding(lagrangian, index, (t, x), h);
-            let departure = self.departure(lagrangian, index, (t, x), h, tolerance);
+            let tolerance = self.rounding(system, index, (t, x), h);
+            let departure = self.departure(system, index, (t, x), h, tolerance);
             if let (Some(Departure { side, .. }), Some(of)) = (departure, self.sides.get_mut(index)) {
                 *of = side;
             }
@@ -249,61 +239,55 @@ impl Surfaces {
     }
 
     /// Whether a point is on a surface up to round-off.
-    pub fn is_on<const N: usize>(
-        &mut self,
-        lagrangian: &dyn System<N>,
-        index: usize,
-        (t, x): (f64, &VelocityPoint<N>),
-        h: f64,
-    ) -> bool {
-        let rounding = self.rounding(lagrangian, index, (t, x), h);
-        self.value(lagrangian, index, (t, x)).abs() <= rounding
+    pub fn is_on(&mut self, system: &dyn System, index: usize, (t, x): (f64, &Point), h: f64) -> bool {
+        let rounding = self.rounding(system, index, (t, x), h);
+        self.value(system, index, (t, x)).abs() <= rounding
     }
 
     /// The other surfaces that the curve of a step crosses at the same point, which is the zero of one function. They
     /// are crossed together: crossing one alone may lead to a region that no motion enters.
-    pub fn simultaneous<const N: usize>(
+    pub fn simultaneous(
         &mut self,
-        lagrangian: &dyn System<N>,
-        curve: &StepCurve<N>,
+        system: &dyn System,
+        curve: &StepCurve,
         change: &SignChange,
-        at: &TimedState<N>,
+        at: &TimedState,
         h: f64,
     ) -> Vec<usize> {
         // Where the function of the zero has its new sign.
         let (t, end) = curve.at(change.ends[1]);
         let others = (0..self.sides.len()).filter(|i| *i != change.index);
         let changed =
-            |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(lagrangian, i, (t, &end))) < 0.0;
-        others.filter(|i| changed(self, *i) && self.is_on(lagrangian, *i, (at.t, &at.point()), h)).collect()
+            |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(system, i, (t, &end))) < 0.0;
+        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.point()), h)).collect()
     }
 
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
     /// not on the surface, or stays on it to second order. `h` is the length of a step.
-    pub fn departure<const N: usize>(
+    pub fn departure(
         &mut self,
-        lagrangian: &dyn System<N>,
+        system: &dyn System,
         index: usize,
-        (t, x): (f64, &VelocityPoint<N>),
+        (t, x): (f64, &Point),
         h: f64,
         tolerance: f64,
     ) -> Option<Departure> {
-        let here = self.value(lagrangian, index, (t, x));
+        let here = self.value(system, index, (t, x));
         if here.is_nan() || here.abs() > tolerance {
             return None;
         }
-        let (a, l) = match lagrangian.rates(t, x) {
+        let (a, l) = match system.rates(t, x) {
             Ok((field, _)) => (field.y, field.z),
-            Err(_) => (SVector::zeros(), 0.0),
+            Err(_) => (Vector::zeros(x.q.len()), 0.0),
         };
         let mut after = |dt: f64| {
-            let later = VelocityPoint { q: x.q + (x.v + a * (0.5 * dt)) * dt, v: x.v + a * dt, z: x.z + l * dt };
-            self.value(lagrangian, index, (t + dt, &later)) - here
+            let later = Point { q: &x.q + (&x.v + &a * (0.5 * dt)) * dt, v: &x.v + &a * dt, z: x.z + l * dt };
+            self.value(system, index, (t + dt, &later)) - here
         };
         let dt = DEPARTURE * h;
         let (later, earlier) = (after(dt), after(-dt));
         let (odd, even) = (0.5 * (later - earlier), 0.5 * (later + earlier));
-        let rounding = self.rounding(lagrangian, index, (t, x), dt);
+        let rounding = self.rounding(system, index, (t, x), dt);
         match (odd.abs() > rounding, even.abs() > 0.0) {
             (true, _) => Some(Departure { side: sign(odd), rate: odd / dt, with_rate: true }),
             (false, true) => Some(Departure { side: sign(even), rate: 0.0, with_rate: false }),
@@ -312,14 +296,9 @@ impl Surfaces {
     }
 
     /// The value of a function; NaN for an index without a function.
-    pub fn value<const N: usize>(
-        &mut self,
-        lagrangian: &dyn System<N>,
-        index: usize,
-        (t, x): (f64, &VelocityPoint<N>),
-    ) -> f64 {
+    pub fn value(&mut self, system: &dyn System, index: usize, (t, x): (f64, &Point)) -> f64 {
         self.values.clear();
-        lagrangian.switching_functions(t, x, &mut self.values);
+        system.switching_functions(t, x, &mut self.values);
         self.values.get(index).copied().unwrap_or(f64::NAN)
     }
 
@@ -336,17 +315,12 @@ impl Surfaces {
 
     /// Whether a surface lies within the fraction `extension` of a step before its start or after its end, where the
     /// curve is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
-    pub fn are_near<const N: usize>(
-        &mut self,
-        lagrangian: &dyn System<N>,
-        curve: &StepCurve<N>,
-        extension: f64,
-    ) -> bool {
+    pub fn are_near(&mut self, system: &dyn System, curve: &StepCurve, extension: f64) -> bool {
         [-extension, 1.0 + extension].into_iter().any(|fraction| {
             let span = curve.span();
             let x = hermite(&curve.from.point(), &curve.to.point(), span, fraction * span);
             self.values.clear();
-            lagrangian.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
+            system.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
             // A surface on which the motion starts counts as near.
             self.sides.iter().zip(&self.values).any(|(side, value)| *side == 0.0 || side * sign(*value) < 0.0)
         })
@@ -354,11 +328,7 @@ impl Surfaces {
 
     /// The first sign change along the curve of a step. A function without a side takes the sign of its first nonzero
     /// value.
-    pub fn first_change<const N: usize>(
-        &mut self,
-        lagrangian: &dyn System<N>,
-        curve: &StepCurve<N>,
-    ) -> Option<SignChange> {
+    pub fn first_change(&mut self, system: &dyn System, curve: &StepCurve) -> Option<SignChange> {
         let (count, degree) = (self.sides.len(), curve.sampling_degree());
         if count == 0 {
             return None;
@@ -366,7 +336,7 @@ impl Surfaces {
         self.values.clear();
         for j in 0..=degree {
             let (t, x) = curve.at(node(degree, j));
-            lagrangian.switching_functions(t, &x, &mut self.values);
+            system.switching_functions(t, &x, &mut self.values);
         }
         // The functions are evaluated anew below, and the values of this step are kept.
         let values = std::mem::take(&mut self.values);
@@ -379,7 +349,7 @@ impl Surfaces {
             if side * end > 0.0 && has_no_zero(&samples, 0.0) {
                 continue;
             }
-            let (place, ends) = self.change_of_side(lagrangian, curve, index, &samples);
+            let (place, ends) = self.change_of_side(system, curve, index, &samples);
             if let Some((own, from)) = place {
                 if side == 0.0 {
                     without_side.push((index, from));
@@ -388,7 +358,7 @@ impl Surfaces {
                     *slot = own;
                 }
             }
-            let change = ends.map(|ends| self.change(lagrangian, curve, index, ends));
+            let change = ends.map(|ends| self.change(system, curve, index, ends));
             first = [first, change].into_iter().flatten().min_by(|a, b| a.estimate.total_cmp(&b.estimate));
         }
         self.values = values;
@@ -405,10 +375,10 @@ impl Surfaces {
 
     /// The side of a function with the fraction of the step from which it has one, and the fractions between which it
     /// first changes.
-    fn change_of_side<const N: usize>(
+    fn change_of_side(
         &mut self,
-        lagrangian: &dyn System<N>,
-        curve: &StepCurve<N>,
+        system: &dyn System,
+        curve: &StepCurve,
         index: usize,
         samples: &Samples,
     ) -> (Option<(f64, f64)>, Option<[f64; 2]>) {
@@ -416,7 +386,7 @@ impl Surfaces {
         let (mut points, scale) = (Vec::new(), Scale { size, near: 0.0, noise: ROUND_OFF * size });
         let along = |fraction: f64| {
             let (t, x) = curve.at(fraction);
-            self.value(lagrangian, index, (t, &x))
+            self.value(system, index, (t, &x))
         };
         let reached = match separate(samples, scale, along, &mut points) {
             Separation::Complete => 1.0,
@@ -440,17 +410,17 @@ impl Surfaces {
     }
 
     /// The zero of a function between two fractions of a step, where the second one is on the other side.
-    pub(super) fn change<const N: usize>(
+    pub(super) fn change(
         &mut self,
-        lagrangian: &dyn System<N>,
-        curve: &StepCurve<N>,
+        system: &dyn System,
+        curve: &StepCurve,
         index: usize,
         [mut from, to]: [f64; 2],
     ) -> SignChange {
         let side = self.side(index);
         let mut toward = |fraction: f64| {
             let (t, x) = curve.at(fraction);
-            side * self.value(lagrangian, index, (t, &x))
+            side * self.value(system, index, (t, &x))
         };
         let (mut before, after) = (toward(from), toward(to));
         if before.is_nan() || before <= 0.0 {

@@ -1,180 +1,203 @@
-//! Mechanical systems as runs, checks and searches see them: values and derivatives in `f64`, behind one interface that
-//! is compiled once for each dimension and not again for each Lagrangian.
+//! Mechanical systems as runs, checks and searches see them: values and derivatives in `f64`, behind one interface
+//! without the Lagrangian and without the number of coordinates. All that stands above it is compiled once.
 
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::switching::Control;
-use contact_geom::{
-    ChartVector, Defect, Defects, Derivatives, ForceStructure, GeometryError, Hessian, Hints, Lagrangian, PhasePoint,
-    Structure, VelocityPoint,
-    support::{gradient_rounding, herglotz_rates, rounding_at_state},
-};
+mod defaults;
+mod guarded;
+mod of_typed;
+mod points;
+mod typed;
+mod vector;
 
-/// A mechanical system with N coordinates: its Lagrangian `L(t, q, v, z)`, the derivatives of L at points in `f64`, and
-/// its switching functions. Every [`Lagrangian`] is one.
+pub(crate) use guarded::Guarded;
+pub(crate) use of_typed::OfTyped;
+pub use points::{Components, Point, SecondDerivatives, State};
+pub use typed::TypedSystem;
+pub use vector::Vector;
+
+use crate::StepError;
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{Defect, Defects, GeometryError, Hints, Structure};
+
+/// The velocity, and L with its derivatives, at a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtState {
+    /// The state with its velocity.
+    pub x: Point,
+    /// The value of L.
+    pub l: f64,
+    /// `L_q + f`, with the applied force f.
+    pub force: Vector,
+    /// `L_z`.
+    pub rate: f64,
+}
+
+/// What happens where a motion reaches the zero of a switching function; see
+/// [`Control`](contact_geom::switching::Control).
+#[derive(Clone, Debug, PartialEq)]
+pub enum AtSwitch {
+    /// The motion continues.
+    Continue,
+    /// The state is replaced, by a map that is conformally contact if a factor is given.
+    Replace {
+        /// The state after it.
+        to: Point,
+        /// The factor by which the contact form is multiplied.
+        factor: Option<f64>,
+    },
+}
+
+/// What is known about an applied force; see [`ForceStructure`](contact_geom::ForceStructure).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceKind {
+    /// There is no force.
+    None,
+    /// A function of time and positions.
+    OfPositions,
+    /// A function of time and positions, with drag.
+    Drag,
+    /// Nothing is known.
+    General,
+}
+
+/// A mechanical system: its Lagrangian `L(t, q, v, z)` in n coordinates, the derivatives of L at points in `f64`, and its
+/// switching functions. Vectors have length n.
 ///
 /// The kernels of integrators are compiled for each Lagrangian. All else takes a `&dyn System`: the plan and the loop of
 /// a run, its checks, the search of the steps for an accuracy, and steps that end on kinks and jumps.
-///
-/// ```
-/// use contact_examples::systems::Pendulum;
-/// use contact_geom::VelocityPoint;
-/// use discrete_herglotz::System;
-/// let pendulum = Pendulum { gamma: -0.1 };
-/// let system: &dyn System<1> = &pendulum;
-/// let x = VelocityPoint::new([1.0], [2.0], 0.0);
-/// assert_eq!(system.gradient(0.0, &x).y[0], 2.0); // L_v
-/// ```
-pub trait System<const N: usize> {
+pub trait System {
+    /// The number n of coordinates.
+    fn dimension(&self) -> usize;
+
     /// What is known of the Lagrangian at compile time.
-    fn hints(&self) -> Hints;
+    fn hints(&self) -> Hints {
+        Hints::NONE
+    }
 
     /// The declared structure of the Lagrangian.
-    fn structure(&self) -> Structure;
+    fn structure(&self) -> Structure {
+        Structure::default()
+    }
 
     /// What may be relied on about the applied force.
-    fn force_structure(&self) -> ForceStructure<N>;
+    fn force_kind(&self) -> ForceKind {
+        ForceKind::None
+    }
 
     /// Whether there is an applied force.
-    fn has_force(&self) -> bool;
+    fn has_force(&self) -> bool {
+        false
+    }
 
     /// The value `L(t, q, v, z)`.
-    fn value(&self, t: f64, x: &VelocityPoint<N>) -> f64;
+    fn value(&self, t: f64, x: &Point) -> f64;
 
     /// The partial derivatives `(L_q, L_v, L_z)`.
-    fn gradient(&self, t: f64, x: &VelocityPoint<N>) -> ChartVector<N>;
-
-    /// The value with `(L_q + f, L_v, L_z)`, where f is the applied force.
-    fn with_gradient_and_force(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>);
-
-    /// The applied force `f(t, q, v, z)`.
-    fn applied_force(&self, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N>;
+    fn gradient(&self, t: f64, x: &Point) -> Components;
 
     /// The second partial derivatives in `(q, v, z)`.
-    fn hessian(&self, t: f64, x: &VelocityPoint<N>) -> Hessian<N>;
+    fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives;
 
     /// `W = L_vv` alone.
-    fn mass_matrix(&self, t: f64, x: &VelocityPoint<N>) -> SMatrix<f64, N, N>;
+    fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {
+        self.hessian(t, x).vv
+    }
 
     /// The Herglotz vector field `(v, a, L)` with the rate `L_z` of the conformal factor.
     ///
     /// # Errors
-    /// [`GeometryError::Singular`] where W is singular; [`GeometryError::Undefined`] for a Lagrangian that is given by a
-    /// contact Hamiltonian, whose rates are those of `(q, p, z)`.
-    fn rates(&self, t: f64, x: &VelocityPoint<N>) -> Result<(ChartVector<N>, f64), GeometryError>;
+    /// [`GeometryError::Singular`] where `W = L_vv` is singular; [`GeometryError::Undefined`] for a Lagrangian that is
+    /// given by a contact Hamiltonian, whose rates are those of `(q, p, z)`.
+    fn rates(&self, t: f64, x: &Point) -> Result<(Components, f64), GeometryError> {
+        defaults::rates(self, t, x)
+    }
+
+    /// The inverse Legendre transformation of a state, from a guess of the velocity; see
+    /// [`legendre_inverse`](crate::theory::legendre_inverse).
+    ///
+    /// # Errors
+    /// Those of the function.
+    fn legendre_inverse(&self, t: f64, state: &State, guess: &[f64]) -> Result<Point, StepError> {
+        defaults::legendre_inverse(self, t, state, guess)
+    }
+
+    /// L and its derivatives at a state. For a Lagrangian that is given by a contact Hamiltonian they are those of the
+    /// Hamiltonian, whatever the rank of `H_pp`; for all others the velocity is found from the momentum, starting from a
+    /// guess.
+    ///
+    /// # Errors
+    /// Those of [`legendre_inverse`](Self::legendre_inverse).
+    fn at_state(&self, t: f64, state: &State, guess: &[f64]) -> Result<AtState, StepError> {
+        defaults::at_state(self, t, state, guess)
+    }
 
     /// First-order bounds of the rounding errors of the value and of the gradient; NaN for a Lagrangian that is given by a
-    /// contact Hamiltonian, for which they are known [at a state](Self::rounding_at_state) alone.
-    fn rounding(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>);
+    /// contact Hamiltonian.
+    fn rounding(&self, t: f64, x: &Point) -> (f64, Components) {
+        defaults::rounding(self, t, x)
+    }
 
     /// The same at a state with its velocity, for a Lagrangian that is given by a contact Hamiltonian from the
     /// derivatives of the Hamiltonian.
-    fn rounding_at_state(&self, t: f64, x: &VelocityPoint<N>, state: &PhasePoint<N>) -> (f64, ChartVector<N>);
+    fn rounding_at_state(&self, t: f64, x: &Point, state: &State) -> (f64, Components) {
+        let _ = state;
+        self.rounding(t, x)
+    }
 
     /// The defects at a point of the claims of the [structure](Self::structure); `None` where they cannot be judged, and
     /// where they are proved.
-    fn claim_defects(&self, t: f64, x: &VelocityPoint<N>) -> Option<Defects>;
+    fn claim_defects(&self, t: f64, x: &Point) -> Option<Defects> {
+        defaults::claim_defects(self, t, x)
+    }
+
+    /// The defect of the declared structure of the applied force, if it is false at a point.
+    fn force_defect(&self, t: f64, x: &Point) -> Option<Defect> {
+        let _ = (t, x);
+        None
+    }
 
     /// The contact Hamiltonian with its derivatives `(H_q, H_p, H_z)` at a state, where the Lagrangian is given by one.
-    fn hamiltonian_with_gradient(&self, t: f64, x: &PhasePoint<N>) -> Option<(f64, ChartVector<N>)>;
+    fn hamiltonian_with_gradient(&self, t: f64, x: &State) -> Option<(f64, Components)> {
+        let _ = (t, x);
+        None
+    }
 
     /// The second derivatives of that contact Hamiltonian, with p in the place of v.
-    fn hamiltonian_hessian(&self, t: f64, x: &PhasePoint<N>) -> Option<Hessian<N>>;
+    fn hamiltonian_hessian(&self, t: f64, x: &State) -> Option<SecondDerivatives> {
+        let _ = (t, x);
+        None
+    }
 
     /// The first claim on that contact Hamiltonian that is false at a state.
-    fn hamiltonian_defect(&self, t: f64, x: &PhasePoint<N>) -> Option<Defect>;
+    fn hamiltonian_defect(&self, t: f64, x: &State) -> Option<Defect> {
+        let _ = (t, x);
+        None
+    }
 
     /// Appends the values of the switching functions at a point.
-    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>);
+    fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
+        let _ = (t, x, values);
+    }
 
     /// What happens at a zero of a switching function.
-    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N>;
+    fn at_switch(&self, index: usize, t: f64, x: &Point, rising: bool) -> AtSwitch {
+        let _ = (index, t, x, rising);
+        AtSwitch::Continue
+    }
 
     /// What happens where replacements at the zero of a switching function accumulate.
-    fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N>;
+    fn at_accumulation(&self, index: usize, t: f64, x: &Point) -> AtSwitch {
+        let _ = (index, t, x);
+        AtSwitch::Continue
+    }
 
     /// The times at which L or the applied force has a kink or a jump in time.
-    fn breaks(&self) -> &[f64];
+    fn breaks(&self) -> &[f64] {
+        &[]
+    }
 
     /// The rate `dt/dtau` of the time transformation.
-    fn dt_dtau(&self, q: &SVector<f64, N>) -> f64;
-}
-
-impl<L: Lagrangian<N>, const N: usize> System<N> for L {
-    fn hints(&self) -> Hints {
-        L::HINTS
-    }
-    fn structure(&self) -> Structure {
-        Lagrangian::structure(self)
-    }
-    fn force_structure(&self) -> ForceStructure<N> {
-        Lagrangian::force_structure(self)
-    }
-    fn has_force(&self) -> bool {
-        Lagrangian::has_force(self)
-    }
-    fn value(&self, t: f64, x: &VelocityPoint<N>) -> f64 {
-        Lagrangian::value(self, t, &x.q, &x.v, x.z)
-    }
-    fn gradient(&self, t: f64, x: &VelocityPoint<N>) -> ChartVector<N> {
-        Derivatives::gradient(self, t, x)
-    }
-    fn with_gradient_and_force(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>) {
-        Derivatives::with_gradient_and_force(self, t, x)
-    }
-    fn applied_force(&self, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N> {
-        Lagrangian::applied_force(self, t, x)
-    }
-    fn hessian(&self, t: f64, x: &VelocityPoint<N>) -> Hessian<N> {
-        Derivatives::hessian(self, t, x)
-    }
-    fn mass_matrix(&self, t: f64, x: &VelocityPoint<N>) -> SMatrix<f64, N, N> {
-        Derivatives::mass_matrix(self, t, x)
-    }
-    fn rates(&self, t: f64, x: &VelocityPoint<N>) -> Result<(ChartVector<N>, f64), GeometryError> {
-        // The derivatives of an inverse Legendre transformation are not compiled where nothing needs them.
-        if const { L::HINTS.hamiltonian } {
-            return Err(GeometryError::Undefined { what: "the acceleration as a function of position and velocity" });
-        }
-        herglotz_rates(self, t, x)
-    }
-    fn rounding(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>) {
-        if const { L::HINTS.hamiltonian } {
-            let none = SVector::from_element(f64::NAN);
-            return (f64::NAN, ChartVector { x: none, y: none, z: f64::NAN });
-        }
-        gradient_rounding(self, t, x)
-    }
-    fn rounding_at_state(&self, t: f64, x: &VelocityPoint<N>, state: &PhasePoint<N>) -> (f64, ChartVector<N>) {
-        rounding_at_state(self, t, x, state)
-    }
-    fn claim_defects(&self, t: f64, x: &VelocityPoint<N>) -> Option<Defects> {
-        if const { L::HINTS.proved || L::HINTS.hamiltonian } {
-            return None;
-        }
-        Lagrangian::structure(self).defects(self, t, x)
-    }
-    fn hamiltonian_with_gradient(&self, t: f64, x: &PhasePoint<N>) -> Option<(f64, ChartVector<N>)> {
-        Lagrangian::hamiltonian_with_gradient(self, t, x)
-    }
-    fn hamiltonian_hessian(&self, t: f64, x: &PhasePoint<N>) -> Option<Hessian<N>> {
-        Lagrangian::hamiltonian_hessian(self, t, x)
-    }
-    fn hamiltonian_defect(&self, t: f64, x: &PhasePoint<N>) -> Option<Defect> {
-        Lagrangian::hamiltonian_defect(self, t, x)
-    }
-    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        Lagrangian::switching_functions(self, t, x, values);
-    }
-    fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
-        Lagrangian::at_switch(self, index, t, x, rising)
-    }
-    fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
-        Lagrangian::at_accumulation(self, index, t, x)
-    }
-    fn breaks(&self) -> &[f64] {
-        Lagrangian::breaks(self)
-    }
-    fn dt_dtau(&self, q: &SVector<f64, N>) -> f64 {
-        Lagrangian::dt_dtau(self, q)
+    fn dt_dtau(&self, q: &Vector) -> f64 {
+        let _ = q;
+        1.0
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::solve::mass_matrix::mass_matrix;
 use crate::{
-    StepError, System,
+    StepError, TypedSystem,
     solve::{ITERATION_LIMIT, last_correction},
 };
 use contact_geom::nalgebra::SVector;
@@ -33,7 +33,7 @@ const MAX_STALLED_CORRECTIONS: u32 = 8;
 /// ```
 #[inline(never)]
 pub fn legendre_inverse<const N: usize>(
-    system: &dyn System<N>,
+    system: &dyn TypedSystem<N>,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
@@ -88,7 +88,7 @@ pub fn legendre_inverse<const N: usize>(
 
 /// The velocity `H_p` at a state, if L is given by a contact Hamiltonian.
 fn velocity_of_hamiltonian<const N: usize>(
-    system: &dyn System<N>,
+    system: &dyn TypedSystem<N>,
     t: f64,
     state: &PhasePoint<N>,
 ) -> Option<VelocityPoint<N>> {

@@ -73,8 +73,8 @@ fn an_accuracy_is_met() {
 /// Ends a run after this step.
 struct StopsAt(usize);
 
-impl<const N: usize> Observer<N> for StopsAt {
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+impl Observer for StopsAt {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if at.k == self.0 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
     }
 }
@@ -107,7 +107,7 @@ fn steps_are_differentiated_along_the_constraint() {
     let system = RigidPendulum::<2> { gravity: 1.0, gamma: -0.1 };
     for method in METHODS {
         let by = Constrained::new(&system, method);
-        let end = |angle: f64, speed: f64| -> Outcome<2> {
+        let end = |angle: f64, speed: f64| -> Outcome {
             let problem = Problem::new(&system, 0.0, swung(angle, speed)).unwrap();
             problem.by(by).steps(Steps::Count(1)).run(Until::Time(0.1)).unwrap()
         };

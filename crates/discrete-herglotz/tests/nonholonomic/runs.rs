@@ -120,8 +120,8 @@ fn an_accuracy_is_met() {
 /// Ends a run after this step.
 struct StopsAt(usize);
 
-impl<const N: usize> Observer<N> for StopsAt {
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+impl Observer for StopsAt {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if at.k == self.0 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
     }
 }

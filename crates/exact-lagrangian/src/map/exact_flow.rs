@@ -2,9 +2,9 @@
 
 use crate::numerics::flow::flow_between_jumps;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, VelocityPoint, legendre};
 use discrete_herglotz::{
-    InputError, Integrator, MethodInfo, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions,
+    InputError, Integrator, MethodInfo, PlanEntry, Problem, State, StepError, StepFailure, Stepper, StepperOptions,
 };
 
 /// The flow of the Herglotz vector field as an [`Integrator`]. Steps of any length are computed to round-off by
@@ -44,7 +44,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ExactFlow {
         problem: &Problem<'a, L, N>,
         h: f64,
         _: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -65,7 +65,7 @@ struct Run<'a, L, const N: usize> {
     evaluations: u64,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Stepper for Run<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let motion = flow_between_jumps(self.lagrangian, self.time(), &self.x, self.h)
@@ -77,8 +77,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        legendre(self.lagrangian, self.time(), &self.x)
+    fn state(&self) -> State {
+        legendre(self.lagrangian, self.time(), &self.x).into()
     }
 
     fn time(&self) -> f64 {

@@ -321,6 +321,7 @@ impl Scene {
             | RuntimeError::HamiltonianDimension { .. }
             | RuntimeError::ConstrainedDimension { .. }
             | RuntimeError::WithConstraints { .. }
+            | RuntimeError::OfFewCoordinates { .. }
             | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
             RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
             RuntimeError::Input(error) => match error {

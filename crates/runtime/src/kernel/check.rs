@@ -53,7 +53,7 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     problem: &'p Problem<'p, L, N>,
     by: Option<AnyIntegrator>,
     count: usize,
-) -> Result<Run<'p, 'o, L, N>, RuntimeError> {
+) -> Result<Run<'p, 'o, Problem<'p, L, N>>, RuntimeError> {
     Ok(match (problem.lagrangian().constrained(by)?, by) {
         (Some(method), _) => problem.by(method).steps(Steps::Count(count)),
         (None, Some(by)) => problem.by(L::by(by)?).steps(Steps::Count(count)),
@@ -76,7 +76,7 @@ fn mapped<L: FormulaSystem<N>, const N: usize>(
     let plan = run_by(&problem, by, count)?.plan(Until::After(h))?;
     let mut stepper = plan.stepper()?;
     stepper.advance(count).map_err(|failure| failure.cause)?;
-    Ok(([*problem.state(), stepper.state()], stepper.sigma()))
+    Ok(([*problem.state(), stepper.state().fixed()], stepper.sigma()))
 }
 
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
@@ -157,10 +157,10 @@ struct Recorded<I, const N: usize> {
     interrupted: I,
 }
 
-impl<I: Fn() -> bool, const N: usize> Observer<N> for Recorded<I, N> {
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+impl<I: Fn() -> bool, const N: usize> Observer for Recorded<I, N> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if at.k.is_multiple_of(self.stride) && !at.last {
-            self.states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
+            self.states.push((at.t, at.state.fixed(), at.log_factor.unwrap_or(f64::NAN)));
         }
         if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && (self.interrupted)() {
             ControlFlow::Break(Stop::here("the check"))
@@ -312,7 +312,7 @@ fn theorems_with<const N: usize>(
     let mut points = Vec::with_capacity(samples.len());
     for (t, x, _) in samples {
         let q1 = step(&system.0, (Some(AnyIntegrator::Gauss { stages }), h, 1), *t, x)?.0.q;
-        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
+        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q.as_slice(), n).to_vec());
         points.push(Points { t: *t, q0, q1, z0: x.z });
     }
     theorems(system.0.formula(), stages, h, &points)

@@ -95,7 +95,7 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
         problem: &Problem<'a, FormulaLagrangian<N>, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         if const { is_compiled(N) } {
             self.with::<_, N>(problem.lagrangian()).stepper(problem, h, options)
         } else {

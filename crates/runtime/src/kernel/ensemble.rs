@@ -8,7 +8,7 @@ use crate::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, Runtim
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
-    Ensemble, InputError, Row, Start, Until,
+    Ensemble, InputError, Row, Start, Until, Vector,
     ensemble::{EnsembleError, Member, Tally},
     theory::legendre_inverse,
 };
@@ -178,7 +178,7 @@ impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
             _ => Cow::Borrowed(columns),
         };
         let (monitor, ended) = (&mut *self.monitor, &mut self.ended);
-        let mut pass_on = |member: &Member<N>, MemberRecord { rows, last, crossings }: MemberRecord<N>| {
+        let mut pass_on = |member: &Member<N>, MemberRecord { rows, last, crossings }: MemberRecord| {
             if *ended {
                 return;
             }
@@ -192,7 +192,7 @@ impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
                     steps: ending.steps,
                     t: ending.t,
                     q: coordinates(&row.q, n).to_vec(),
-                    v: coordinates(&row.v.unwrap_or_else(|| SVector::repeat(f64::NAN)), n).to_vec(),
+                    v: row.v.as_ref().map_or_else(|| vec![f64::NAN; n], |v| coordinates(v, n).to_vec()),
                     p: coordinates(&row.p, n).to_vec(),
                     z: ending.state.z,
                     columns: own_columns(member.index).iter().map(|column| number(l, column, &row)).collect(),
@@ -208,10 +208,9 @@ impl<L: FormulaSystem<N>, const N: usize> Block<'_, L, N> {
         let of_block = if observed {
             let observer = |i: usize| {
                 let events = own_of(i).map_or(Some(events), |own| own.map(|own| own.events.as_slice()));
-                let crossings = lagrangian(i)
-                    .zip(events)
-                    .and_then(|(l, events)| Crossings::of(l as &dyn Observed<N>, events, None));
-                MemberObserver::<N>::new(ensemble.rows.as_ref(), columns, crossings)
+                let crossings =
+                    lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l as &dyn Observed, events, None));
+                MemberObserver::new(ensemble.rows.as_ref(), columns, crossings)
             };
             let many = many.observe(observer, MemberObserver::into_record);
             many.run(until, |member, record| pass_on(member, record.unwrap_or_default()))?
@@ -293,13 +292,13 @@ impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
 fn end_of<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
     ending: &discrete_herglotz::ensemble::Ending<N>,
-    last: Option<&Row<N>>,
-) -> Row<N> {
+    last: Option<&Row>,
+) -> Row {
     let (t, x) = (ending.t, &ending.state);
     // A row at another time belongs to the end of the step in which the member ended.
     let of_the_end = last.filter(|row| row.t == t);
-    let v = of_the_end.and_then(|row| row.v).or_else(|| {
-        let guess = last.map_or_else(SVector::zeros, |row| row.p);
+    let v = of_the_end.and_then(|row| row.v.as_ref().map(Vector::fixed)).or_else(|| {
+        let guess = last.map_or_else(SVector::zeros, |row| row.p.fixed());
         legendre_inverse(lagrangian, t, x, &guess).ok().map(|x| x.v)
     });
     let energy = if const { L::HINTS.hamiltonian } {
@@ -309,9 +308,9 @@ fn end_of<L: FormulaSystem<N>, const N: usize>(
     };
     Row {
         t,
-        q: x.q,
-        v,
-        p: x.p,
+        q: x.q.into(),
+        v: v.map(Vector::from),
+        p: x.p.into(),
         z: Some(x.z),
         energy,
         log_factor: of_the_end.and_then(|r| r.log_factor),

@@ -2,17 +2,17 @@
 
 use super::constrained::{OfConstraints, multipliers, projected};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry, VelocityPoint};
+use contact_geom::{Lagrangian, OfHamiltonian, Symmetry, VelocityPoint};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
-    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme,
-    Stepper, StepperOptions, theory::legendre_inverse,
+    AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Point, Problem, SplittingScheme,
+    State, Stepper, StepperOptions, Vector, theory::legendre_inverse,
 };
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
 
 /// What observers of a motion use. It is not generic, so that observers are compiled once for each dimension.
-pub(super) trait Observed<const N: usize> {
+pub(super) trait Observed {
     fn formula(&self) -> &Formula;
     /// `L_z` if it is proved to be constant.
     fn constant_rate(&self) -> Option<f64>;
@@ -22,16 +22,16 @@ pub(super) trait Observed<const N: usize> {
     fn reset_of(&self, index: usize) -> Option<usize>;
     /// What expressions contain beside the position and the action: the velocity, found from a guess, or the momentum
     /// for a Hamiltonian. `None` where there is none.
-    fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>>;
+    fn velocity_or_momentum(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector>;
     /// The multiplier of the constraint with this index; NaN where it is not determined.
-    fn multiplier(&self, _t: f64, _x: &VelocityPoint<N>, _index: usize) -> f64 {
+    fn multiplier(&self, _t: f64, _x: &Point, _index: usize) -> f64 {
         f64::NAN
     }
 }
 
 /// A formula that is run.
 pub(super) trait FormulaSystem<const N: usize>:
-    Lagrangian<N> + Observed<N> + Clone + Send + Sync + 'static
+    Lagrangian<N> + Observed + Clone + Send + Sync + 'static
 {
     /// The integrators for it, which are compiled.
     type By: for<'a> Integrator<'a, Self, N> + Copy + Sync;
@@ -63,7 +63,7 @@ pub(super) trait FormulaSystem<const N: usize>:
     fn symmetries(&self) -> Vec<Symmetry<N>>;
 }
 
-impl<const N: usize> Observed<N> for FormulaLagrangian<N> {
+impl<const N: usize> Observed for FormulaLagrangian<N> {
     fn formula(&self) -> &Formula {
         self.formula()
     }
@@ -80,12 +80,14 @@ impl<const N: usize> Observed<N> for FormulaLagrangian<N> {
         self.reset_of(index)
     }
 
-    fn velocity_or_momentum(&self, t: f64, state: &PhasePoint<N>, guess: &SVector<f64, N>) -> Option<SVector<f64, N>> {
-        legendre_inverse(self, t, state, guess).ok().map(|x| x.v)
+    fn velocity_or_momentum(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector> {
+        // Coordinates that the formula does not have are at rest.
+        let guess = SVector::from_fn(|i, _| guess.get(i).copied().unwrap_or(0.0));
+        legendre_inverse(self, t, &state.fixed(), &guess).ok().map(|x| x.v.into())
     }
 
-    fn multiplier(&self, t: f64, x: &VelocityPoint<N>, index: usize) -> f64 {
-        multipliers(self, t, x).and_then(|all| all.get(index).copied()).unwrap_or(f64::NAN)
+    fn multiplier(&self, t: f64, x: &Point, index: usize) -> f64 {
+        multipliers(self, t, &x.fixed()).and_then(|all| all.get(index).copied()).unwrap_or(f64::NAN)
     }
 }
 
@@ -114,7 +116,7 @@ impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
     }
 }
 
-impl<const N: usize> Observed<N> for OfHamiltonian<FormulaHamiltonian<N>> {
+impl<const N: usize> Observed for OfHamiltonian<FormulaHamiltonian<N>> {
     fn formula(&self) -> &Formula {
         self.0.formula()
     }
@@ -131,8 +133,8 @@ impl<const N: usize> Observed<N> for OfHamiltonian<FormulaHamiltonian<N>> {
         None
     }
 
-    fn velocity_or_momentum(&self, _t: f64, state: &PhasePoint<N>, _: &SVector<f64, N>) -> Option<SVector<f64, N>> {
-        Some(state.p)
+    fn velocity_or_momentum(&self, _t: f64, state: &State, _: &[f64]) -> Option<Vector> {
+        Some(state.p.clone())
     }
 }
 
@@ -173,7 +175,7 @@ impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>
         problem: &Problem<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         each!(self, by => by.stepper(problem, h, options))
     }
 }

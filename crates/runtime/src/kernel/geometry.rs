@@ -11,7 +11,7 @@ use formula_lagrangian::FormulaLagrangian;
 
 /// The components of a vector on TQ x R in the first n coordinates.
 fn components<const N: usize>(x: &ChartVector<N>, n: usize) -> Vec<f64> {
-    [coordinates(&x.x, n), coordinates(&x.y, n), &[x.z]].concat()
+    [coordinates(x.x.as_slice(), n), coordinates(x.y.as_slice(), n), &[x.z]].concat()
 }
 
 /// The factor by which `eta ^ (d eta)^n = (-1)^(n(n-1)/2) n! det W`, evaluated on the coordinate vectors, grows when n
@@ -33,7 +33,7 @@ pub(super) fn at<const N: usize>(
     let p = legendre(lagrangian, t, x).p;
     Ok(Geometry {
         lagrangian: value,
-        momentum: coordinates(&p, n).to_vec(),
+        momentum: coordinates(p.as_slice(), n).to_vec(),
         energy: p.dot(&x.v) - value,
         rate: g.z,
         mass: w.row_iter().take(n).map(|row| row.iter().take(n).copied().collect()).collect(),
@@ -53,6 +53,6 @@ pub(super) fn rates<const N: usize>(system: &Sized<FormulaLagrangian<N>, N>, t: 
     };
     let x = VelocityPoint { q: part(0), v: part(n), z: y.get(2 * n).copied().unwrap_or(0.0) };
     let Ok(field) = herglotz_field(&system.0, t, &x) else { return to.fill(f64::NAN) };
-    let all = coordinates(&field.x, n).iter().chain(coordinates(&field.y, n)).chain([&field.z]);
+    let all = coordinates(field.x.as_slice(), n).iter().chain(coordinates(field.y.as_slice(), n)).chain([&field.z]);
     to.iter_mut().zip(all).for_each(|(to, from)| *to = *from);
 }

@@ -103,13 +103,14 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
         if !(value.is_finite() && d.is_finite()) {
             return Err(RuntimeError::HamiltonianUndefined);
         }
-        let all =
-            |x: &SVector<f64, N>, y: &SVector<f64, N>, z: f64| [coordinates(x, n), coordinates(y, n), &[z]].concat();
+        let all = |x: &SVector<f64, N>, y: &SVector<f64, N>, z: f64| {
+            [coordinates(x.as_slice(), n), coordinates(y.as_slice(), n), &[z]].concat()
+        };
         let still = SVector::zeros();
         let square = DMatrix::from_fn(n, n, |i, j| second[(i, j)]);
         Ok(HamiltonianGeometry {
             hamiltonian: value,
-            velocity: coordinates(&d.y, n).to_vec(),
+            velocity: coordinates(d.y.as_slice(), n).to_vec(),
             rate: if d.z == 0.0 { 0.0 } else { -d.z },
             condition: Regularity::of(square.clone()).condition(),
             hessian: square.row_iter().map(|row| row.iter().copied().collect()).collect(),

@@ -6,6 +6,7 @@ mod ensemble;
 mod formula_system;
 mod geometry;
 mod hamiltonian;
+mod many;
 mod member_derivatives;
 mod observed;
 pub(crate) mod path;
@@ -34,6 +35,10 @@ use work_thread::on_large_stack;
 /// A system whose dimension is not part of its type.
 pub(crate) trait Kernel: Send + Sync {
     fn formula(&self) -> &Formula;
+    /// The error where the kernel has no such computation.
+    fn lacks(&self, what: &'static str) -> RuntimeError {
+        RuntimeError::OfLagrangians { what }
+    }
     fn structure(&self) -> Structure;
     fn is_smooth(&self) -> bool;
     fn has_force(&self) -> bool;
@@ -56,7 +61,7 @@ pub(crate) trait Kernel: Send + Sync {
         to.fill(f64::NAN);
     }
     fn geometry(&self, _at: &Start) -> Result<Geometry, RuntimeError> {
-        Err(of_lagrangians("geometry on TQ x R"))
+        Err(self.lacks("geometry on TQ x R"))
     }
     fn hamiltonian_geometry(&self, _at: &Start) -> Result<HamiltonianGeometry, RuntimeError> {
         Err(FormulaError::IsLagrangian.into())
@@ -70,7 +75,7 @@ pub(crate) trait Kernel: Send + Sync {
         _times: &[f64],
         _monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        Err(of_lagrangians(DERIVATIVES))
+        Err(self.lacks(DERIVATIVES))
     }
     fn gradient(
         &self,
@@ -79,14 +84,14 @@ pub(crate) trait Kernel: Send + Sync {
         _loss: &mut Loss<'_>,
         _monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
-        Err(of_lagrangians(DERIVATIVES))
+        Err(self.lacks(DERIVATIVES))
     }
     fn lyapunov_exponents(
         &self,
         _motion: &Motion,
         _monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
-        Err(of_lagrangians(DERIVATIVES))
+        Err(self.lacks(DERIVATIVES))
     }
     fn ensemble_gradient(
         &self,
@@ -95,7 +100,7 @@ pub(crate) trait Kernel: Send + Sync {
         _loss: &BatchLoss<'_>,
         _interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
-        Err(of_lagrangians(DERIVATIVES))
+        Err(self.lacks(DERIVATIVES))
     }
     fn ensemble_sensitivity(
         &self,
@@ -104,17 +109,15 @@ pub(crate) trait Kernel: Send + Sync {
         _times: &[f64],
         _interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
-        Err(of_lagrangians(DERIVATIVES))
+        Err(self.lacks(DERIVATIVES))
     }
 }
 
 /// What a Hamiltonian has no kernel for, nor a formula with constraints.
 const DERIVATIVES: &str = "derivatives of motions";
 
-/// The error of what is compiled for Lagrangians only.
-fn of_lagrangians(what: &'static str) -> RuntimeError {
-    RuntimeError::OfLagrangians { what }
-}
+/// The largest number of coordinates for which kernels are compiled.
+const MOST_COMPILED_COORDINATES: usize = 16;
 
 /// The kernel of a formula.
 pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
@@ -130,7 +133,7 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
         ($($n:literal)*) => {
             match formula.dimension() {
                 $(found if found <= $n && (!constrained || constrained::is_compiled($n)) => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
-                found => Err(FormulaError::Dimension { found }.into()),
+                _ => many::kernel_of(formula),
             }
         };
     }

@@ -6,34 +6,29 @@ use discrete_herglotz::{InputError, Observer, OutputRequest, Row, Rows, RunInfo,
 use std::ops::ControlFlow;
 
 /// The records of a member.
-pub(super) struct MemberRecord<const N: usize> {
-    pub rows: Vec<Row<N>>,
+#[derive(Default)]
+pub(super) struct MemberRecord {
+    pub rows: Vec<Row>,
     /// The row at the end of the last step, where the conformal factor is requested, which is known only at the ends of
     /// steps.
-    pub last: Option<Row<N>>,
+    pub last: Option<Row>,
     pub crossings: Vec<Crossing>,
 }
 
-impl<const N: usize> Default for MemberRecord<N> {
-    fn default() -> Self {
-        MemberRecord { rows: Vec::new(), last: None, crossings: Vec::new() }
-    }
-}
-
 /// Observer that records a member.
-pub(super) struct MemberObserver<'r, const N: usize> {
-    rows: Option<Rows<'r, N>>,
-    last: Option<Rows<'r, N>>,
-    crossings: Option<Crossings<'r, N>>,
+pub(super) struct MemberObserver<'r> {
+    rows: Option<Rows<'r>>,
+    last: Option<Rows<'r>>,
+    crossings: Option<Crossings<'r>>,
     found: Vec<Crossing>,
     forward: bool,
 }
 
-impl<'r, const N: usize> MemberObserver<'r, N> {
+impl<'r> MemberObserver<'r> {
     pub fn new(
         when: Option<&OutputTimes>,
         columns: &[Column],
-        crossings: Option<Crossings<'r, N>>,
+        crossings: Option<Crossings<'r>>,
     ) -> Result<Self, InputError> {
         let of_rows = when.map(|when| rows(when, columns)).transpose()?;
         let has_factor = columns.iter().any(Column::has_conformal_factor);
@@ -41,19 +36,19 @@ impl<'r, const N: usize> MemberObserver<'r, N> {
         Ok(MemberObserver { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
     }
 
-    pub fn into_record(self) -> MemberRecord<N> {
+    pub fn into_record(self) -> MemberRecord {
         let rows = self.rows.map(|rows| rows.rows).unwrap_or_default();
         MemberRecord { rows, last: self.last.and_then(|mut last| last.rows.pop()), crossings: self.found }
     }
 }
 
-impl<const N: usize> Observer<N> for MemberObserver<'_, N> {
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+impl Observer for MemberObserver<'_> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         self.crossings.as_ref().and_then(Crossings::terminal)
     }
 
     fn needs(&self) -> OutputRequest {
-        let of = |rows: &Option<Rows<'_, N>>| rows.as_ref().map(Observer::needs).unwrap_or_default();
+        let of = |rows: &Option<Rows<'_>>| rows.as_ref().map(Observer::needs).unwrap_or_default();
         let of_events = self.crossings.as_ref().map(Crossings::needs).unwrap_or_default();
         of(&self.rows).and(of(&self.last)).and(of_events)
     }
@@ -73,14 +68,14 @@ impl<const N: usize> Observer<N> for MemberObserver<'_, N> {
         self.rows.as_ref().map_or(usize::MAX, |rows| rows.next(taken))
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.start(at)?;
         }
         self.crossings.as_mut().map_or(ControlFlow::Continue(()), |crossings| crossings.start(at))
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.step(at)?;
         }

@@ -5,14 +5,13 @@ use super::sized::coordinates;
 use crate::{
     AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };
-use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::support::sorted;
 use discrete_herglotz::{
-    Event, Events, InputError, Observer, OutputRequest, Reset, Row, Rows, RunInfo, StepView, Stop, Terminal,
+    Event, Events, InputError, Observer, OutputRequest, Point, Reset, Row, Rows, RunInfo, State, StepView, Stop,
+    Terminal, Vector,
 };
 use formula_lagrangian::Expression;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::ops::ControlFlow;
 use std::rc::Rc;
 
@@ -20,23 +19,23 @@ use std::rc::Rc;
 const STEPS_BETWEEN_POLLS: usize = 256;
 
 /// Observes a motion on behalf of a [`RunMonitor`].
-pub(super) struct Recorder<'r, const N: usize> {
-    rows: Option<Rows<'r, N>>,
+pub(super) struct Recorder<'r> {
+    rows: Option<Rows<'r>>,
     columns: &'r [Column],
     /// The numbers of a row, in a buffer that is reused.
     numbers: Vec<f64>,
-    crossings: Option<Crossings<'r, N>>,
+    crossings: Option<Crossings<'r>>,
     nodes: bool,
     needs: OutputRequest,
     run_info: Option<RunInfo>,
     dimension: usize,
-    lagrangian: &'r dyn Observed<N>,
+    lagrangian: &'r dyn Observed,
     monitor: &'r mut dyn RunMonitor,
 }
 
-impl<'r, const N: usize> Recorder<'r, N> {
+impl<'r> Recorder<'r> {
     pub fn new(
-        lagrangian: &'r dyn Observed<N>,
+        lagrangian: &'r dyn Observed,
         motion: &'r Motion,
         monitor: &'r mut dyn RunMonitor,
     ) -> Result<Self, RuntimeError> {
@@ -62,7 +61,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
     }
 
     /// Passes on the rows, up to a time if one is given.
-    fn pass_on_rows(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
+    fn pass_on_rows(&mut self, until: Option<f64>) -> ControlFlow<Stop> {
         let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
         let backward = self.run_info.is_some_and(|run_info| run_info.t_end < run_info.t0);
         let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
@@ -77,11 +76,11 @@ impl<'r, const N: usize> Recorder<'r, N> {
         ControlFlow::Continue(())
     }
 
-    fn notify(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn notify(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if self.nodes {
-            let PhasePoint { q, p, z } = &at.state;
+            let State { q, p, z } = &at.state;
             // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
-            let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
+            let v = at.velocity().unwrap_or_else(|_| Vector::zeros(q.len()));
             self.monitor.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
         if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
@@ -105,7 +104,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
 }
 
 /// The rows that have the quantities of these columns.
-pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
+pub(super) fn rows<'r>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r>, InputError> {
     let rows = match when {
         OutputTimes::Every(stride) => Rows::every(*stride)?,
         OutputTimes::At(times) => Rows::at(times.iter().copied())?,
@@ -128,8 +127,8 @@ pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -
 }
 
 /// The value of a column in a row; NaN where the row does not have it.
-pub(super) fn number<const N: usize>(lagrangian: &dyn Observed<N>, column: &Column, row: &Row<N>) -> f64 {
-    let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+pub(super) fn number(lagrangian: &dyn Observed, column: &Column, row: &Row) -> f64 {
+    let of = |vector: Option<&Vector>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
     match column {
         Column::Time => row.t,
         Column::Position(i) => of(Some(&row.q), *i),
@@ -138,13 +137,21 @@ pub(super) fn number<const N: usize>(lagrangian: &dyn Observed<N>, column: &Colu
         Column::Action => row.z.unwrap_or(f64::NAN),
         Column::Energy => row.energy.unwrap_or(f64::NAN),
         Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
-        Column::Multiplier(i) => match (row.v, row.z) {
-            (Some(v), Some(z)) => lagrangian.multiplier(row.t, &VelocityPoint { q: row.q, v, z }, *i),
+        Column::Multiplier(i) => match (&row.v, row.z) {
+            (Some(v), Some(z)) => lagrangian.multiplier(row.t, &Point::new(row.q.clone(), v.clone(), z), *i),
             _ => f64::NAN,
         },
         Column::Expression(e) => {
             // An expression that does not contain v or z ignores the zeros here.
-            let v = if e.is_of_hamiltonian() { row.p } else { row.v.unwrap_or_else(SVector::zeros) };
+            let zeros;
+            let v = match &row.v {
+                _ if e.is_of_hamiltonian() => &row.p,
+                Some(v) => v,
+                None => {
+                    zeros = Vector::zeros(row.q.len());
+                    &zeros
+                }
+            };
             let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
             e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
         }
@@ -153,10 +160,7 @@ pub(super) fn number<const N: usize>(lagrangian: &dyn Observed<N>, column: &Colu
 
 /// Rejects events with the conformal factor where it is not known at all times, terminal events that count from a given
 /// time or have a reset, and events with a reset that the formula does not have.
-pub(super) fn check_events<const N: usize>(
-    lagrangian: &dyn Observed<N>,
-    events: &[crate::Event],
-) -> Result<(), RuntimeError> {
+pub(super) fn check_events(lagrangian: &dyn Observed, events: &[crate::Event]) -> Result<(), RuntimeError> {
     let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
     if of_terminal {
         let why = "is given for a terminal event, which is detected from the start of the motion; remove one of the \
@@ -179,38 +183,39 @@ pub(super) fn check_events<const N: usize>(
 }
 
 /// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
-struct EventContext<const N: usize> {
+struct EventContext {
     /// The initial time.
     start_time: Cell<f64>,
     /// The last velocity that was found, the initial guess for the next.
-    velocity: Cell<SVector<f64, N>>,
+    velocity: RefCell<Vector>,
 }
 
 /// An expression as a function of time and of a state `(q, p, z)` of a motion.
-fn at_states<'r, const N: usize>(
-    lagrangian: &'r dyn Observed<N>,
+fn at_states<'r>(
+    lagrangian: &'r dyn Observed,
     function: &'r Expression,
-    context: Rc<EventContext<N>>,
-) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
+    context: Rc<EventContext>,
+) -> impl FnMut(f64, &State) -> f64 + 'r {
     // `check_events` ensures that the rate is constant wherever it is needed.
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
-            match lagrangian.velocity_or_momentum(t, state, &context.velocity.get()) {
-                Some(v) => context.velocity.set(v),
+            let found = lagrangian.velocity_or_momentum(t, state, &context.velocity.borrow());
+            match found {
+                Some(v) => context.velocity.replace(v),
                 None => return f64::NAN,
-            }
+            };
         }
-        let v = context.velocity.get();
+        let v = context.velocity.borrow();
         function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - context.start_time.get()))
     }
 }
 
 /// The events of a motion, with the data needed to evaluate them.
-pub(super) struct Crossings<'r, const N: usize> {
-    lagrangian: &'r dyn Observed<N>,
+pub(super) struct Crossings<'r> {
+    lagrangian: &'r dyn Observed,
     /// The events without a reset, whose sign changes are searched for, and their indices.
-    events: Events<'r, N>,
+    events: Events<'r>,
     searched: Vec<usize>,
     /// The events as they were requested.
     requested: &'r [crate::Event],
@@ -220,20 +225,19 @@ pub(super) struct Crossings<'r, const N: usize> {
     action: bool,
     /// Whether an event contains the velocity.
     velocity: bool,
-    context: Rc<EventContext<N>>,
+    context: Rc<EventContext>,
     backward: bool,
     dimension: usize,
 }
 
-impl<'r, const N: usize> Crossings<'r, N> {
+impl<'r> Crossings<'r> {
     /// `None` where there are no events.
-    pub fn of(lagrangian: &'r dyn Observed<N>, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
+    pub fn of(lagrangian: &'r dyn Observed, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
         let numbers = match start.map(|start| &start.velocity) {
             Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
             _ => &[],
         };
-        let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
-        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: Cell::new(v) });
+        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: RefCell::new(numbers.into()) });
         let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
         let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
         let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
@@ -261,26 +265,26 @@ impl<'r, const N: usize> Crossings<'r, N> {
         self.events.prepare(run_info)
     }
 
-    pub fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    pub fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if self.velocity
             && let Ok(v) = at.velocity()
         {
-            self.context.velocity.set(v);
+            self.context.velocity.replace(v);
         }
         self.events.start(at)
     }
 
     /// The terminal events, at which trial runs end.
-    pub fn terminal(&self) -> Option<Terminal<'_, N>> {
+    pub fn terminal(&self) -> Option<Terminal<'_>> {
         self.events.terminal()
     }
 
     /// Passes on the sign changes in a step; `Break` at a terminal event.
     pub fn step(
         &mut self,
-        at: &StepView<'_, N>,
+        at: &StepView<'_>,
         mut pass_on_rows: impl FnMut(Crossing) -> ControlFlow<()>,
-    ) -> ControlFlow<Stop<N>> {
+    ) -> ControlFlow<Stop> {
         let ended = self.events.step(at);
         let end = match &ended {
             ControlFlow::Break(Stop { at: Some((t, _)), .. }) => Some(*t),
@@ -293,19 +297,21 @@ impl<'r, const N: usize> Crossings<'r, N> {
                 continue;
             }
             // The velocity at the end of the step is close enough as an initial guess.
-            let velocity = |state| at.velocity_at(t, state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
-            let (PhasePoint { q, p, z }, v) = (before, velocity(&before));
+            let velocity =
+                |state: &State| at.velocity_at(t, state).unwrap_or_else(|_| Vector::repeat(state.q.len(), f64::NAN));
+            let v = velocity(&before);
+            let State { q, p, z } = before;
             let log_factor = self.rate * (t - self.context.start_time.get());
             let columns = requested.map_or(&[][..], |event| &event.columns).iter();
-            let of_expression = if self.lagrangian.formula().is_hamiltonian() { p } else { v };
+            let of_expression = if self.lagrangian.formula().is_hamiltonian() { &p } else { &v };
             let state = (q.as_slice(), of_expression.as_slice(), z);
             let columns = columns.map(|e| e.at_factor(t, state, log_factor)).collect();
-            let vectors = |[q, v, p]: [SVector<f64, N>; 3]| [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
+            let vectors = |x: [&Vector; 3]| x.map(|x| coordinates(x, self.dimension).to_vec());
             let after = after.as_ref().map(|after| {
-                let [q, v, p] = vectors([after.q, velocity(after), after.p]);
+                let [q, v, p] = vectors([&after.q, &velocity(after), &after.p]);
                 AfterReset { q, v, p, z: after.z }
             });
-            let [q, v, p] = vectors([q, v, p]);
+            let [q, v, p] = vectors([&q, &v, &p]);
             if pass_on_rows(Crossing { t, event, q, v, p, z, columns, after }).is_break() {
                 return ControlFlow::Break(Stop::here("the monitor"));
             }
@@ -315,17 +321,17 @@ impl<'r, const N: usize> Crossings<'r, N> {
 
     /// The crossings in a step, up to a time at which the motion ends within it: the index of the event, the time, the
     /// state, and that after a reset. They are in the order of the motion, resets after others at the same time.
-    fn found(&mut self, at: &StepView<'_, N>, end: Option<f64>) -> Vec<Found<N>> {
+    fn found(&mut self, at: &StepView<'_>, end: Option<f64>) -> Vec<Found> {
         let searched = &self.searched;
         let changes = self.events.crossings.drain(..);
         let changes = changes.map(|c| (searched.get(c.event).copied().unwrap_or(usize::MAX), c.t, c.state, None));
-        let mut found: Vec<Found<N>> = changes.collect();
+        let mut found: Vec<Found> = changes.collect();
         let count = found.len();
         for Reset { t, index, before, after } in at.resets() {
             let Some(reset) = self.lagrangian.reset_of(*index) else { continue };
             let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) else { continue };
             if end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
-                found.push((event, *t, *before, Some(*after)));
+                found.push((event, *t, before.clone(), Some(after.clone())));
             }
         }
         if found.len() > count {
@@ -336,13 +342,9 @@ impl<'r, const N: usize> Crossings<'r, N> {
 }
 
 /// A crossing: the index of the event, the time, the state, and that after a reset.
-type Found<const N: usize> = (usize, f64, PhasePoint<N>, Option<PhasePoint<N>>);
+type Found = (usize, f64, State, Option<State>);
 
-fn of<'r, const N: usize>(
-    lagrangian: &'r dyn Observed<N>,
-    event: &'r crate::Event,
-    context: Rc<EventContext<N>>,
-) -> Event<'r, N> {
+fn of<'r>(lagrangian: &'r dyn Observed, event: &'r crate::Event, context: Rc<EventContext>) -> Event<'r> {
     let found = Event::new(at_states(lagrangian, &event.function, context));
     let found = match event.direction {
         Direction::Rising => found.rising(),
@@ -352,8 +354,8 @@ fn of<'r, const N: usize>(
     if event.terminal { found.terminal() } else { found }
 }
 
-impl<const N: usize> Observer<N> for Recorder<'_, N> {
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+impl Observer for Recorder<'_> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         self.crossings.as_ref().and_then(Crossings::terminal)
     }
 
@@ -377,7 +379,7 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if let Some(rows) = &mut self.rows {
             rows.start(at)?;
         }
@@ -388,14 +390,14 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.notify(at)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if let Some(rows) = &mut self.rows {
             rows.step(at)?;
         }
         if let Some(crossings) = &mut self.crossings {
             let ended = crossings.step(at, |crossing| self.monitor.crossing(&crossing));
             if let ControlFlow::Break(stop) = ended {
-                self.pass_on_rows(stop.at.map(|(t, _)| t))?;
+                self.pass_on_rows(stop.at.as_ref().map(|(t, _)| *t))?;
                 return ControlFlow::Break(stop);
             }
         }

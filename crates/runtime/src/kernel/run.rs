@@ -4,7 +4,7 @@ use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
 use crate::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
-use discrete_herglotz::{Problem, ResumeState, Run, Until};
+use discrete_herglotz::{Problem, ResumeState, Run, Until, Vector};
 use formula_lagrangian::Formula;
 
 /// What motions with a force lose, and why.
@@ -25,7 +25,7 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     system: &Sized<L, N>,
     problem: &'p Problem<'p, L, N>,
     motion: &Motion,
-) -> Result<Run<'p, 'o, L, N>, RuntimeError> {
+) -> Result<Run<'p, 'o, Problem<'p, L, N>>, RuntimeError> {
     let by = match motion.step_control {
         StepControl::Accuracy { by, .. } => by,
         StepControl::Steps { by, .. } => Some(by),
@@ -37,13 +37,19 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         (StepControl::Accuracy { error, by: Some(by) }, None) => problem.by(L::by(by)?).accuracy(error),
         (StepControl::Steps { by, steps }, None) => problem.by(L::by(by)?).steps(steps),
     };
+    let scales = motion.scales.as_ref().map(|scales| system.vector("scales", scales)).transpose()?;
+    Ok(requested(run, motion, scales.map(Vector::from)))
+}
+
+/// A run with what a motion requests of it.
+pub(super) fn requested<'p, 'o, P>(run: Run<'p, 'o, P>, motion: &Motion, scales: Option<Vector>) -> Run<'p, 'o, P> {
     let run = if motion.action { run } else { run.without_action() };
     let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
     let run = if motion.estimate { run.with_error_estimate() } else { run };
-    Ok(match &motion.scales {
-        Some(scales) => run.scales(system.vector("scales", scales)?.into()),
+    match scales {
+        Some(scales) => run.scales(scales),
         None => run,
-    })
+    }
 }
 
 /// The first line of the plan of a formula in which z may have been meant to be a coordinate.
@@ -65,12 +71,22 @@ pub(super) fn plan<L: FormulaSystem<N>, const N: usize>(
     let mut no_monitor = ();
     let mut recorder = Recorder::new(&system.0, motion, &mut no_monitor)?;
     let run = of(system, &problem, motion)?.observe(&mut recorder);
+    plan_of(&run, motion, system.0.formula(), system.0.has_force())
+}
+
+/// The plan of a run.
+pub(super) fn plan_of<P>(
+    run: &Run<'_, '_, P>,
+    motion: &Motion,
+    formula: &Formula,
+    has_force: bool,
+) -> Result<Plan, RuntimeError> {
     let plan = run.plan(Until::Time(motion.end))?;
     let (mut text, mut items) = (plan.to_string(), plan.entries());
-    if acts_as_drag(system.0.formula()) {
+    if acts_as_drag(formula) {
         text.insert_str(0, &format!("{ACTION_IS_NO_COORDINATE}\n"));
     }
-    if system.0.has_force() {
+    if has_force {
         for (what, why) in LOSSES_WITH_FORCE {
             // The entries that are skipped are the last ones in the text.
             text += &format!("  {what}: {why}\n");
@@ -96,11 +112,21 @@ pub(super) fn run<L: FormulaSystem<N>, const N: usize>(
     let problem = system.problem_of(motion)?;
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = of(system, &problem, motion)?.observe(&mut recorder);
+    outcome_of(run, motion, from, system.0.formula().dimension())
+}
+
+/// The outcome of a run, in the n coordinates of a formula.
+pub(super) fn outcome_of<P>(
+    run: Run<'_, '_, P>,
+    motion: &Motion,
+    from: Option<ResumeState>,
+    n: usize,
+) -> Result<Outcome, RuntimeError> {
     let run = match from {
         Some(from) => run.resume(from),
         None => run,
     };
-    let (outcome, n) = (run.run(Until::Time(motion.end))?, system.0.formula().dimension());
+    let outcome = run.run(Until::Time(motion.end))?;
     Ok(Outcome {
         status: outcome.status,
         unresolved: outcome.unresolved,

@@ -19,7 +19,7 @@ fn unobserved(motion: &Motion) -> Motion {
 }
 
 pub(super) fn state<const N: usize>(of: &EndState<N>, n: usize) -> MotionState {
-    let [q, v, p] = [&of.q, &of.v, &of.p].map(|x| coordinates(x, n).to_vec());
+    let [q, v, p] = [&of.q, &of.v, &of.p].map(|x| coordinates(x.as_slice(), n).to_vec());
     MotionState { t: of.t, q, v, p, z: of.z }
 }
 
@@ -39,8 +39,8 @@ pub(super) fn loss_gradient<const N: usize>(
     n: usize,
 ) -> LossGradient {
     let of = |gradient: discrete_herglotz::sensitivity::Gradient<N>| Gradient {
-        q: coordinates(&gradient.q, n).to_vec(),
-        velocity: coordinates(&gradient.rate, n).to_vec(),
+        q: coordinates(gradient.q.as_slice(), n).to_vec(),
+        velocity: coordinates(gradient.rate.as_slice(), n).to_vec(),
         z: gradient.z,
         parameters: gradient.parameters,
         t0: gradient.t0,

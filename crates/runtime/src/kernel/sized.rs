@@ -5,45 +5,64 @@ use super::formula_system::FormulaSystem;
 use crate::{InitialVelocity, Motion, RuntimeError, Start};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, VelocityPoint};
-use discrete_herglotz::{InputError, Problem, StepError};
+use discrete_herglotz::{InitialState, InputError, Point, Problem, State, StepError, Vector};
+use formula_lagrangian::Formula;
 
 /// A system compiled for N coordinates, at least as many as its formula has. The additional coordinates are at rest and
 /// are not visible from outside.
 pub(super) struct Sized<L, const N: usize>(pub L);
 
 /// The first n coordinates of a vector.
-pub(super) fn coordinates<const N: usize>(x: &SVector<f64, N>, n: usize) -> &[f64] {
-    x.as_slice().get(..n).unwrap_or(&[])
+pub(super) fn coordinates(x: &[f64], n: usize) -> &[f64] {
+    x.get(..n).unwrap_or(&[])
+}
+
+/// A vector with 0 for the coordinates beyond those of a formula.
+fn padded<const N: usize>(x: &[f64]) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0))
+}
+
+/// A vector with one finite number per coordinate of a formula.
+pub(super) fn checked(formula: &Formula, what: &'static str, numbers: &[f64]) -> Result<Vector, RuntimeError> {
+    let expected = formula.dimension();
+    if numbers.len() != expected {
+        return Err(RuntimeError::Length { what, found: numbers.len(), expected });
+    }
+    match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+        Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
+        None => Ok(numbers.into()),
+    }
+}
+
+/// The start of a motion of a formula, validated.
+pub(super) fn initial_state(formula: &Formula, start: &Start) -> Result<InitialState, RuntimeError> {
+    for (what, value) in [("t", start.t), ("z", start.z)] {
+        if !value.is_finite() {
+            return Err(RuntimeError::NotFinite { what: what.into(), value });
+        }
+    }
+    let of = |what, numbers: &[f64]| checked(formula, what, numbers);
+    let (q, z) = (of("q", &start.q)?, start.z);
+    Ok(match &start.velocity {
+        InitialVelocity::Velocity(v) => Point { q, v: of("v", v)?, z }.into(),
+        InitialVelocity::MomentumNear { p, v } => InitialState::Momentum(State { q, p: of("p", p)?, z }, of("v", v)?),
+        InitialVelocity::Momentum(p) => State { q, p: of("p", p)?, z }.into(),
+    })
 }
 
 impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
     /// A vector with one finite number per coordinate.
     pub fn vector(&self, what: &'static str, numbers: &[f64]) -> Result<SVector<f64, N>, RuntimeError> {
-        let expected = self.0.formula().dimension();
-        if numbers.len() != expected {
-            return Err(RuntimeError::Length { what, found: numbers.len(), expected });
-        }
-        match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
-            Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
-            None => Ok(SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0))),
-        }
+        Ok(padded(&checked(self.0.formula(), what, numbers)?))
     }
 
     /// The start of a motion, validated.
     pub fn start(&self, start: &Start) -> Result<discrete_herglotz::Start<N>, RuntimeError> {
-        for (what, value) in [("t", start.t), ("z", start.z)] {
-            if !value.is_finite() {
-                return Err(RuntimeError::NotFinite { what: what.into(), value });
+        Ok(match initial_state(self.0.formula(), start)? {
+            InitialState::Velocity(Point { q, v, z }) => VelocityPoint { q: padded(&q), v: padded(&v), z }.into(),
+            InitialState::Momentum(State { q, p, z }, v) => {
+                discrete_herglotz::Start::Momentum(PhasePoint { q: padded(&q), p: padded(&p), z }, padded(&v))
             }
-        }
-        let q = self.vector("q", &start.q)?;
-        Ok(match &start.velocity {
-            InitialVelocity::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
-            InitialVelocity::MomentumNear { p, v } => discrete_herglotz::Start::Momentum(
-                PhasePoint { q, p: self.vector("p", p)?, z: start.z },
-                self.vector("v", v)?,
-            ),
-            InitialVelocity::Momentum(p) => PhasePoint { q, p: self.vector("p", p)?, z: start.z }.into(),
         })
     }
 

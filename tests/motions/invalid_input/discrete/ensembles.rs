@@ -105,7 +105,7 @@ fn ensembles(report: &mut Report) {
         report.check(good(&ended, 2), || format!("accuracy {wanted}: {ended:?}"));
         report.check(wanted > 0.0 || ended.is_err(), || format!("accuracy {wanted}: {ended:?}"));
     }
-    let observed = of(2).observe(Rows::every, |rows: Rows<'_, 1>| rows.rows.len());
+    let observed = of(2).observe(Rows::every, |rows: Rows<'_>| rows.rows.len());
     let mut seen = Vec::new();
     let tally = observed.run(until, |member, rows| seen.push((member.ending.is_ok(), rows.is_some())));
     report.check(tally.is_ok() && seen == [(false, false), (true, true)], || format!("observers: {seen:?}"));

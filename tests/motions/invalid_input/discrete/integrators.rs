@@ -74,7 +74,7 @@ fn integrators(report: &mut Report) {
         let info = by.info();
         let said = !info.name.is_empty() && info.order > 0 && info.cost_per_evaluation > 0;
         report.check(said && by.check(&CLAIMING).is_ok(), || format!("{info:?}"));
-        let driven = |mut stepper: Box<dyn Stepper<1>>| {
+        let driven = |mut stepper: Box<dyn Stepper>| {
             let _ = stepper.advance(3);
             (stepper.state(), stepper.time())
         };
@@ -185,7 +185,7 @@ fn resumed(report: &mut Report) {
         }
         // A state that is kept by hand in the middle of a run, and written to a path that does not exist.
         let mut kept = None;
-        let mut keep = Each(|at: &StepView<'_, 1>| {
+        let mut keep = Each(|at: &StepView<'_>| {
             if at.k == 3 {
                 kept = at.resume_state();
             }

@@ -56,7 +56,7 @@ pub const TESTS: &[InputTest] = &[
 
 fn rows(report: &mut Report) {
     let problem = tame();
-    report.check(Rows::<1>::every(0).is_err(), || "a row every 0 steps".into());
+    report.check(Rows::every(0).is_err(), || "a row every 0 steps".into());
     for (stride, expected) in [(1, 8), (7, 2), (usize::MAX, 2)] {
         let mut rows = Rows::every(stride).unwrap().without_action().with_velocity();
         let outcome = seven(&problem, None).observe(&mut rows).run(Until::Time(0.5));
@@ -79,7 +79,7 @@ fn rows(report: &mut Report) {
     }
     for value in EXTREME {
         // Times in order and inside of the span.
-        let two = Rows::<1>::at([0.1, value]);
+        let two = Rows::at([0.1, value]);
         report.check(two.is_ok() == value.is_finite(), || format!("rows at 0.1 and {value}"));
         for integrator in BY {
             if let Ok(mut two) = Rows::at([0.1, value]) {
@@ -103,7 +103,7 @@ fn rows(report: &mut Report) {
         report.check(handed_on && outcome.is_ok(), || format!("a column {value}: {:?}", columns.rows));
     }
     for bad in [&[0.1, 0.1][..], &[0.1, 0.3, 0.2], &[f64::NAN], &[0.1, f64::INFINITY]] {
-        let refused = Rows::<1>::at(bad.iter().copied()).err();
+        let refused = Rows::at(bad.iter().copied()).err();
         report.check(matches!(refused, Some(InputError::Times { .. })), || format!("{bad:?}: {refused:?}"));
     }
     let mut none = Rows::at([]).unwrap();
@@ -133,11 +133,11 @@ fn progress_and_quotients(report: &mut Report) {
         let good = if value.is_finite() && value != 0.0 { change == 0.0 } else { change.is_nan() };
         report.check(outcome.is_ok() && good, || format!("{value} over one changes by {change}"));
     }
-    report.check(Quotient::<1>::new(|_, _| 1.0, |_, _| 1.0).largest_change() == 0.0, || "of no run".into());
+    report.check(Quotient::new(|_, _| 1.0, |_, _| 1.0).largest_change() == 0.0, || "of no run".into());
 }
 
 /// A run of [`EVERYTHING`] by Gauss steps of a tenth with events, from t = 0.
-fn with_events(events: &mut Events<'_, 1>, until: Until) -> Result<Outcome<1>, InputError> {
+fn with_events(events: &mut Events<'_>, until: Until) -> Result<Outcome, InputError> {
     let problem = Problem::new(&EVERYTHING, 0.0, VelocityPoint::from(triples()[0]))?;
     problem.by(AnyIntegrator::Gauss { stages: 4 }).steps(Steps::Size(0.1)).observe(events).run(until)
 }
@@ -185,13 +185,13 @@ fn events(report: &mut Report) {
 }
 
 /// Ends the run at its start.
-struct AtTheStart(Stop<1>);
+struct AtTheStart(Stop);
 
-impl Observer<1> for AtTheStart {
-    fn start(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+impl Observer for AtTheStart {
+    fn start(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Break(self.0)
     }
-    fn step(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
     }
 }
@@ -199,11 +199,11 @@ impl Observer<1> for AtTheStart {
 /// Refuses every run.
 struct Refusing;
 
-impl Observer<1> for Refusing {
+impl Observer for Refusing {
     fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         Err(InputError::Times { index: 0, t: course.t_end })
     }
-    fn step(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
     }
 }
@@ -211,11 +211,11 @@ impl Observer<1> for Refusing {
 /// Requests this step, whatever step has been taken, and records the steps that it sees.
 struct AsksFor(usize, Vec<usize>);
 
-impl Observer<1> for AsksFor {
+impl Observer for AsksFor {
     fn next(&self, _taken: usize) -> usize {
         self.0
     }
-    fn step(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.1.push(at.k);
         ControlFlow::Continue(())
     }
@@ -265,7 +265,7 @@ fn moments(report: &mut Report) {
         for until in [0.5, -0.5] {
             let mut at_start = None;
             let mut seen = 0;
-            let mut look = Each(|at: &StepView<'_, 1>| {
+            let mut look = Each(|at: &StepView<'_>| {
                 report.entry_point(&at.t, at.velocity());
                 report.entry_point(&at.t, at.energy());
                 for value in EXTREME {
@@ -296,14 +296,14 @@ fn moments(report: &mut Report) {
 /// Records whether there is a last step, at the start and after all steps.
 struct Start<'k>(&'k mut Vec<(usize, bool)>);
 
-impl Observer<1> for Start<'_> {
+impl Observer for Start<'_> {
     fn next(&self, _taken: usize) -> usize {
         usize::MAX
     }
-    fn start(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.step(at)
     }
-    fn step(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0.push((at.k, at.last_step().is_some()));
         ControlFlow::Continue(())
     }

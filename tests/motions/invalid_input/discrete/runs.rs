@@ -98,7 +98,7 @@ pub fn tame() -> Problem<'static, One, 1> {
 }
 
 /// A run in seven steps.
-pub fn seven<'p, 'o>(problem: &'p Problem<'p, One, 1>, by: Option<AnyIntegrator>) -> Run<'p, 'o, One, 1> {
+pub fn seven<'p, 'o>(problem: &'p Problem<'p, One, 1>, by: Option<AnyIntegrator>) -> Run<'p, 'o, Problem<'p, One, 1>> {
     let run = problem.steps(Steps::Count(7));
     if let Some(by) = by { run.by(by) } else { run }
 }
@@ -106,7 +106,7 @@ pub fn seven<'p, 'o>(problem: &'p Problem<'p, One, 1>, by: Option<AnyIntegrator>
 /// All numbers of an outcome.
 type Ends = ((SVector<f64, 1>, SVector<f64, 1>), (Option<f64>, f64), (Option<SVector<f64, 1>>, Option<f64>));
 
-fn numbers(o: Outcome<1>) -> Ends {
+fn numbers(o: Outcome) -> Ends {
     ((o.q, o.p), (o.z, o.t), (o.v, o.log_factor))
 }
 

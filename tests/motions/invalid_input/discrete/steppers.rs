@@ -118,7 +118,7 @@ fn drifts(report: &mut Report) {
 }
 
 /// An entry point that makes a stepper: a start that is not finite is refused, and the states are finite.
-fn drive<S: Stepper<1>>(report: &mut Report, input: &(impl Numbers + std::fmt::Debug), made: Result<S, InputError>) {
+fn drive<S: Stepper>(report: &mut Report, input: &(impl Numbers + std::fmt::Debug), made: Result<S, InputError>) {
     let driven = made.map(|mut stepper| {
         let _ = stepper.advance(3);
         (stepper.state(), stepper.time(), if stepper.sigma() >= 0.0 { 0.0 } else { f64::NAN })
@@ -127,7 +127,7 @@ fn drive<S: Stepper<1>>(report: &mut Report, input: &(impl Numbers + std::fmt::D
 }
 
 /// The constructor of a stepper with invalid starts and steps.
-fn constructor<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<1>) -> Result<S, InputError>) {
+fn constructor<S: Stepper>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<1>) -> Result<S, InputError>) {
     for (t, x) in starts() {
         drive(report, &(t, x), make(0.1, t, x));
     }
@@ -203,7 +203,7 @@ fn steppers(report: &mut Report) {
     let start: PhasePoint<1> = triples()[0].into();
     let gauss = Gauss::new(EVERYTHING, 4, 0.1).unwrap();
     let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
-    let steppers: [Box<dyn Stepper<1> + '_>; 4] = [
+    let steppers: [Box<dyn Stepper + '_>; 4] = [
         Box::new(gauss.stepper(0.0, start, start.p).unwrap()),
         Box::new(Flow::new(&ld, 0.0, start).unwrap()),
         Box::new(Splitting::new(&CLAIMING, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),

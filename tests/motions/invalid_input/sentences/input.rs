@@ -104,7 +104,7 @@ fn spring() -> Quadratic<1> {
 /// An integrator with the required functions alone.
 struct Minimal;
 
-struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
+struct Bare<'a>(Box<dyn Stepper + 'a>);
 
 impl<'a> Integrator<'a, One, 1> for Minimal {
     fn info(&self) -> MethodInfo {
@@ -118,12 +118,12 @@ impl<'a> Integrator<'a, One, 1> for Minimal {
         problem: &Problem<'a, One, 1>,
         h: f64,
         options: StepperOptions,
-    ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, options)?)))
     }
 }
 
-impl Stepper<1> for Bare<'_> {
+impl Stepper for Bare<'_> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.0.advance(steps)
     }
@@ -191,7 +191,7 @@ fn input_errors() {
             gauss.transformed_stepper(0.0, start, start.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Rule::MIDPOINT.of(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
-        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the number of steps between two rows", "is 0", "at least 1"];
+        InputError::Count { .. } => Rows::every(0).err().unwrap(), ["the number of steps between two rows", "is 0", "at least 1"];
         InputError::PathLength { .. } => {
             let ends = [End::Position([0.0].into()), End::Free];
             let path = DiscretePath::new(vec![[0.0].into(); 3]).unwrap();

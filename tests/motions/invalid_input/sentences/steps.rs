@@ -215,7 +215,7 @@ fn statuses() {
         }, ["failed in step", "at t = ", "without bound"];
     });
     // The ways in which a run with events ends; events that were found before are kept.
-    let run = |event: Event<'_, 1>, steps| {
+    let run = |event: Event<'_>, steps| {
         let mut events = Events::new([event]);
         let run = blows_up.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(0.1)).observe(&mut events);
         (run.run(Until::Steps(steps)).unwrap().status, events.crossings.len())

@@ -7,11 +7,12 @@ use crate::gauss::curve::Curve;
 use crate::gauss::curve::between::Between;
 use crate::gauss::curve::comparison::Compare;
 use crate::gauss::resolution::defect_sample::DefectSample;
-use crate::gauss::system::Typed;
+use crate::gauss::system::{ByPoints, Typed};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{MAX_STAGES, Stages, blocks};
+use crate::{Point, System};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, vector};
 use pulp::{Simd, WithSimd};
@@ -27,6 +28,14 @@ impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
         let mut sample = Sample::of(arch, curve, set);
         arch.dispatch(Evaluate::<L, N> { lagrangian: self.0, transformed, curve, sample: &mut sample });
         arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: L::HINTS.hamiltonian, set })
+    }
+}
+
+impl SampleKernel for ByPoints<'_> {
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
+        let mut sample = Sample::of(arch, curve, set);
+        sample.evaluate(&*self.0, curve);
+        arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, set })
     }
 }
 
@@ -74,6 +83,23 @@ impl Sample {
         };
         arch.dispatch(Interpolate { curve, sample: &mut sample });
         sample
+    }
+
+    /// Evaluates L and its gradient at one point after another; the values at the last one are repeated in the padding.
+    fn evaluate(&mut self, system: &dyn System, curve: &Curve) {
+        let Sample { between, v, q, z, value, force, momentum, slope, .. } = self;
+        for i in 0..curve.s {
+            let of = |stages: &[Stages]| stages.iter().map(|x| x.0[i]).collect();
+            let (t, x) = (between.points.0[i] * curve.h + curve.t, Point { q: of(q), v: of(v), z: z.0[i] });
+            let (l, g) = (system.value(t, &x), system.gradient(t, &x));
+            let set = |to: &mut Stages, x: f64| to.0[i..if i + 1 == curve.s { MAX_STAGES } else { i + 1 }].fill(x);
+            set(value, l);
+            set(slope, g.z);
+            for d in 0..g.x.len() {
+                set(&mut force[d], g.x[d]);
+                set(&mut momentum[d], g.y[d]);
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ mod step;
 
 use crate::StepError;
 use crate::gauss::curve::Curve;
-use crate::gauss::dense::{Solved, SolvedStep, StartValues};
+use crate::gauss::dense::{Solved, SolvedStep, StepStart};
 use crate::gauss::resolution::defect_sample::SAMPLE_SETS;
 use crate::gauss::routes::linear::coefficients::{LinearStages, StepMap};
 use crate::gauss::routes::linear::step::Advance;
@@ -38,7 +38,7 @@ pub(crate) struct Linear {
     /// q and v of a trial, and those at the start of its last step; for many coordinates.
     trial: [Vec<CompensatedSum>; 4],
     /// The start of a step that is taken alone.
-    start: StartValues,
+    start: StepStart,
 }
 
 impl Linear {
@@ -64,7 +64,7 @@ impl Linear {
             v: sums(start.v),
             z: start.z.into(),
             trial: [trial(), trial(), trial(), trial()],
-            start: StartValues::zeros(start.q.len()),
+            start: StepStart::zeros(start.q.len()),
         })
     }
 
@@ -73,7 +73,7 @@ impl Linear {
     ///
     /// The state is checked at the end of all steps; only if it is not finite they are repeated from the start with a
     /// check after each step.
-    fn advance(&mut self, steps: usize, last: &mut StartValues) -> usize {
+    fn advance(&mut self, steps: usize, last: &mut StepStart) -> usize {
         if self.try_steps(steps, last) {
             return steps;
         }
@@ -82,7 +82,7 @@ impl Linear {
 
     /// Takes steps and writes the start of the last one; `false`, without a change of the state, if its end is not
     /// finite.
-    fn try_steps(&mut self, steps: usize, last: &mut StartValues) -> bool {
+    fn try_steps(&mut self, steps: usize, last: &mut StepStart) -> bool {
         let Linear { arch, map, q, v, z, trial, .. } = self;
         arch.dispatch(Advance { map, q, v, z, trial, last, steps })
     }
@@ -105,7 +105,7 @@ impl Linear {
 
     /// Computes the accelerations and the positions of the stages of a step.
     fn set_stages(&self, step: &SolvedStep<'_>, a: &mut [Stages], positions: &mut [Stages]) {
-        let StartValues { q, y: v, .. } = step.from;
+        let StepStart { q, y: v, .. } = step.from;
         let (n, s, table) = (q.len(), self.table.s, &self.table);
         for (d, a) in a.iter_mut().enumerate() {
             for i in 0..s {
@@ -149,7 +149,7 @@ impl StageRoute for Linear {
         if finite { IterationOutcome::Done } else { IterationOutcome::NonFinite }
     }
 
-    fn take_steps(&mut self, steps: usize, last: &mut StartValues) -> Option<usize> {
+    fn take_steps(&mut self, steps: usize, last: &mut StepStart) -> Option<usize> {
         Some(self.advance(steps, last))
     }
 

@@ -8,7 +8,7 @@ pub(crate) mod transformed;
 
 use crate::StepError;
 use crate::gauss::curve::Curve;
-use crate::gauss::dense::{Solved, SolvedStep, StartValues};
+use crate::gauss::dense::{Solved, SolvedStep, StepStart};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::work_summary::GaussRoute;
@@ -53,7 +53,7 @@ pub(crate) trait StageRoute: Saved {
 
     /// Takes a number of steps at once, if the route can: the number of steps taken, which is smaller if the state is no
     /// longer finite; the start of the last one is written.
-    fn take_steps(&mut self, _steps: usize, _last: &mut StartValues) -> Option<usize> {
+    fn take_steps(&mut self, _steps: usize, _last: &mut StepStart) -> Option<usize> {
         None
     }
 

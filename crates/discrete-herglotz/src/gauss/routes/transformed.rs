@@ -2,14 +2,13 @@
 
 use crate::gauss::checks::check_step;
 use crate::gauss::curve::Curve;
-use crate::gauss::curve::SampleKernel;
 use crate::gauss::initial_mass::InitialMass;
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::general::{Extension, General, GeneralKernel, InTransformedTime, Values};
 use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
-use crate::gauss::system::{PointRef, SystemAtPoints, Typed, vector_of};
+use crate::gauss::system::{CollocationSystem, PointRef, Typed};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
 use crate::integration::check_unforced;
@@ -18,9 +17,9 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::{InputError, PlanEntry, Problem, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint};
+use crate::solve::ITERATION_LIMIT;
+use crate::{InputError, PlanEntry, Problem, State, StepError, StepFailure, Stepper, UnresolvedStep, Vector};
+use contact_geom::{Lagrangian, Structure};
 
 /// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of the
 /// time transformation of the Lagrangian, `dt = g(q) dtau` ([`Lagrangian::dt_dtau`]).
@@ -40,8 +39,10 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// [`StepError::NotConverged`].
 ///
 /// A run by [`TransformedGauss`](crate::TransformedGauss) uses it.
-pub struct TransformedStepper<'a, L, const N: usize> {
-    lagrangian: &'a L,
+pub struct TransformedStepper<'a> {
+    system: Box<dyn CollocationSystem + 'a>,
+    kernel: Box<dyn GeneralKernel + 'a>,
+    structure: Structure,
     run: Run,
 }
 
@@ -60,31 +61,22 @@ struct Run {
 /// A system with the kernel of its steps in transformed time.
 #[derive(Clone, Copy)]
 struct Evaluated<'r> {
-    system: &'r dyn SystemAtPoints,
+    system: &'r dyn CollocationSystem,
     kernel: &'r dyn GeneralKernel,
 }
 
-/// Calls a method of the run with the system and the kernel of the Lagrangian as the first argument.
-macro_rules! of_run {
-    ($stepper:ident.$method:ident($($argument:expr),*)) => {
-        $stepper.run.$method(
-            Evaluated {
-                system: &Typed::<L, N>($stepper.lagrangian),
-                kernel: &InTransformedTime::<L, N>($stepper.lagrangian),
-            },
-            $($argument),*
-        )
-    };
-}
-
-impl<'a, L: Lagrangian<N>, const N: usize> TransformedStepper<'a, L, N> {
+impl<'a> TransformedStepper<'a> {
     /// A stepper at the start of a problem with `stages` from 1 to 16 and steps of length `h` in tau.
     ///
     /// # Errors
     /// [`InputError::Stages`], [`InputError::Step`]; [`InputError::Unclaimed`] if the Lagrangian does not claim that it
     /// is autonomous; [`InputError::TimeTransformation`] if the rate dt/dtau at the start is not positive and finite;
     /// [`InputError::FirstStep`] if the mass matrix or the energy at the start is not regular or not finite.
-    pub fn new(problem: &Problem<'a, L, N>, stages: usize, h: f64) -> Result<Self, InputError> {
+    pub fn new<L: Lagrangian<N>, const N: usize>(
+        problem: &Problem<'a, L, N>,
+        stages: usize,
+        h: f64,
+    ) -> Result<Self, InputError> {
         check_step(stages, h)?;
         check_unforced(problem.lagrangian, "collocation in transformed time")?;
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
@@ -101,14 +93,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> TransformedStepper<'a, L, N> {
         if !energy.is_finite() {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
-        let mass = Mass::new(&structure, inverse);
+        let mass = Mass::new(&structure, inverse, false);
         let from = PointRef { q: state.q.as_slice(), v: state.p.as_slice(), z: state.z };
         let extension = (Extension::new(t0, -energy), true);
         let general =
             Box::new(General::new(extension, StageTable::new(stages, h), mass, false, from, start.v.as_slice()));
         let from = general.values();
         let run = Run { general, h, tau: 0.0, taken: 0, from, knows_from: false, unresolved: None };
-        Ok(TransformedStepper { lagrangian, run })
+        let (system, kernel) = (Box::new(Typed(lagrangian)), Box::new(InTransformedTime(lagrangian)));
+        Ok(TransformedStepper { system, kernel, structure, run })
     }
 
     /// The momentum `p_t` conjugate to t. Up to the error of the method it is minus the energy, `E + p_t = K / g`. Each
@@ -134,9 +127,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> TransformedStepper<'a, L, N> {
     /// The largest defect of the last step over a number of sets of sample points between its nodes. `None` if the
     /// start of the last step is not known.
     pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
-        let system = Typed::<L, N>(self.lagrangian);
-        let curve = self.run.curve(&system)?;
-        let at = |set| system.sample_defect(Instructions::new(), &curve, true, set);
+        let curve = self.run.curve(&*self.system)?;
+        let at = |set| self.system.sample_defect(Instructions::new(), &curve, true, set);
         (0..sets).map(at).reduce(DefectSample::and)
     }
 }
@@ -148,7 +140,7 @@ impl Run {
     }
 
     /// The last step as a curve, if its start is known.
-    fn curve(&self, system: &dyn SystemAtPoints) -> Option<Curve> {
+    fn curve(&self, system: &dyn CollocationSystem) -> Option<Curve> {
         if !self.knows_from {
             return None;
         }
@@ -295,23 +287,25 @@ impl Run {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, N> {
+impl Stepper for TransformedStepper<'_> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
-        of_run!(self.advance(steps))
+        let with = Evaluated { system: &*self.system, kernel: &*self.kernel };
+        self.run.advance(with, steps)
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        self.run.general.last_velocity().map(vector_of)
+    fn last_velocity(&self) -> Option<Vector> {
+        self.run.general.last_velocity().map(Vector::from)
     }
 
     fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
-        of_run!(self.advance_until(steps, t_end))
+        let with = Evaluated { system: &*self.system, kernel: &*self.kernel };
+        self.run.advance_until(with, steps, t_end)
     }
 
-    fn state(&self) -> PhasePoint<N> {
+    fn state(&self) -> State {
         let RouteState { q, y, z } = self.run.general.state();
-        let value = |x: &[CompensatedSum]| SVector::from_fn(|d, _| x[d].value);
-        PhasePoint { q: value(q), p: value(y), z: z.value }
+        let values = |of: &[CompensatedSum]| of.iter().map(|x| x.value).collect();
+        State { q: values(q), p: values(y), z: z.value }
     }
 
     fn time(&self) -> f64 {
@@ -327,7 +321,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, 
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary_in_transformed_time(&self.lagrangian.structure())
+        work_summary_in_transformed_time(&self.structure)
     }
 
     fn save(&self) -> Option<Vec<u64>> {

@@ -8,6 +8,7 @@ use crate::gauss::system::{PointRef, SystemAtPoints};
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
+use crate::solve::mass_matrix::MAX_BY_COLUMNS;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Structure, support::linear, vector};
 use pulp::Simd;
@@ -37,14 +38,16 @@ struct OneStage {
 }
 
 impl Mass {
-    /// Uses `W^-1` at the start of the run if it is constant.
-    pub fn new(structure: &Structure, inverse: DMatrix<f64>) -> Self {
+    /// Uses `W^-1` at the start of the run if it is constant; `by_points` states that the system is evaluated at one point
+    /// at a time.
+    pub fn new(structure: &Structure, inverse: DMatrix<f64>, by_points: bool) -> Self {
         if structure.constant_mass || structure.separable {
             return Mass::Constant(inverse);
         }
         let n = inverse.nrows();
         let zeros = || DMatrix::zeros(n, n);
-        let one = (n > MAX_DIMENSION_IN_LANES).then(|| OneStage { w: zeros(), copy: zeros(), inverse: zeros() });
+        let one =
+            (by_points || n > MAX_DIMENSION_IN_LANES).then(|| OneStage { w: zeros(), copy: zeros(), inverse: zeros() });
         Mass::Stages(Box::new(StageInverses { rows: vec![Stages::ZERO; n * n], one }))
     }
 
@@ -71,14 +74,21 @@ impl Mass {
         let Mass::Stages(stored) = self else { return true };
         let StageInverses { rows, one: Some(OneStage { w, copy, inverse }) } = &mut **stored else { return true };
         system.mass_matrix(t, x, w);
-        inverse.fill_with_identity();
-        for mut column in inverse.column_iter_mut() {
-            copy.copy_from(w);
-            if linear::solve(copy, &mut column).is_err() {
+        let n = w.nrows();
+        if n > MAX_BY_COLUMNS {
+            inverse.copy_from(w);
+            if !inverse.try_inverse_mut() {
                 return false;
             }
+        } else {
+            inverse.fill_with_identity();
+            for mut column in inverse.column_iter_mut() {
+                copy.copy_from(w);
+                if linear::solve(copy, &mut column).is_err() {
+                    return false;
+                }
+            }
         }
-        let n = w.nrows();
         for i in 0..n {
             for j in 0..n {
                 rows[i * n + j].0[stage..].fill(inverse[(i, j)]);
@@ -87,12 +97,17 @@ impl Mass {
         true
     }
 
-    /// `W^-1` as a kernel for N coordinates reads it.
+    /// Whether W is inverted at one stage after another.
+    pub fn is_inverted_by_stages(&self) -> bool {
+        matches!(self, Mass::Stages(stored) if stored.one.is_some())
+    }
+
+    /// `W^-1` as a kernel for n coordinates reads it.
     #[inline(always)]
-    pub fn inverse<const N: usize>(&self) -> InverseMass<'_> {
+    pub fn inverse(&self, n: usize) -> InverseMass<'_> {
         match self {
-            Mass::Constant(w) => InverseMass::Constant(&w.as_slice()[..N * N]),
-            Mass::Stages(stored) => InverseMass::Stages(&stored.rows[..N * N]),
+            Mass::Constant(w) => InverseMass::Constant(&w.as_slice()[..n * n]),
+            Mass::Stages(stored) => InverseMass::Stages(&stored.rows[..n * n]),
         }
     }
 }
@@ -107,12 +122,12 @@ pub(crate) enum InverseMass<'r> {
 }
 
 impl InverseMass<'_> {
-    /// An entry at a block of stages.
+    /// An entry, for n coordinates, at a block of stages.
     #[inline(always)]
-    pub fn entry<S: Simd, const N: usize>(&self, i: usize, j: usize, r: usize) -> Lanes<S> {
+    pub fn entry<S: Simd>(&self, n: usize, i: usize, j: usize, r: usize) -> Lanes<S> {
         match self {
-            InverseMass::Constant(w) => Lanes::splat(w[j * N + i]),
-            InverseMass::Stages(w) => w[i * N + j].block(r),
+            InverseMass::Constant(w) => Lanes::splat(w[j * n + i]),
+            InverseMass::Stages(w) => w[i * n + j].block(r),
         }
     }
 }

@@ -5,7 +5,7 @@ mod retries;
 mod sequence;
 mod state_words;
 
-use crate::gauss::dense::{Solved, SolvedStep, StartValues};
+use crate::gauss::dense::{Solved, SolvedStep, StepStart};
 use crate::gauss::limits::FIRST_NEWTON_PAUSE;
 use crate::gauss::routes::{RouteState, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
@@ -37,8 +37,8 @@ pub(crate) struct Suspect {
     pub is_new: bool,
     pub step: usize,
     pub t: f64,
-    pub from: StartValues,
-    pub to: StartValues,
+    pub from: StepStart,
+    pub to: StepStart,
 }
 
 /// A motion by collocation: the route with its state, and the selection of the method of solution. The system is the same
@@ -59,7 +59,7 @@ pub(crate) struct GaussSteps {
     pub t0: f64,
     pub k: usize,
     /// The state at the start of the last step.
-    from: StartValues,
+    from: StepStart,
     /// Whether the stages of the last step are in the route's workspace.
     solved: bool,
     /// Whether the Newton methods may be used.
@@ -79,7 +79,7 @@ pub(crate) struct GaussSteps {
     monitor: StepMonitor,
     pub suspect: Suspect,
     /// The end of the last step; a velocity, momenta and a gradient.
-    end: StartValues,
+    end: StepStart,
     v: Vec<f64>,
     p: Vec<f64>,
     gradient: PointGradient,
@@ -104,8 +104,8 @@ pub(crate) struct Setup<'r> {
 
 impl GaussSteps {
     pub fn new(Setup { s, h, t0, route, mass, of_sigma, q, v, check_resolution }: Setup<'_>) -> Self {
-        let zeros = || StartValues::zeros(q.len());
-        let start = StartValues { q: q.to_vec(), ..zeros() };
+        let zeros = || StepStart::zeros(q.len());
+        let start = StepStart { q: q.into(), ..zeros() };
         GaussSteps {
             s,
             h,
@@ -151,7 +151,7 @@ impl GaussSteps {
         system: &dyn CollocationSystem,
         wants_l: bool,
         to: Solved<'_>,
-    ) -> Option<(bool, f64, &StartValues)> {
+    ) -> Option<(bool, f64, &StepStart)> {
         let step = self.last_step()?;
         Some((self.route.solved(system, &step, wants_l, to), step.t, &self.from))
     }
@@ -254,7 +254,7 @@ impl GaussSteps {
 }
 
 /// The state in the variables of a route.
-fn copy_state(route: &dyn StageRoute, to: &mut StartValues) {
+fn copy_state(route: &dyn StageRoute, to: &mut StepStart) {
     let RouteState { q, y, z } = route.state();
     copy_values(q, &mut to.q);
     copy_values(y, &mut to.y);

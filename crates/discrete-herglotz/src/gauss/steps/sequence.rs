@@ -1,13 +1,14 @@
 //! The mean velocities of the last steps, from which it is judged whether steps of few stages resolve the motion.
 
-use crate::gauss::dense::StartValues;
+use crate::Vector;
+use crate::gauss::dense::StepStart;
 use crate::numbers::state_words::saved;
 
 /// The mean velocities of the last four steps, the last position, and the states after the last two steps.
 pub(crate) struct Sequence {
     pub velocities: [Vec<f64>; 4],
-    pub q: Vec<f64>,
-    pub ends: [StartValues; 2],
+    pub q: Vector,
+    pub ends: [StepStart; 2],
     /// The last two second differences of the velocities, the older one first.
     pub turns: [Vec<f64>; 2],
     /// The last one again, with another order of the sums.
@@ -16,7 +17,7 @@ pub(crate) struct Sequence {
 
 impl Sequence {
     /// The sequence before the first step.
-    pub fn new(start: &StartValues) -> Self {
+    pub fn new(start: &StepStart) -> Self {
         let zeros = || vec![0.0; start.q.len()];
         Sequence {
             velocities: [zeros(), zeros(), zeros(), zeros()],
@@ -48,7 +49,7 @@ impl Sequence {
     }
 
     /// Adds the state at the end of a step.
-    pub fn keep(&mut self, end: &StartValues) {
+    pub fn keep(&mut self, end: &StepStart) {
         self.ends.swap(0, 1);
         self.ends[1].copy_from(end);
     }

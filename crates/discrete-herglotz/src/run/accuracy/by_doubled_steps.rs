@@ -16,10 +16,10 @@ use crate::{InputError, SelectionFailure};
 /// The steps of an integrator for the requested error, without a reference: three runs, each with twice as many steps as
 /// the one before, must agree better and better, at least as with half the order of the method. The distance of two runs
 /// is then the error of the coarser one.
-pub(crate) fn by_doubled_steps<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-    integrator: &SharedIntegrator<'p, N>,
-) -> Result<StepSelection<'p, N>, InputError> {
+pub(crate) fn by_doubled_steps<'p>(
+    trials: &mut TrialRuns<'_, 'p>,
+    integrator: &SharedIntegrator<'p>,
+) -> Result<StepSelection<'p>, InputError> {
     let (wanted, order, grid) =
         (trials.wanted, f64::from(integrator.info().order), ComparisonGrid::equal(COMPARED_PARTS));
     // Half the order, so that the start of the asymptotic range is not missed.
@@ -33,7 +33,7 @@ pub(crate) fn by_doubled_steps<'p, const N: usize>(
         ended: None,
     };
     let mut count = grid.whole(first_guess(trials.request, DEFAULT_STAGES, wanted) as f64);
-    let (mut known, mut before, mut best, mut stagnations): (Option<Track<N>>, _, _, _) =
+    let (mut known, mut before, mut best, mut stagnations): (Option<Track>, _, _, _) =
         (None, f64::INFINITY, f64::INFINITY, 0);
     let mut cause = SelectionFailure::Budget;
     for _ in 0..MAX_ITERATIONS {

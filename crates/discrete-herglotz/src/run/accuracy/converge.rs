@@ -19,7 +19,7 @@ use crate::{InputError, SelectionFailure};
 use contact_geom::numbers::max_or_nan;
 
 /// A motion on which runs with k and 2k steps agree.
-pub(crate) struct Converged<const N: usize> {
+pub(crate) struct Converged {
     pub k: usize,
     /// The error of the run with k steps, and the predicted error of the run with 2k steps.
     pub errors: [f64; 2],
@@ -30,7 +30,7 @@ pub(crate) struct Converged<const N: usize> {
     /// Whether the run with 2k steps costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
-    pub reference: Track<N>,
+    pub reference: Track,
     pub grid: ComparisonGrid,
     /// Whether the search found a narrow feature, or defects that do not decrease like those of a smooth motion: the
     /// errors of other numbers of steps cannot be predicted.
@@ -74,13 +74,13 @@ pub(crate) enum Compared {
 
 /// The selection of a number of steps that fill the span; in transformed time their number is computed from the span of
 /// tau.
-pub(crate) fn selected<'p, const N: usize>(
-    trials: &TrialRuns<'_, 'p, N>,
-    integrator: &SharedIntegrator<'p, N>,
+pub(crate) fn selected<'p>(
+    trials: &TrialRuns<'_, 'p>,
+    integrator: &SharedIntegrator<'p>,
     count: usize,
     error: f64,
-    found: &Converged<N>,
-) -> StepSelection<'p, N> {
+    found: &Converged,
+) -> StepSelection<'p> {
     let (h, integrator, error) = (trials.step(count, &found.grid), integrator.clone(), Some(error));
     if let ComparisonGrid::Times = found.grid {
         // The last step is about half as long as the others, so that round-off does not add a step.
@@ -97,12 +97,12 @@ pub(crate) fn selected<'p, const N: usize>(
 }
 
 /// Refines the steps until two runs agree.
-pub(crate) fn converge<const N: usize>(
-    trials: &mut TrialRuns<'_, '_, N>,
+pub(crate) fn converge(
+    trials: &mut TrialRuns<'_, '_>,
     stages: usize,
     goal: f64,
     compared: Compared,
-) -> Result<Converged<N>, Ended> {
+) -> Result<Converged, Ended> {
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let failed = |reached, cause| InputError::Accuracy { wanted, reached, cause };
     let s = stages as f64;
@@ -118,7 +118,7 @@ pub(crate) fn converge<const N: usize>(
     // The smallest distance of two runs, regardless of a third one; and the reason why they do not agree.
     let (mut nearest, mut cause) = (f64::INFINITY, SelectionFailure::Budget);
     // The finer of the last two runs, and their distance.
-    let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
+    let (mut known, mut before): (Option<Track>, f64) = (None, f64::NAN);
     let (mut predicted, mut irregular) = (false, false);
     'search: for _ in 0..MAX_ITERATIONS {
         if 2.0 * k as f64 > MAX_STEPS {
@@ -253,16 +253,16 @@ pub(crate) fn converge<const N: usize>(
 /// The distance between the end of a run with k + 1 steps and that of two runs that agree, if it is too large. The
 /// nodes of both of these lie on the ends of the k steps, and so on any kink or pulse that begins at one of them.
 /// `None` if the third run agrees too, or if no feature can be hidden: kinks of a formula that is proved end steps.
-pub(crate) fn disagreement_of_other_nodes<const N: usize>(
-    trials: &mut TrialRuns<'_, '_, N>,
+pub(crate) fn disagreement_of_other_nodes(
+    trials: &mut TrialRuns<'_, '_>,
     stages: usize,
     k: usize,
     compared: Compared,
     goal: f64,
-    fine: &Track<N>,
+    fine: &Track,
 ) -> Result<Option<f64>, InputError> {
     let structure = &trials.request.problem.structure;
-    if trials.request.problem.lagrangian.hints().proved
+    if trials.request.problem.system.hints().proved
         || matches!(compared, Compared::Times)
         || structure.quadratic && structure.autonomous
     {

@@ -18,16 +18,14 @@ use contact_geom::numbers::max_or_nan;
 /// Selects steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most the
 /// requested error: a division and one with parts of half the size must agree. The error of a part is about the square
 /// of its defect, and halving a part divides its defect by `2^s`.
-pub(crate) fn divided_steps<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-) -> Result<StepSelection<'p, N>, InputError> {
+pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let finer = f64::powi(0.5, DIVIDED_STAGES as i32);
     let count = first_guess(trials.request, DIVIDED_STAGES, wanted).clamp(DIVIDED_STEPS[0], DIVIDED_STEPS[1]);
     let grid = ComparisonGrid::of(count);
     let mut max_defect = (PART_DEFECT_PER_ROOT * wanted.sqrt()).min(MAX_PART_DEFECT);
     let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, SelectionFailure::Budget);
-    let mut coarse: Option<Track<N>> = None;
+    let mut coarse: Option<Track> = None;
     for _ in 0..MAX_DIVISIONS {
         let integrator = DividedGauss { stages: DIVIDED_STAGES, max_defect };
         let mut track =

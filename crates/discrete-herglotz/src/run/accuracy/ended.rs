@@ -15,8 +15,8 @@ const SPENT: &str = "the budget of the search";
 /// Ends a search whose evaluations exceed its budget.
 struct Budget;
 
-impl<const N: usize> Observer<N> for Budget {
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+impl Observer for Budget {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         match at.stepper.evaluations() {
             spent if spent > EVENT_SEARCH_BUDGET => ControlFlow::Break(Stop::here(SPENT)),
             _ => ControlFlow::Continue(()),
@@ -24,13 +24,13 @@ impl<const N: usize> Observer<N> for Budget {
     }
 }
 
-impl<'p, const N: usize> Request<'p, N> {
+impl<'p> Request<'p> {
     /// The approximate time at which an observer ends the run; `None` if none ends it within the budget.
-    pub(crate) fn time_of_end(&self, collocation: Collocation<'p, N>, terminal: Terminal<'_, N>) -> Option<f64> {
+    pub(crate) fn time_of_end(&self, collocation: &Collocation<'p>, terminal: Terminal<'_>) -> Option<f64> {
         if self.is_constrained() {
             return None;
         }
-        let request = Request { integrator: None, needs: terminal.needs(), ..*self };
+        let request = Request { integrator: None, needs: terminal.needs(), ..self.clone() };
         let count = first_guess(self, EVENT_SEARCH.stages, EVENT_SEARCH_ERROR).max(MIN_EVENT_SEARCH_STEPS);
         let h = self.span / count as f64;
         let selection = StepSelection {
@@ -49,7 +49,7 @@ impl<'p, const N: usize> Request<'p, N> {
     }
 }
 
-impl<'p, const N: usize> StepSelection<'p, N> {
+impl<'p> StepSelection<'p> {
     /// The same steps over a multiple of the span; an observer is expected to end the run after the original number of
     /// steps.
     pub(crate) fn extended_by(self, factor: f64) -> Self {

@@ -1,10 +1,8 @@
 //! The motion that round-off maintains at an equilibrium.
 
-use crate::System;
 use crate::run::request::Request;
-use crate::theory::legendre_inverse;
-use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
+use crate::{Point, State, System, Vector};
+use contact_geom::numbers::max_abs_or_nan;
 
 /// The displacement of a motion at an equilibrium by the round-off of its forces alone. Forces that cancel there have
 /// the round-off of the terms that cancel, as in `1 - exp(-x)` near `x = 0`: a decaying motion does not become smaller
@@ -22,7 +20,7 @@ pub(crate) struct EquilibriumRoundOff {
 
 impl EquilibriumRoundOff {
     /// The round-off at a point.
-    pub fn at<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Self {
+    pub fn at(system: &dyn System, t: f64, x: &Point) -> Self {
         if system.hints().hamiltonian {
             // The stiffness is that of L, which need not exist.
             return EquilibriumRoundOff { displacement: 0.0, force: 0.0, energy: 0.0 };
@@ -30,7 +28,7 @@ impl EquilibriumRoundOff {
         let (_, of_gradient) = system.rounding(t, x);
         let h = system.hessian(t, x);
         let (mut squares, mut energy) = (0.0, 0.0);
-        for i in 0..N {
+        for i in 0..system.dimension() {
             let (force, stiffness, mass) = (of_gradient.x[i], h.qq[(i, i)].abs(), h.vv[(i, i)].abs());
             // Without stiffness or mass the displacement is undefined.
             if stiffness > 0.0 && mass > 0.0 {
@@ -53,13 +51,13 @@ pub(crate) fn accumulated_roundings(steps: usize) -> f64 {
     (64.0 + steps as f64).sqrt() * 8.0
 }
 
-impl<const N: usize> Request<'_, N> {
+impl Request<'_> {
     /// The round-off at a state of the motion.
     #[cold]
     #[inline(never)]
-    pub(crate) fn equilibrium_round_off(&self, t: f64, state: &PhasePoint<N>) -> EquilibriumRoundOff {
-        let lagrangian = self.problem.lagrangian;
-        let still = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        EquilibriumRoundOff::at(lagrangian, t, &legendre_inverse(lagrangian, t, state, &still.v).unwrap_or(still))
+    pub(crate) fn equilibrium_round_off(&self, t: f64, state: &State) -> EquilibriumRoundOff {
+        let system = &*self.problem.system;
+        let still = Point { q: state.q.clone(), v: Vector::zeros(system.dimension()), z: state.z };
+        EquilibriumRoundOff::at(system, t, &system.legendre_inverse(t, state, &still.v).unwrap_or(still))
     }
 }

@@ -10,9 +10,10 @@ pub(crate) struct EvaluationCost {
 }
 
 impl EvaluationCost {
-    pub fn of<const N: usize>(stages: usize) -> Self {
-        let (unknowns, stages) = ((stages * (N + 2)) as u64, stages as u64);
+    /// The cost for this number of stages, in n coordinates.
+    pub fn of(stages: usize, n: usize) -> Self {
+        let (unknowns, stages) = ((stages * (n + 2)) as u64, stages as u64);
         // An evaluation takes as long as about 32 products; second derivatives are not computed in SIMD lanes.
-        EvaluationCost { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * N as u64 + 1)), sample: 2 * stages }
+        EvaluationCost { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * n as u64 + 1)), sample: 2 * stages }
     }
 }

@@ -1,27 +1,29 @@
 //! The number of steps with which the search for an accuracy starts.
 
-use crate::Problem;
+use crate::integration::SystemProblem;
 use crate::run::accuracy::limits::MAX_FIRST_GUESS;
+use crate::run::accuracy::matrices::{frobenius_norm, product};
 use crate::run::request::Request;
-use crate::solve::mass_matrix::inverted;
-use contact_geom::nalgebra::SMatrix;
+use crate::solve::mass_matrix::inverse;
+use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::max_or_nan;
 use std::f64::consts::PI;
 
 /// The number of steps for which the motion linearised at its start has a given error. It is too small if nonlinear
 /// terms lead to higher frequencies.
-pub(crate) fn first_guess<const N: usize>(request: &Request<'_, N>, stages: usize, goal: f64) -> usize {
-    let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
-    if lagrangian.hints().hamiltonian {
+pub(crate) fn first_guess(request: &Request<'_>, stages: usize, goal: f64) -> usize {
+    let Request { problem: SystemProblem { system, start, t0, .. }, span, .. } = request;
+    if system.hints().hamiltonian {
         let frequency = frequency_of_hamiltonian(request);
         let count = span.abs() * frequency / radians(stages, goal).min(stages as f64 / 3.0).min(1.0);
         return if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 };
     }
-    let h = lagrangian.hessian(*t0, start);
+    let h = system.hessian(*t0, start);
     // The frequencies of forces that depend on the position, and of forces that rotate the velocity like a magnetic
     // field.
-    let [of_position, turning] = inverted(&h.vv).map_or([0.0; 2], |inverse| {
-        [spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose()))]
+    let [of_position, turning] = inverse(&h.vv).map_or([0.0; 2], |inverse| {
+        let rotation = &h.qv - h.qv.transpose();
+        [spectral_radius(product(&inverse, &h.qq)).sqrt(), spectral_radius(product(&inverse, &rotation))]
     });
     let (s, radians) = (stages as f64, radians(stages, goal));
     // The fixed-point iteration for the velocity contracts by the angle of its rotation in a step.
@@ -42,26 +44,26 @@ fn radians(stages: usize, goal: f64) -> f64 {
 
 /// The largest frequency of the motion of a contact Hamiltonian, linearised at its start: the rates of `H_pq`, and the
 /// root of the product of `H_pp` and `H_qq`.
-fn frequency_of_hamiltonian<const N: usize>(request: &Request<'_, N>) -> f64 {
-    let Problem { lagrangian, state, t0, .. } = &request.problem;
-    let Some(h) = lagrangian.hamiltonian_hessian(*t0, state) else { return 0.0 };
-    let rate = lagrangian.hamiltonian_with_gradient(*t0, state).map_or(0.0, |(_, d)| d.z.abs());
-    let of_position = spectral_radius(h.vv * h.qq).sqrt();
+fn frequency_of_hamiltonian(request: &Request<'_>) -> f64 {
+    let SystemProblem { system, state, t0, .. } = &request.problem;
+    let Some(h) = system.hamiltonian_hessian(*t0, state) else { return 0.0 };
+    let rate = system.hamiltonian_with_gradient(*t0, state).map_or(0.0, |(_, d)| d.z.abs());
+    let of_position = spectral_radius(product(&h.vv, &h.qq)).sqrt();
     max_or_nan(max_or_nan(of_position, spectral_radius(h.qv)), rate)
 }
 
 /// The largest absolute eigenvalue, estimated from the norm of the eighth power: too large by at most a factor
-/// `N^(1/16)` for a symmetric matrix. Not finite if the matrix is not.
-fn spectral_radius<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
+/// `n^(1/16)` for a symmetric matrix. Not finite if the matrix is not.
+fn spectral_radius(matrix: DMatrix<f64>) -> f64 {
     let (mut power, mut logarithm) = (matrix, 0.0);
     for squared in 0..=3 {
-        let norm = power.norm();
+        let norm = frobenius_norm(&power);
         if norm == 0.0 || !norm.is_finite() {
             return norm;
         }
         logarithm += norm.ln() / f64::from(1 << squared);
         power /= norm;
-        power *= power;
+        power = product(&power, &power);
     }
     logarithm.exp()
 }

@@ -12,6 +12,7 @@ mod evaluation_cost;
 mod failure;
 mod first_guess;
 pub(crate) mod limits;
+mod matrices;
 mod reference;
 mod rest;
 mod select;

@@ -13,11 +13,11 @@ use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
 
 /// The steps of any integrator for the requested error, from runs that are compared with the reference.
-pub(crate) fn by_reference<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-    integrator: &SharedIntegrator<'p, N>,
-    found: &Converged<N>,
-) -> Result<StepSelection<'p, N>, InputError> {
+pub(crate) fn by_reference<'p>(
+    trials: &mut TrialRuns<'_, 'p>,
+    integrator: &SharedIntegrator<'p>,
+    found: &Converged,
+) -> Result<StepSelection<'p>, InputError> {
     let wanted = trials.wanted;
     let (order, grid) = (f64::from(integrator.info().order), &found.grid);
     let whole = |count: f64| grid.whole(count);

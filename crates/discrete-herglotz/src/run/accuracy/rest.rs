@@ -9,31 +9,31 @@ use crate::run::checks::rest::{is_at_rest, rests_at_the_origin, starts_at_rest};
 use crate::run::request::Request;
 use crate::switching::Collocation;
 
-impl<'p, const N: usize> Request<'p, N> {
+impl<'p> Request<'p> {
     /// The time at which the motion comes to rest, if it lies within the span; found with steps of eight stages, if the
     /// span is long enough for the decay.
     #[inline(never)]
-    pub(crate) fn time_of_rest(&self, collocation: Collocation<'p, N>) -> Option<f64> {
+    pub(crate) fn time_of_rest(&self, collocation: Collocation<'p>) -> Option<f64> {
         if self.is_constrained() {
             return None;
         }
-        let problem = self.problem;
-        let change = problem.lagrangian.gradient(problem.t0, &problem.start).z * self.span;
+        let problem = &self.problem;
+        let change = problem.system.gradient(problem.t0, &problem.start).z * self.span;
         // Written so that a NaN counts as no decrease.
         let decays = change < -MIN_DECAY_TO_REST;
-        if !decays || starts_at_rest(&problem) || !rests_at_the_origin(&problem, problem.start.z) {
+        if !decays || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
             return None;
         }
         let h = self.span / first_guess(self, DEFAULT_STAGES, REST_SEARCH_ERROR) as f64;
         let options = StepperOptions { action: self.needs.action, check_resolution: false };
-        let mut stepper = collocation.stepper(&problem, DEFAULT_STAGES, h, options).ok()?;
+        let mut stepper = collocation.stepper(problem, DEFAULT_STAGES, h, options).ok()?;
         for _ in 0..MAX_REST_SEARCH_STEPS / STEPS_BETWEEN_REST_CHECKS {
             stepper.advance(STEPS_BETWEEN_REST_CHECKS).ok()?;
             let t = stepper.time();
             if (t - problem.t0).abs() >= self.span.abs() {
                 return None;
             }
-            if is_at_rest(&problem, self.needs, t, &stepper.state()) {
+            if is_at_rest(problem, self.needs, t, &stepper.state()) {
                 return Some(t);
             }
         }

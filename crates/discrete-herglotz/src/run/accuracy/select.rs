@@ -22,9 +22,9 @@ use contact_geom::numbers::max_or_nan;
 
 /// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
 /// expensive, for many steps of few stages the number of steps.
-fn stages_along<const N: usize>(request: &Request<'_, N>, wanted: f64) -> usize {
+fn stages_along(request: &Request<'_>, wanted: f64) -> usize {
     let structure = &request.problem.structure;
-    let condensed = is_separable(request.problem.lagrangian, structure) && structure.has_constant_rate();
+    let condensed = is_separable(&*request.problem.system, structure) && structure.has_constant_rate();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
     if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MIN_STEPS_FOR_MAX_STAGES {
         MAX_STAGES
@@ -45,32 +45,30 @@ fn stages_along<const N: usize>(request: &Request<'_, N>, wanted: f64) -> usize 
 /// cost little. The error of a run of the integrator is then its distance from the reference.
 ///
 /// If `terminal` ends the run, all these runs end there.
-pub(crate) fn select_steps<'p, const N: usize>(
-    request: &Request<'p, N>,
+pub(crate) fn select_steps<'p>(
+    request: &Request<'p>,
     wanted: f64,
-    collocation: Collocation<'p, N>,
-    terminal: Option<Terminal<'_, N>>,
-) -> Result<StepSelection<'p, N>, InputError> {
+    collocation: Collocation<'p>,
+    terminal: Option<Terminal<'_>>,
+) -> Result<StepSelection<'p>, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    let select = |request: &Request<'p, N>| {
-        select_within_budget(&mut TrialRuns::new(request, wanted, collocation))
+    let select = |request: &Request<'p>| {
+        select_within_budget(&mut TrialRuns::new(request, wanted, collocation.clone()))
             .map_err(|refused| request.by_rounding_of_velocity(refused))
     };
-    let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(collocation, terminal)) else {
+    let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(&collocation, terminal)) else {
         return select(request);
     };
     // The motion after this end is not computed.
     let span = t_end - request.problem.t0;
-    let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
+    let part = Request { t_end, span, ..request.clone() };
     Ok(select(&part)?.extended_by(request.span / span))
 }
 
 /// The selection with a given budget.
-pub(crate) fn select_within_budget<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-) -> Result<StepSelection<'p, N>, InputError> {
+pub(crate) fn select_within_budget<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
     let wanted = trials.wanted;
     let Some(integrator) = trials.request.integrator.clone() else { return select_integrator(trials) };
     let info = integrator.info();
@@ -89,11 +87,9 @@ pub(crate) fn select_within_budget<'p, const N: usize>(
 }
 
 /// The selection if no integrator is given.
-fn select_integrator<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-) -> Result<StepSelection<'p, N>, InputError> {
-    let collocation = trials.collocation;
-    let hints = trials.request.problem.lagrangian.hints();
+fn select_integrator<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
+    let collocation = trials.collocation.clone();
+    let hints = trials.request.problem.system.hints();
     let divides = hints.proved || hints.switching_functions;
     let mut stages = stages_along(trials.request, trials.wanted);
     trials.tests_transformation = hints.time_transformation && trials.request.problem.structure.autonomous;
@@ -140,27 +136,27 @@ fn select_integrator<'p, const N: usize>(
 }
 
 /// The selection for Gauss collocation as its own reference, with equal steps.
-fn by_equal_steps<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-    integrator: &SharedIntegrator<'p, N>,
+fn by_equal_steps<'p>(
+    trials: &mut TrialRuns<'_, 'p>,
+    integrator: &SharedIntegrator<'p>,
     stages: usize,
-) -> Result<StepSelection<'p, N>, Ended> {
+) -> Result<StepSelection<'p>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Steps)?;
     // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
     // does not predict.
     let structure = &trials.request.problem.structure;
-    let longer = is_separable(trials.request.problem.lagrangian, structure) && structure.has_constant_rate();
+    let longer = is_separable(&*trials.request.problem.system, structure) && structure.has_constant_rate();
     let (count, error) = min_step_count(stages, wanted, &found, longer);
     Ok(selected(trials, integrator, count, error, &found))
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.
-fn in_transformed_time<'p, const N: usize>(
-    trials: &mut TrialRuns<'_, 'p, N>,
-    integrator: &SharedIntegrator<'p, N>,
+fn in_transformed_time<'p>(
+    trials: &mut TrialRuns<'_, 'p>,
+    integrator: &SharedIntegrator<'p>,
     stages: usize,
-) -> Result<StepSelection<'p, N>, Ended> {
+) -> Result<StepSelection<'p>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Times)?;
     let (count, error) = min_step_count(stages, wanted, &found, false);
@@ -168,7 +164,7 @@ fn in_transformed_time<'p, const N: usize>(
 }
 
 /// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict.
-fn min_step_count<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
+fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool) -> (usize, f64) {
     let Converged { k, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
     let (target, predicted) = (TARGET_ERROR * wanted, PREDICTED_ERROR * wanted);
     let steps =

@@ -7,12 +7,13 @@ use crate::run::accuracy::select::select_within_budget;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::Request;
 use crate::run::{OutputRequest, Until};
-use crate::switching::Collocation;
+use crate::switching::{Collocation, CollocationOf};
 use crate::test_lagrangians::{InPlane, OnLine, Unstated};
 use crate::{AnyIntegrator, Stepper, StepperOptions};
 use contact_examples::systems::{Duffing, Kepler, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// The integrator and the number of steps that are selected for a run, and the cost of the selection.
 fn search<L: Lagrangian<N>, const N: usize>(
@@ -21,7 +22,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
     stages: Option<usize>,
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
-    let collocation: Collocation<'_, N> = problem.lagrangian;
+    let collocation: Collocation<'_> = Arc::new(CollocationOf(problem.lagrangian));
     let request = Request {
         problem: problem.of_system(),
         t_end: span,

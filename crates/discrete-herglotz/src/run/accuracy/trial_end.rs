@@ -5,9 +5,9 @@ use crate::{InputError, StepError};
 
 /// The end of a trial run.
 #[derive(Clone, Debug)]
-pub(crate) enum TrialEnd<const N: usize> {
+pub(crate) enum TrialEnd {
     /// The run reached the end of the span.
-    Completed(Track<N>),
+    Completed(Track),
     /// A step does not resolve the motion, after this part of the span.
     Unresolved { part: f64 },
     /// The same, with the defect of a narrow feature.
@@ -34,7 +34,7 @@ pub(crate) enum SwitchReason {
     Divided,
 }
 
-impl<const N: usize> TrialEnd<N> {
+impl TrialEnd {
     /// Returns the end itself, or the error by which an interrupt ends the whole search.
     pub fn unless_interrupted(self) -> Result<Self, InputError> {
         if let TrialEnd::Interrupted = self { Err(InputError::Interrupted) } else { Ok(self) }

@@ -24,13 +24,13 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::{DividedGauss, has_switching_functions};
-use crate::{InputError, Interrupt, Problem, StepFailure, Stepper, StepperOptions};
+use crate::{InputError, Interrupt, StepFailure, Stepper, StepperOptions};
 use contact_geom::{Defect, numbers::max_or_nan};
 
 /// The trial runs of a request, with the rest of their budget.
-pub(crate) struct TrialRuns<'t, 'p, const N: usize> {
-    pub request: &'t Request<'p, N>,
-    pub collocation: Collocation<'p, N>,
+pub(crate) struct TrialRuns<'t, 'p> {
+    pub request: &'t Request<'p>,
+    pub collocation: Collocation<'p>,
     pub left: u64,
     /// The rest of the reserve for runs that are expected to reach their end.
     pub reserve: u64,
@@ -44,9 +44,9 @@ pub(crate) struct TrialRuns<'t, 'p, const N: usize> {
     pub tests_uneven_steps: bool,
 }
 
-impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
+impl<'t, 'p> TrialRuns<'t, 'p> {
     /// The trial runs of a request, with the whole budget.
-    pub fn new(request: &'t Request<'p, N>, wanted: f64, collocation: Collocation<'p, N>) -> Self {
+    pub fn new(request: &'t Request<'p>, wanted: f64, collocation: Collocation<'p>) -> Self {
         let (tests_transformation, tests_newton_steps, tests_uneven_steps) = (false, false, false);
         TrialRuns {
             request,
@@ -70,31 +70,32 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
         grid: &ComparisonGrid,
         closely: bool,
         narrow: bool,
-    ) -> Result<TrialEnd<N>, InputError> {
-        let (problem, h) = (self.request.problem, self.step(count, grid));
+    ) -> Result<TrialEnd, InputError> {
+        let (problem, h) = (&self.request.problem, self.step(count, grid));
         let points = if closely { MIN_SAMPLE_POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
-        let settings = TrialSettings { count, grid, points, narrow, costs: EvaluationCost::of::<N>(stages) };
-        let hints = problem.lagrangian.hints();
+        let costs = EvaluationCost::of(stages, problem.system.dimension());
+        let settings = TrialSettings { count, grid, points, narrow, costs };
+        let hints = problem.system.hints();
         if hints.time_transformation && matches!(grid, ComparisonGrid::Times) {
-            let mut stepper = match self.collocation.transformed_stepper(&problem, stages, h) {
+            let mut stepper = match self.collocation.transformed_stepper(problem, stages, h) {
                 Ok(stepper) => stepper,
                 Err(error) => return TrialEnd::of_failed_start(error),
             };
             let ending = self.run_with_samples(&mut *stepper, &settings, 1)?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let (options, collocation) = (StepperOptions::default(), self.collocation);
-        if hints.switching_functions && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)? {
-            let make = move |problem: &SystemProblem<'p, N>, h: f64, _: bool| {
+        let (options, collocation) = (StepperOptions::default(), self.collocation.clone());
+        if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
+            let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
                 collocation.stepper(problem, stages, h, options).map(PartStepper::Collocation)
             };
-            let mut stepper = match SwitchingStepper::new(&problem, h, EvaluationRange::Within, Box::new(make)) {
+            let mut stepper = match SwitchingStepper::new(problem, h, EvaluationRange::Within, Box::new(make)) {
                 Ok(stepper) => stepper.keeping_parts(),
                 Err(error) => return TrialEnd::of_failed_start(error),
             };
             return self.run_with_samples(&mut stepper, &settings, 1);
         }
-        let mut stepper = match collocation.stepper(&problem, stages, h, options) {
+        let mut stepper = match collocation.stepper(problem, stages, h, options) {
             Ok(stepper) => stepper,
             Err(error) => return TrialEnd::of_failed_start(error),
         };
@@ -111,9 +112,9 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
         integrator: DividedGauss,
         count: usize,
         grid: &ComparisonGrid,
-    ) -> Result<TrialEnd<N>, InputError> {
-        let (problem, h) = (self.request.problem, self.step(count, grid));
-        let mut stepper = match integrator.run(self.collocation, &problem, h, StepperOptions::default()) {
+    ) -> Result<TrialEnd, InputError> {
+        let (problem, h) = (&self.request.problem, self.step(count, grid));
+        let mut stepper = match integrator.run(self.collocation.clone(), problem, h, StepperOptions::default()) {
             Ok(stepper) => stepper,
             Err(error) => return TrialEnd::of_failed_start(error),
         };
@@ -125,20 +126,20 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
     /// The step size with which `count` steps fill the span; in transformed time, if the rate kept its value at the
     /// start.
     pub fn step(&self, count: usize, grid: &ComparisonGrid) -> f64 {
-        let Problem { lagrangian, start, .. } = self.request.problem;
+        let SystemProblem { system, start, .. } = &self.request.problem;
         let h = self.request.span / count as f64;
-        if let ComparisonGrid::Times = grid { h / lagrangian.dt_dtau(&start.q) } else { h }
+        if let ComparisonGrid::Times = grid { h / system.dt_dtau(&start.q) } else { h }
     }
 
     /// Computes the motion with defect samples of the steps, and counts the steps that needed Newton's method.
     fn run_with_samples(
         &mut self,
-        run: &mut (dyn CollocationStepper<N> + '_),
+        run: &mut (dyn CollocationStepper + '_),
         settings: &TrialSettings<'_>,
         stride: usize,
-    ) -> Result<TrialEnd<N>, InputError> {
+    ) -> Result<TrialEnd, InputError> {
         let TrialSettings { count, grid, points, narrow, costs } = settings;
-        let Problem { lagrangian, start, .. } = self.request.problem;
+        let SystemProblem { system, start, .. } = &self.request.problem;
         let (floor, h) = (
             max_or_nan(NEGLIGIBLE_SAMPLED_DEFECT * self.wanted, MIN_COMPARED_DEFECT),
             (self.request.span / *count as f64).abs(),
@@ -150,7 +151,7 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
             let (sample, newton_steps) = (run.sample_defect(*points), run.newton_steps());
             cost = run.evaluations() + newton_steps * costs.newton;
             let spent = |samples: u64| cost + samples * costs.sample;
-            if tests_transformation && gain.with_step(lagrangian.dt_dtau(&run.state().q)) > MIN_TRANSFORMATION_GAIN {
+            if tests_transformation && gain.with_step(system.dt_dtau(&run.state().q)) > MIN_TRANSFORMATION_GAIN {
                 return (Some(TrialEnd::SwitchReason(SwitchReason::TimeTransformation)), spent(samples));
             }
             if tests_newton_steps && newton_steps as f64 > MAX_NEWTON_STEPS + MAX_NEWTON_FRACTION * part * *count as f64
@@ -173,7 +174,7 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
         });
         // A large defect may be due to a false claim of structure.
         if let TrialEnd::Narrow { .. } | TrialEnd::Unresolved { .. } = ending
-            && let Some(Defect { claim, size }) = violated_claim(lagrangian, run.time(), &run.state(), &start.v)
+            && let Some(Defect { claim, size }) = violated_claim(&**system, run.time(), &run.state(), &start.v)
         {
             return Err(InputError::FalseClaim { claim, size });
         }
@@ -186,10 +187,10 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
     /// Computes the motion with the given integrator.
     pub fn with_integrator(
         &mut self,
-        integrator: &SharedIntegrator<'p, N>,
+        integrator: &SharedIntegrator<'p>,
         count: usize,
         grid: &ComparisonGrid,
-    ) -> Result<TrialEnd<N>, InputError> {
+    ) -> Result<TrialEnd, InputError> {
         let selection = StepSelection {
             integrator: integrator.clone(),
             count,
@@ -203,34 +204,34 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
             Err(error) => return TrialEnd::of_failed_start(error),
         };
         let cost_per_evaluation = integrator.info().cost_per_evaluation;
-        let cost = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(cost_per_evaluation));
+        let cost = |run: &(dyn Stepper + '_), _: f64| (None, run.evaluations().saturating_mul(cost_per_evaluation));
         self.take_steps(&mut *stepper, count, grid, MAX_UNCHECKED_STEPS, cost).unless_interrupted()
     }
 
     /// Takes `count` steps, at most `stride` at a time. After each of these chunks `after_chunk` is called with the
     /// completed fraction of the span; it may end the run, and returns the cost so far, which is deducted from the
     /// budget.
-    fn take_steps<R: Stepper<N> + ?Sized>(
+    fn take_steps<R: Stepper + ?Sized>(
         &mut self,
         run: &mut R,
         count: usize,
         grid: &ComparisonGrid,
         stride: usize,
-        mut after_chunk: impl FnMut(&R, f64) -> (Option<TrialEnd<N>>, u64),
-    ) -> TrialEnd<N> {
-        let &Request { problem, span, .. } = self.request;
-        let t0 = problem.t0;
+        mut after_chunk: impl FnMut(&R, f64) -> (Option<TrialEnd>, u64),
+    ) -> TrialEnd {
+        let Request { problem, scales, .. } = self.request;
+        let (t0, span) = (problem.t0, self.request.span);
         let (mut states, mut round_off, mut taken, mut spent) =
             (Vec::with_capacity(COMPARED_PARTS), Vec::with_capacity(COMPARED_PARTS), 0, 0);
-        let mut largest_size = norm(&[problem.state.q, problem.state.p]);
+        let mut largest_size = norm(&[&problem.state.q, &problem.state.p]);
         let (mut velocities, mut speeds) =
-            (Vec::with_capacity(COMPARED_PARTS), Velocities::new(&problem, self.request.scales));
+            (Vec::with_capacity(COMPARED_PARTS), Velocities::new(problem, scales.as_ref()));
         let (mut ending, mut chunks) = (None, 0_usize);
         while ending.is_none()
             && let Some((steps, time)) = grid.stop(states.len(), count, t0, span)
         {
             let queries = stride > 1 || chunks.is_multiple_of(CHECKS_PER_INTERRUPT_QUERY);
-            if queries && self.request.problem.interrupt.is_some_and(Interrupt::is_requested) {
+            if queries && problem.interrupt.is_some_and(Interrupt::is_requested) {
                 ending = Some(TrialEnd::Interrupted);
                 break;
             }
@@ -249,20 +250,19 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
             let on_grid = taken == steps || (run.time() - time) * span >= 0.0;
             let x = run.state();
             if on_grid || stride > 1 {
-                let v = speeds.at(run.time(), &x, run.last_velocity());
+                let v = speeds.at(run.time(), &x, run.last_velocity().as_ref());
                 velocities.extend(on_grid.then_some(v));
             } else {
                 speeds.record_position(run.time(), &x.q);
             }
             if on_grid {
-                let state = [x.q, x.p];
-                let size = norm(&state);
+                let size = norm(&[&x.q, &x.p]);
                 largest_size = max_or_nan(largest_size, size);
                 let decayed = size < MAX_DECAYED_SIZE * largest_size;
                 let of_all_steps =
                     || accumulated_roundings(taken) * self.request.equilibrium_round_off(run.time(), &x).displacement;
                 round_off.push(if decayed { of_all_steps() } else { 0.0 });
-                states.push(state);
+                states.push([x.q, x.p]);
             }
             // A run continues on the reserve if it is expected to end within it.
             if spent > self.left && spent as f64 > part * self.reserve as f64 {
@@ -271,7 +271,7 @@ impl<'t, 'p, const N: usize> TrialRuns<'t, 'p, N> {
         }
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
-        let (speed, scales) = (speeds.speed(taken), self.request.scales);
+        let (speed, scales) = (speeds.speed(taken), scales.clone());
         let track = Track { states, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
         ending.unwrap_or(TrialEnd::Completed(track))
     }

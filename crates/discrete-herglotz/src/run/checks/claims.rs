@@ -5,12 +5,10 @@ use crate::resolution::monitor::size;
 use crate::resolution::thresholds::{CLAIM_ROUNDINGS, MAX_CONSTANT_DIFFERENCE, MIN_CLAIM_DISPLACEMENT};
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
-use crate::{Stepper, System, theory::legendre_inverse};
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{
-    Defect, PhasePoint, Structure, VelocityPoint,
-    numbers::{max_abs_or_nan, max_or_nan},
-};
+use crate::{Point, State, Stepper, System, Vector};
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
+use contact_geom::{Defect, Structure};
 
 /// The number of parts into which a step is divided for checks within it, if its own displacement exceeds
 /// [`MIN_CLAIM_DISPLACEMENT`]: a step that spans the whole motion has parts of about this displacement.
@@ -27,32 +25,33 @@ const CHECKS_PER_DOUBLING: usize = 8;
 /// step.
 ///
 /// A check costs about as much as a step. [`Structure::defects`] checks more, and is evaluated less often.
-pub(crate) struct ClaimMonitor<const N: usize> {
+pub(crate) struct ClaimMonitor {
     structure: Structure,
     /// The values at the start. `None` for a system that depends on time: its values are evaluated at the initial state
     /// and the current time.
-    reference: Option<Constants<N>>,
+    reference: Option<Constants>,
     /// The bounding box of the motion so far, and the state at the last check.
-    low: [SVector<f64, N>; 2],
-    high: [SVector<f64, N>; 2],
-    last: [SVector<f64, N>; 2],
-    guess: SVector<f64, N>,
+    low: [Vector; 2],
+    high: [Vector; 2],
+    last: [Vector; 2],
+    guess: Vector,
 }
 
 /// The quantities that are claimed to be constant.
-struct Constants<const N: usize> {
+struct Constants {
     rate: f64,
-    mass: SMatrix<f64, N, N>,
-    qq: Option<SMatrix<f64, N, N>>,
+    mass: DMatrix<f64>,
+    qq: Option<DMatrix<f64>>,
 }
 
-impl<const N: usize> Constants<N> {
-    fn at(structure: &Structure, lagrangian: &dyn System<N>, t: f64, x: &VelocityPoint<N>) -> Option<Self> {
+impl Constants {
+    fn at(structure: &Structure, system: &dyn System, t: f64, x: &Point) -> Option<Self> {
+        let rate = system.gradient(t, x).z;
         let constants = if structure.quadratic {
-            let h = lagrangian.hessian(t, x);
-            Constants { rate: lagrangian.gradient(t, x).z, mass: h.vv, qq: Some(h.qq) }
+            let h = system.hessian(t, x);
+            Constants { rate, mass: h.vv, qq: Some(h.qq) }
         } else {
-            Constants { rate: lagrangian.gradient(t, x).z, mass: lagrangian.mass_matrix(t, x), qq: None }
+            Constants { rate, mass: system.mass_matrix(t, x), qq: None }
         };
         let entries = constants.mass.iter().chain(constants.qq.iter().flatten());
         let finite = constants.rate.is_finite() && entries.into_iter().all(|e| e.is_finite());
@@ -60,28 +59,29 @@ impl<const N: usize> Constants<N> {
     }
 }
 
-impl<const N: usize> ClaimMonitor<N> {
+impl ClaimMonitor {
     /// The monitor of a run whose Lagrangian claims that something is constant. `None` if the claims are proved.
-    pub fn of(steps: &Discretization<'_, N>) -> Option<Self> {
-        let hints = steps.problem.lagrangian.hints();
+    pub fn of(steps: &Discretization<'_>) -> Option<Self> {
+        let problem = &steps.problem;
+        let hints = problem.system.hints();
         // A Hamiltonian's own claims are verified at the start of the run.
         if hints.proved || hints.hamiltonian {
             return None;
         }
-        let problem = steps.problem;
         let structure = problem.structure;
         if !(structure.is_affine_in_z() || structure.separable || structure.constant_mass || structure.quadratic) {
             return None;
         }
-        let here = [problem.state.q, problem.state.p];
+        let here = [problem.state.q.clone(), problem.state.p.clone()];
         // The coefficients of a quadratic Lagrangian may depend on time.
         let reference = structure.autonomous || structure.z_free && structure.constant_mass && !structure.quadratic;
         let reference = if reference {
-            Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?)
+            Some(Constants::at(&structure, &*problem.system, problem.t0, &problem.start)?)
         } else {
             None
         };
-        Some(ClaimMonitor { structure, reference, low: here, high: here, last: here, guess: problem.start.v })
+        let guess = problem.start.v.clone();
+        Some(ClaimMonitor { structure, reference, low: here.clone(), high: here.clone(), last: here, guess })
     }
 
     /// The number of steps after which the next check is due.
@@ -92,35 +92,34 @@ impl<const N: usize> ClaimMonitor<N> {
     /// Checks the claims at the end of a step, and within a long step; returns a violated claim.
     pub fn violated(
         &mut self,
-        steps: &Discretization<'_, N>,
-        stepper: &dyn Stepper<N>,
-        before: Option<&(f64, PhasePoint<N>)>,
+        steps: &Discretization<'_>,
+        stepper: &dyn Stepper,
+        before: Option<&(f64, State)>,
     ) -> Option<Defect> {
         let (t, state) = (stepper.time(), stepper.state());
         if self.cover(&state) < MIN_CLAIM_DISPLACEMENT {
             return None;
         }
-        self.last = [state.q, state.p];
-        let lagrangian = steps.problem.lagrangian;
-        let guess = stepper.last_velocity().unwrap_or(self.guess);
-        let x = legendre_inverse(lagrangian, t, &state, &guess).ok()?;
-        self.guess = x.v;
+        self.last = [state.q.clone(), state.p.clone()];
+        let (system, near) = (&*steps.problem.system, stepper.last_velocity());
+        let x = system.legendre_inverse(t, &state, near.as_ref().unwrap_or(&self.guess)).ok()?;
+        self.guess = x.v.clone();
         let fractions = (1..PARTS_OF_A_STEP).map(|i| i as f64 / PARTS_OF_A_STEP as f64);
         if let Some(curve) = stepper.dense() {
             let (start, end) = curve.span();
             let from = curve.at_fraction(0.0);
-            if self.part([from.q - state.q, from.p - state.p]) > MIN_CLAIM_DISPLACEMENT {
+            if self.part([from.q - &state.q, from.p - &state.p]) > MIN_CLAIM_DISPLACEMENT {
                 for fraction in fractions {
                     let (t, state) = (start + fraction * (end - start), curve.at_fraction(fraction));
-                    let within = legendre_inverse(lagrangian, t, &state, &self.guess);
+                    let within = system.legendre_inverse(t, &state, &self.guess);
                     if let Some(defect) = within.ok().and_then(|x| self.compare(steps, t, &x)) {
                         return Some(defect);
                     }
                 }
             }
         } else if let Some((start, from)) = before
-            && self.part([from.q - state.q, from.p - state.p]) > MIN_CLAIM_DISPLACEMENT
-            && let Ok(from) = legendre_inverse(lagrangian, *start, from, &self.guess)
+            && self.part([&from.q - &state.q, &from.p - &state.p]) > MIN_CLAIM_DISPLACEMENT
+            && let Ok(from) = system.legendre_inverse(*start, from, &self.guess)
         {
             for fraction in fractions {
                 let at = fraction * (t - start);
@@ -133,43 +132,44 @@ impl<const N: usize> ClaimMonitor<N> {
     }
 
     /// Extends the bounding box by a state; returns its distance from the last check, relative to the box.
-    fn cover(&mut self, state: &PhasePoint<N>) -> f64 {
+    fn cover(&mut self, state: &State) -> f64 {
         for (x, (low, high)) in [&state.q, &state.p].into_iter().zip(self.low.iter_mut().zip(&mut self.high)) {
             // States are finite here: a run ends at the first state that is not.
-            *low = low.zip_map(x, |low, x| if x < low { x } else { low });
-            *high = high.zip_map(x, |high, x| if x > high { x } else { high });
+            for (x, (low, high)) in x.iter().zip(low.iter_mut().zip(high.iter_mut())) {
+                *low = if *x < *low { *x } else { *low };
+                *high = if *x > *high { *x } else { *high };
+            }
         }
-        self.part([state.q - self.last[0], state.p - self.last[1]])
+        self.part([&state.q - &self.last[0], &state.p - &self.last[1]])
     }
 
     /// A distance relative to the box: the largest ratio over all coordinates and momenta.
-    fn part(&self, distance: [SVector<f64, N>; 2]) -> f64 {
+    fn part(&self, distance: [Vector; 2]) -> f64 {
         let mut part = 0.0;
         for (distance, (low, high)) in distance.iter().zip(self.low.iter().zip(&self.high)) {
-            for i in 0..N {
-                if distance[i] != 0.0 {
-                    part = max_or_nan(part, distance[i].abs() / (high[i] - low[i]));
+            for (distance, (low, high)) in distance.iter().zip(low.iter().zip(high)) {
+                if *distance != 0.0 {
+                    part = max_or_nan(part, distance.abs() / (high - low));
                 }
             }
         }
         part
     }
 
-    fn compare(&self, steps: &Discretization<'_, N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
-        let (lagrangian, structure) = (steps.problem.lagrangian, self.structure);
-        let here = Constants::at(&structure, lagrangian, t, x)?;
+    fn compare(&self, steps: &Discretization<'_>, t: f64, x: &Point) -> Option<Defect> {
+        let (system, structure) = (&*steps.problem.system, self.structure);
+        let here = Constants::at(&structure, system, t, x)?;
         let then;
         let reference = match &self.reference {
             Some(reference) => reference,
             None => {
-                then = Constants::at(&structure, lagrangian, t, &steps.problem.start)?;
+                then = Constants::at(&structure, system, t, &steps.problem.start)?;
                 &then
             }
         };
         let rounding = |part: usize| {
-            let (_, r) = lagrangian.rounding(t, x);
-            let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
-            CLAIM_ROUNDINGS * [of(&r.x, size(x.q.as_slice())), of(&r.y, size(x.v.as_slice())), r.z][part]
+            let (_, r) = system.rounding(t, x);
+            CLAIM_ROUNDINGS * [size(&r.x) / size(&x.q), size(&r.y) / size(&x.v), r.z][part]
         };
         let mut found = None;
         let mut claim = |made: bool, claim: &'static str, part: usize, difference: Option<(f64, f64)>| {

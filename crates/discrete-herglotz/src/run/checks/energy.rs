@@ -1,13 +1,12 @@
 //! The energy of an autonomous system, which decays with the conformal factor along the exact motion.
 
-use crate::integration::{AtState, at_state};
 use crate::resolution::thresholds::MIN_SUSPECT_DRIFT;
 use crate::run::accuracy::equilibrium_round_off::EquilibriumRoundOff;
 use crate::run::checks::energy_drift::{EnergyDrift, EnergySample, allowed};
 use crate::run::discretization::Discretization;
-use crate::{Stepper, System, theory::legendre_inverse};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
+use crate::system::AtState;
+use crate::{Point, State, Stepper, System, Vector};
+use contact_geom::numbers::max_or_nan;
 
 /// The shortest distance of two energy checks in long runs, in steps: a check costs about three of the least expensive
 /// steps.
@@ -18,12 +17,12 @@ const MIN_STEPS_BETWEEN_CHECKS: usize = 256;
 const MAX_REGULAR_CHECKS: usize = 32;
 
 /// Monitors the [drift](EnergyDrift) of the energy `H = p.v - L` along a run.
-pub(crate) struct EnergyMonitor<const N: usize> {
+pub(crate) struct EnergyMonitor {
     /// `L_z`, if it is constant and the run does not accumulate the conformal factor: `ln sigma` is then `L_z` times
     /// the time.
     rate: Option<f64>,
     every: usize,
-    guess: SVector<f64, N>,
+    guess: Vector,
     pub drift: EnergyDrift,
 }
 
@@ -35,25 +34,25 @@ struct Energies {
     terms: f64,
 }
 
-impl<const N: usize> EnergyMonitor<N> {
+impl EnergyMonitor {
     /// The monitor of a run, if its energy and its conformal factor are available.
-    pub fn of(steps: &Discretization<'_, N>, constant_rate: bool) -> Option<Self> {
-        let problem = steps.problem;
+    pub fn of(steps: &Discretization<'_>, constant_rate: bool) -> Option<Self> {
+        let problem = &steps.problem;
         let structure = &problem.structure;
         let known = constant_rate || structure.has_constant_rate() || steps.needs.conformal_factor;
         if steps.error.is_some() || !structure.autonomous || !known || !(structure.z_free || steps.needs.action) {
             return None;
         }
-        let Energies { total, kinetic, terms } =
-            energies(problem.lagrangian, problem.t0, &problem.start, &problem.state)?;
+        let system = &*problem.system;
+        let Energies { total, kinetic, terms } = energies(system, problem.t0, &problem.start, &problem.state)?;
         let counted = constant_rate || steps.needs.conformal_factor;
-        let rate = || at_state(problem.lagrangian, problem.t0, &problem.state, &problem.start.v).map(|at| at.rate);
+        let rate = || system.at_state(problem.t0, &problem.state, &problem.start.v).map(|at| at.rate);
         let rate = if counted { None } else { Some(rate().ok()?) };
         let start = EnergySample { total, kinetic, terms, log_factor: 0.0, taken: 0 };
         Some(EnergyMonitor {
             rate,
             every: MIN_STEPS_BETWEEN_CHECKS.max(steps.count.div_ceil(MAX_REGULAR_CHECKS)),
-            guess: problem.start.v,
+            guess: problem.start.v.clone(),
             drift: EnergyDrift::new(steps.info.order, &start),
         })
     }
@@ -68,41 +67,36 @@ impl<const N: usize> EnergyMonitor<N> {
     /// one.
     pub fn drift(
         &mut self,
-        steps: &Discretization<'_, N>,
-        stepper: &dyn Stepper<N>,
+        steps: &Discretization<'_>,
+        stepper: &dyn Stepper,
         (log_factor, taken): (f64, usize),
     ) -> Option<f64> {
         let (t, state) = (stepper.time(), &stepper.state());
-        let problem = steps.problem;
+        let (problem, system) = (&steps.problem, &*steps.problem.system);
         if taken < self.drift.first() {
             return None;
         }
-        let guess = stepper.last_velocity().unwrap_or(self.guess);
-        let x = legendre_inverse(problem.lagrangian, t, state, &guess).ok()?;
-        let Energies { total, kinetic, terms } = energies(problem.lagrangian, t, &x, state)?;
+        let near = stepper.last_velocity();
+        let x = system.legendre_inverse(t, state, near.as_ref().unwrap_or(&self.guess)).ok()?;
+        let Energies { total, kinetic, terms } = energies(system, t, &x, state)?;
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
+        let drift = self.drift.defect(&EnergySample { total, kinetic, terms, log_factor, taken }, |sigma| {
+            rounding_of(system, t, &x, state)
+                + rounding_of(system, problem.t0, &problem.start, &problem.state) * sigma
+                + EquilibriumRoundOff::at(system, t, &x).energy
+        });
         self.guess = x.v;
-        let start = (problem.t0, &problem.start, &problem.state);
-        self.drift.defect(&EnergySample { total, kinetic, terms, log_factor, taken }, |sigma| {
-            rounding_of(problem.lagrangian, t, &x, state)
-                + rounding_of(problem.lagrangian, start.0, start.1, start.2) * sigma
-                + EquilibriumRoundOff::at(problem.lagrangian, t, &x).energy
-        })
+        drift
     }
 }
 
 /// Whether the energy of a run may have drifted, judged from its two ends, for an autonomous system with constant
 /// `L_z`. The decision is left to an [`EnergyMonitor`].
-pub(crate) fn may_drift<const N: usize>(
-    system: &dyn System<N>,
-    order: u32,
-    (t0, from): (f64, &PhasePoint<N>),
-    (t, to): (f64, &PhasePoint<N>),
-) -> bool {
-    let rest = SVector::zeros();
-    let Ok(x) = legendre_inverse(system, t0, from, &rest) else { return false };
-    let Ok(y) = legendre_inverse(system, t, to, &x.v) else { return false };
-    let Ok(AtState { rate, .. }) = at_state(system, t0, from, &x.v) else { return false };
+pub(crate) fn may_drift(system: &dyn System, order: u32, (t0, from): (f64, &State), (t, to): (f64, &State)) -> bool {
+    let rest = Vector::zeros(system.dimension());
+    let Ok(x) = system.legendre_inverse(t0, from, &rest) else { return false };
+    let Ok(y) = system.legendre_inverse(t, to, &x.v) else { return false };
+    let Ok(AtState { rate, .. }) = system.at_state(t0, from, &x.v) else { return false };
     let sigma = (rate * (t - t0)).exp();
     let (Some(a), Some(b)) = (energies(system, t0, &x, from), energies(system, t, &y, to)) else {
         return false;
@@ -112,21 +106,16 @@ pub(crate) fn may_drift<const N: usize>(
 }
 
 /// The energy at a state, with the kinetic energy `v.Wv/2` as the sum of the magnitudes of its terms.
-fn energies<const N: usize>(
-    system: &dyn System<N>,
-    t: f64,
-    x: &VelocityPoint<N>,
-    state: &PhasePoint<N>,
-) -> Option<Energies> {
-    let AtState { l, rate: slope, .. } = at_state(system, t, state, &x.v).ok()?;
-    let mut kinetic = 0.0;
+fn energies(system: &dyn System, t: f64, x: &Point, state: &State) -> Option<Energies> {
+    let AtState { l, rate: slope, .. } = system.at_state(t, state, &x.v).ok()?;
+    let (n, mut kinetic) = (system.dimension(), 0.0);
     if system.hints().hamiltonian {
         // The mass matrix need not exist.
-        kinetic = (0..N).map(|i| 0.5 * (state.p[i] * x.v[i]).abs()).sum();
+        kinetic = (0..n).map(|i| 0.5 * (state.p[i] * x.v[i]).abs()).sum();
     } else {
         let w = system.mass_matrix(t, x);
-        for i in 0..N {
-            for j in 0..N {
+        for i in 0..n {
+            for j in 0..n {
                 kinetic += 0.5 * (x.v[i] * w[(i, j)] * x.v[j]).abs();
             }
         }
@@ -139,8 +128,8 @@ fn energies<const N: usize>(
 /// A bound on the round-off of the energy at a state.
 #[cold]
 #[inline(never)]
-fn rounding_of<const N: usize>(system: &dyn System<N>, t: f64, x: &VelocityPoint<N>, state: &PhasePoint<N>) -> f64 {
+fn rounding_of(system: &dyn System, t: f64, x: &Point, state: &State) -> f64 {
     let (of_value, of_gradient) = system.rounding_at_state(t, x, state);
     let of_momentum = |i: usize| (f64::EPSILON * state.p[i] * x.v[i]).abs() + (of_gradient.y[i] * x.v[i]).abs();
-    of_value + (0..N).map(of_momentum).sum::<f64>()
+    of_value + (0..system.dimension()).map(of_momentum).sum::<f64>()
 }

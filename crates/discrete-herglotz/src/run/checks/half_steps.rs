@@ -1,28 +1,22 @@
 //! Comparison of steps with twice as many steps of half their size: whether given steps resolve the motion.
 
+use crate::integration::{SuspectInterval, SystemProblem};
 use crate::resolution::monitor::rounding;
 use crate::resolution::thresholds::{FIRST_ORDER_STEPS, MAX_HALF_STEP_DIFFERENCE, MIN_RELATIVE_DISPLACEMENT};
 use crate::run::discretization::Discretization;
-use crate::{Problem, integration::SuspectInterval, theory::legendre_inverse};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{
-    PhasePoint, VelocityPoint,
-    numbers::{max_abs_or_nan, max_or_nan},
-};
+use crate::{Point, State, Vector};
+use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 
-impl<const N: usize> Discretization<'_, N> {
+impl Discretization<'_> {
     /// The defect of some steps, above one if they do not resolve the motion. `None` if no comparison is possible.
-    pub(crate) fn half_step_defect(
-        &self,
-        SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
-    ) -> Option<f64> {
-        let Problem { lagrangian, start, .. } = self.problem;
+    pub(crate) fn half_step_defect(&self, SuspectInterval { steps, t, from, to, .. }: &SuspectInterval) -> Option<f64> {
+        let SystemProblem { system, start, structure, .. } = &self.problem;
         let end = t + *steps as f64 * self.h;
         // If several velocities have the same momentum, the mean velocity selects that of the motion.
-        let mean = (to.q - from.q) / (end - t);
-        let guess = if self.problem.structure.constant_mass { start.v } else { mean };
-        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
-        let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
+        let mean = (&to.q - &from.q) / (end - t);
+        let guess = if structure.constant_mass { &start.v } else { &mean };
+        let Point { v, .. } = system.legendre_inverse(*t, from, guess).ok()?;
+        let at_end = |x: &State| system.legendre_inverse(end, x, &v).map(|x| x.v).ok();
         if self.info.in_transformed_time {
             return None;
         }
@@ -32,16 +26,14 @@ impl<const N: usize> Discretization<'_, N> {
         };
         let fine = fine.state();
         let (coarse_v, fine_v) = (at_end(to)?, at_end(&fine)?);
-        let size = |x: [&SVector<f64, N>; 3]| max_abs_or_nan(x.into_iter().flat_map(|x| x.iter().copied()));
-        let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| max_abs_or_nan((a - b).iter().copied());
+        let size = |x: [&Vector; 3]| max_abs_or_nan(x.into_iter().flat_map(|x| x.iter().copied()));
+        let apart = |a: &Vector, b: &Vector| (a - b).amax();
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
         // After n steps from rest, the error of a method of order one is the displacement divided by n.
         let moved =
             if self.info.order == 1 { FIRST_ORDER_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
-        let width = max_or_nan(
-            max_or_nan(size([&from.q, &to.q, &fine.q]), moved),
-            rounding(start.q.as_slice(), start.v.as_slice(), self.h),
-        );
+        let width =
+            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v = if of_v * self.h.abs() > MIN_RELATIVE_DISPLACEMENT * width {
             relative(of_v, size([&v, &coarse_v, &fine_v]))
@@ -66,7 +58,7 @@ mod tests {
         problem: &'a Problem<'a, InPlane, 2>,
         integrator: impl Integrator<'a, InPlane, 2> + 'a,
         steps: usize,
-    ) -> Plan<'a, 2> {
+    ) -> Plan<'a> {
         problem.by(integrator).steps(Steps::Size(H)).plan(Until::Time(H * steps as f64)).unwrap()
     }
 
@@ -76,7 +68,7 @@ mod tests {
     }
 
     /// Whether a stepper multiplies by one matrix: it then makes no evaluations.
-    fn by_one_matrix(mut stepper: Box<dyn Stepper<2> + '_>) -> bool {
+    fn by_one_matrix(mut stepper: Box<dyn Stepper + '_>) -> bool {
         stepper.advance(1).unwrap();
         stepper.evaluations() == 0
     }
@@ -88,8 +80,9 @@ mod tests {
         let problem = problem();
         let plan = plan(&problem, GaussCollocation { stages: 8 }, 100);
         assert!(by_one_matrix(plan.stepper().unwrap()));
+        let (from, v) = (problem.state.into(), problem.start.v.into());
         for h in [0.3 * H, -0.5 * H] {
-            let part = plan.steps.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
+            let part = plan.steps.advanced((0.0, &from), &v, h, (1, h), |_| ()).unwrap();
             assert!(part.evaluations() > 0);
             // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
             let (t, state) = (h, part.state());
@@ -119,7 +112,7 @@ mod tests {
             problem: &Problem<'a, InPlane, 2>,
             h: f64,
             options: StepperOptions,
-        ) -> Result<Box<dyn Stepper<2> + 'a>, InputError> {
+        ) -> Result<Box<dyn Stepper + 'a>, InputError> {
             GaussCollocation { stages: 8 }.stepper(problem, h, options)
         }
     }
@@ -146,7 +139,8 @@ mod tests {
             let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
             assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");
             let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
-            let part = plan.steps.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
+            let (from, v) = (problem.state.into(), start.v.into());
+            let part = plan.steps.advanced((0.0, &from), &v, 0.03, (1, 0.03), |_| ()).unwrap();
             // A whole step of the same size, to the round-off amplified by the inverse of the mass matrix.
             let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
             whole = whole.without_action();

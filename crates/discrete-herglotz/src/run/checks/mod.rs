@@ -13,9 +13,9 @@ use crate::integration::check_claims::violated_claim;
 use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
 use crate::status::first;
-use crate::{Status, Stepper, UnresolvedStep, integration::SuspectInterval};
+use crate::{State, Status, Stepper, UnresolvedStep, integration::SuspectInterval};
 use claims::ClaimMonitor;
-use contact_geom::{Defect, PhasePoint};
+use contact_geom::Defect;
 use energy::EnergyMonitor;
 
 /// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the
@@ -36,10 +36,10 @@ pub(crate) fn next_full_check(taken: usize) -> usize {
 }
 
 /// Steps that a run has just taken.
-pub(crate) struct TakenSteps<'s, const N: usize> {
-    pub stepper: &'s mut dyn Stepper<N>,
+pub(crate) struct TakenSteps<'s> {
+    pub stepper: &'s mut dyn Stepper,
     /// The time and the state before them, where a check or an observer needs them.
-    pub before: Option<(f64, PhasePoint<N>)>,
+    pub before: Option<(f64, State)>,
     /// The number of steps before them, and with them.
     pub first: usize,
     pub taken: usize,
@@ -47,10 +47,15 @@ pub(crate) struct TakenSteps<'s, const N: usize> {
     pub over: bool,
 }
 
-impl<const N: usize> TakenSteps<'_, N> {
+impl TakenSteps<'_> {
     /// The time and the state at the start, if it is a single step.
-    pub fn single(&self) -> Option<&(f64, PhasePoint<N>)> {
+    pub fn single(&self) -> Option<&(f64, State)> {
         self.before.as_ref().filter(|_| self.taken == self.first + 1)
+    }
+
+    /// The same, when the step is no longer needed.
+    pub fn into_single(self) -> Option<(f64, State)> {
+        self.before.filter(|_| self.taken == self.first + 1)
     }
 
     /// Whether all claims are checked after these steps.
@@ -60,8 +65,8 @@ impl<const N: usize> TakenSteps<'_, N> {
 }
 
 /// The checks of a run.
-pub(crate) struct Checks<'r, 'p, const N: usize> {
-    steps: &'r Discretization<'p, N>,
+pub(crate) struct Checks<'r, 'p> {
+    steps: &'r Discretization<'p>,
     pub findings: Findings,
     /// Whether the conformal factor is a product along the run, and whether it is a power of one `sigma_d`.
     product: bool,
@@ -74,18 +79,18 @@ pub(crate) struct Checks<'r, 'p, const N: usize> {
     /// sampled; and not for a motion that is proved to be linear, in which a transient within a step causes no error
     /// beyond that of the order.
     of_stepper: bool,
-    claims: Option<ClaimMonitor<N>>,
-    energy: Option<EnergyMonitor<N>>,
+    claims: Option<ClaimMonitor>,
+    energy: Option<EnergyMonitor>,
     ends_after: Option<usize>,
 }
 
-impl<'r, 'p, const N: usize> Checks<'r, 'p, N> {
+impl<'r, 'p> Checks<'r, 'p> {
     /// The checks of a run with these steps. `constant_rate`: whether every step has the same `sigma_d`. `ends_after`:
     /// the step at which an observer is expected to end the run.
-    pub fn of(steps: &'r Discretization<'p, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
+    pub fn of(steps: &'r Discretization<'p>, constant_rate: bool, ends_after: Option<usize>) -> Self {
         let given = steps.error.is_none();
         let suspects = given && !steps.info.in_transformed_time;
-        let linear = steps.problem.lagrangian.hints().proved && steps.problem.structure.quadratic;
+        let linear = steps.problem.system.hints().proved && steps.problem.structure.quadratic;
         let energy = EnergyMonitor::of(steps, constant_rate);
         Checks {
             steps,
@@ -148,15 +153,16 @@ impl<'r, 'p, const N: usize> Checks<'r, 'p, N> {
     }
 
     /// Checks some steps; returns the status of the run if a claim is violated, which ends it.
-    pub fn check(&mut self, step: &mut TakenSteps<'_, N>) -> Option<Status> {
+    pub fn check(&mut self, step: &mut TakenSteps<'_>) -> Option<Status> {
         self.compare_with_halves(step);
         let next_claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(step.first));
         let next_energy = self.energy.as_ref().map_or(usize::MAX, |energy| energy.next(step.first));
         let status = |Defect { claim, size }| Status::FalseClaim { step: step.taken, claim, size };
         if step.are_fully_checked() {
-            let guess = step.stepper.last_velocity().unwrap_or(self.steps.problem.start.v);
+            let (problem, near) = (&self.steps.problem, step.stepper.last_velocity());
+            let guess = near.as_ref().unwrap_or(&problem.start.v);
             let (t, state) = (step.stepper.time(), step.stepper.state());
-            if let Some(defect) = violated_claim(self.steps.problem.lagrangian, t, &state, &guess) {
+            if let Some(defect) = violated_claim(&*problem.system, t, &state, guess) {
                 return Some(status(defect));
             }
             self.query_stepper(step.stepper);
@@ -185,24 +191,25 @@ impl<'r, 'p, const N: usize> Checks<'r, 'p, N> {
     }
 
     /// Compares the step with two of half its length, where that is due.
-    fn compare_with_halves(&mut self, step: &TakenSteps<'_, N>) {
+    fn compare_with_halves(&mut self, step: &TakenSteps<'_>) {
         if self.next_halves(step.first) == step.first + 1
-            && let Some(&(t, from)) = step.single()
+            && let Some((t, from)) = step.single()
         {
-            let interval = SuspectInterval { step: step.first, steps: 1, t, from, to: step.stepper.state() };
+            let (t, from, to) = (*t, from.clone(), step.stepper.state());
+            let interval = SuspectInterval { step: step.first, steps: 1, t, from, to };
             self.note(self.steps.unresolved_within(&interval));
         }
     }
 
     /// Checks the suspect interval of the stepper, and takes over its unresolved step.
-    fn query_stepper(&mut self, stepper: &mut dyn Stepper<N>) {
+    fn query_stepper(&mut self, stepper: &mut dyn Stepper) {
         let suspect = stepper.suspect_interval().filter(|_| self.suspects && self.findings.unresolved.is_none());
         self.note(suspect.and_then(|suspect| self.steps.unresolved_within(&suspect)));
         self.note(self.unresolved_by(stepper));
     }
 
     /// The first step that the stepper found unresolved.
-    pub fn unresolved_by(&self, stepper: &dyn Stepper<N>) -> Option<UnresolvedStep> {
+    pub fn unresolved_by(&self, stepper: &dyn Stepper) -> Option<UnresolvedStep> {
         if self.of_stepper { stepper.unresolved() } else { None }
     }
 

@@ -29,7 +29,7 @@ impl Checkpoint {
     }
 }
 
-impl<const N: usize> Observer<N> for Checkpoint {
+impl Observer for Checkpoint {
     fn needs(&self) -> OutputRequest {
         OutputRequest { saved: true, ..OutputRequest::default() }
     }
@@ -38,7 +38,7 @@ impl<const N: usize> Observer<N> for Checkpoint {
         (taken / self.every + 1) * self.every
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if !at.k.is_multiple_of(self.every) && !at.last {
             return ControlFlow::Continue(());
         }

@@ -1,6 +1,5 @@
 //! The sign changes of an event function within a step.
 
-use crate::StepError;
 use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
@@ -9,7 +8,7 @@ use crate::run::observers::output_request::RunInfo;
 use crate::solve::chebyshev::{Samples, node};
 use crate::solve::sign_changes::opposite_signs;
 use crate::solve::sign_changes::{Scale, Separation, Separator, has_no_zero, separate};
-use contact_geom::PhasePoint;
+use crate::{State, StepError};
 
 /// The value of an event function, relative to its size in the step, below which the function may be on its surface g =
 /// 0, or may have different signs on the motion and on the interpolant.
@@ -25,13 +24,13 @@ const DEFAULT_COUNT: f64 = 64.0;
 const ROUND_OFF_IN_STEPS: f64 = 512.0;
 
 /// The function of an event at the last point of evaluation.
-#[derive(Clone, Copy)]
-pub(crate) struct LastSign<const N: usize> {
+#[derive(Clone)]
+pub(crate) struct LastSign {
     pub value: f64,
     /// The last nonzero sign; 0 before the first one.
     pub sign: f64,
     /// The first zero since then.
-    pub zero: Option<(f64, PhasePoint<N>)>,
+    pub zero: Option<(f64, State)>,
     /// The later point at which the function has this sign, if the last point itself is on the surface.
     pub departure: Option<Departure>,
 }
@@ -44,11 +43,11 @@ pub(crate) struct Departure {
 }
 
 /// A sign change from one point to the next.
-enum Change<const N: usize> {
+enum Change {
     /// No sign change that counts.
     None,
     /// A sign change at a known point.
-    There(f64, PhasePoint<N>),
+    There(f64, State),
     /// A sign change between the two points, with these values.
     Between([f64; 2]),
 }
@@ -74,7 +73,7 @@ pub(crate) struct TimeScales {
 }
 
 impl TimeScales {
-    pub(crate) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
+    pub(crate) fn of(RunInfo { t0, t_end, h, count, .. }: &RunInfo) -> Self {
         let span = t_end - t0;
         TimeScales { h: h.unwrap_or(span / count.map_or(DEFAULT_COUNT, |count| count.max(1) as f64)) }
     }
@@ -87,21 +86,21 @@ impl TimeScales {
 
 /// The motion of a run, with its time scales.
 #[derive(Clone, Copy)]
-pub(crate) struct ScaledMotion<'r, const N: usize> {
-    pub motion: &'r dyn Motion<N>,
+pub(crate) struct ScaledMotion<'r> {
+    pub motion: &'r dyn Motion,
     pub scales: TimeScales,
-    pub near: NearbyVelocity<N>,
+    pub near: NearbyVelocity<'r>,
 }
 
-impl<const N: usize> Event<'_, N> {
+impl Event<'_> {
     /// Finds the sign changes in a step, given interpolated states at its nodes. `points` is a workspace.
     pub(crate) fn in_step(
         &mut self,
         index: usize,
-        (step, motion): (&mut LastStep<'_, N>, ScaledMotion<'_, N>),
-        (interpolated, points): (&[PhasePoint<N>], &mut Vec<Separator>),
-        last_sign: &mut LastSign<N>,
-        found: &mut Vec<Crossing<N>>,
+        (step, motion): (&mut LastStep<'_>, ScaledMotion<'_>),
+        (interpolated, points): (&[State], &mut Vec<Separator>),
+        last_sign: &mut LastSign,
+        found: &mut Vec<Crossing>,
     ) -> Result<(), StepError> {
         let ((start, end), degree) = (step.ends(), interpolated.len() + 1);
         let value = self.value(end.0, &end.1);
@@ -113,7 +112,7 @@ impl<const N: usize> Event<'_, N> {
         let size = samples.size();
         let near = MAX_NEAR_VALUE * size;
         // The end may be on the surface if the value is below a hundredth of its size in the step.
-        let departure = if value.abs() < near { self.departure_from(motion, (end.0, &end.1), value) } else { None };
+        let departure = if value.abs() < near { self.departure_from(motion, end, value) } else { None };
         // On the surface, the sign of the value is that of its round-off: a change to it does not count.
         let at_end = if departure.is_some() { 0.0 } else { value };
         samples.set_end(at_end);
@@ -148,10 +147,11 @@ impl<const N: usize> Event<'_, N> {
             (last_sign.value, last_sign.departure) = (value, None);
             return Ok(());
         }
-        let (before, count) = (*last_sign, found.len());
+        let (before, count) = (last_sign.clone(), found.len());
         let scan = Scan { points, separation, on_motion, near, departure };
         if !self.scan(index, step, scan, last_sign, found)? {
-            (*last_sign, _) = (before, found.truncate(count));
+            *last_sign = before;
+            found.truncate(count);
             self.scan(index, step, Scan { on_motion: true, ..scan }, last_sign, found)?;
         }
         last_sign.departure = departure;
@@ -163,12 +163,12 @@ impl<const N: usize> Event<'_, N> {
     fn scan(
         &mut self,
         index: usize,
-        step: &mut LastStep<'_, N>,
+        step: &mut LastStep<'_>,
         Scan { points, separation, on_motion, near, departure }: Scan<'_>,
-        last_sign: &mut LastSign<N>,
-        found: &mut Vec<Crossing<N>>,
+        last_sign: &mut LastSign,
+        found: &mut Vec<Crossing>,
     ) -> Result<bool, StepError> {
-        let (start, end) = step.ends();
+        let (start, end) = step.span();
         let unresolved = match separation {
             Separation::Unresolved(from) => Some(StepError::EventUnresolved { t: step.time(from) }),
             _ => None,
@@ -183,7 +183,7 @@ impl<const N: usize> Event<'_, N> {
             };
             let interpolated = interpolated.filter(|(t, x)| (near..=f64::MAX).contains(&self.value(*t, x).abs()));
             let (t, state) = match interpolated {
-                _ if is_end => end,
+                _ if is_end => step.ends().1.clone(),
                 Some(interpolated) => interpolated,
                 None => (step.time(tau), step.at(step.time(tau))?),
             };
@@ -193,7 +193,7 @@ impl<const N: usize> Event<'_, N> {
                 continue;
             }
             if let Some(Departure { t, value: there }) = last_sign.departure {
-                let fraction = (t - start.0) / (end.0 - start.0);
+                let fraction = (t - start) / (end - start);
                 if fraction >= tau {
                     // The function is still on its surface.
                     continue;
@@ -224,7 +224,7 @@ impl<const N: usize> Event<'_, N> {
     }
 
     /// The value on the motion at a fraction of a step; NaN where the motion is not defined.
-    fn on_motion(&mut self, step: &LastStep<'_, N>, fraction: f64) -> f64 {
+    fn on_motion(&mut self, step: &LastStep<'_>, fraction: f64) -> f64 {
         let t = step.time(fraction);
         step.at(t).map_or(f64::NAN, |x| self.value(t, &x))
     }
@@ -233,10 +233,10 @@ impl<const N: usize> Event<'_, N> {
     /// one.
     fn before_its_domain_ends(
         &mut self,
-        step: &LastStep<'_, N>,
+        step: &LastStep<'_>,
         [mut from, mut to]: [f64; 2],
-        last_sign: &mut LastSign<N>,
-    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        last_sign: &mut LastSign,
+    ) -> Result<Option<(f64, State)>, StepError> {
         let before = last_sign.sign;
         loop {
             let tau = 0.5 * (from + to);
@@ -260,15 +260,10 @@ impl<const N: usize> Event<'_, N> {
 
     /// The sign change that counts between the last point and the next one, if there is one. `value` is the value of
     /// the function at the next point, and `side` has the sign that the function takes there.
-    fn between(
-        &mut self,
-        last_sign: &mut LastSign<N>,
-        [value, side]: [f64; 2],
-        (t, state): (f64, &PhasePoint<N>),
-    ) -> Change<N> {
+    fn between(&mut self, last_sign: &mut LastSign, [value, side]: [f64; 2], (t, state): (f64, &State)) -> Change {
         let before = std::mem::replace(&mut last_sign.value, value);
         if side == 0.0 {
-            last_sign.zero = last_sign.zero.or(Some((t, *state)));
+            last_sign.zero.get_or_insert_with(|| (t, state.clone()));
             return Change::None;
         }
         let (old, zero) = (std::mem::replace(&mut last_sign.sign, side.signum()), last_sign.zero.take());
@@ -278,7 +273,7 @@ impl<const N: usize> Event<'_, N> {
         match zero {
             Some((t, state)) => Change::There(t, state),
             // The point is on the surface, and the function is about to leave it.
-            None if !opposite_signs(value, before) => Change::There(t, *state),
+            None if !opposite_signs(value, before) => Change::There(t, state.clone()),
             None => Change::Between([before, value]),
         }
     }
@@ -291,19 +286,20 @@ impl<const N: usize> Event<'_, N> {
     /// surface when its value exceeds twice this bound, so that its sign is not due to round-off.
     pub(crate) fn departure_from(
         &mut self,
-        ScaledMotion { motion, scales, near }: ScaledMotion<'_, N>,
-        (t, state): (f64, &PhasePoint<N>),
+        ScaledMotion { motion, scales, near }: ScaledMotion<'_>,
+        from: &(f64, State),
         g: f64,
     ) -> Option<Departure> {
+        let (t, state) = (from.0, &from.1);
         let (rounding, state_rounding) = (scales.rounding(t), self.rounding(t, state, g));
         let shortest = (f64::powi(2.0, -20) * scales.h.abs()).max(64.0 * rounding);
         for ahead in (0..5).map(|k| shortest * f64::powi(16.0, k)).take_while(|ahead| *ahead <= 0.5 * scales.h.abs()) {
-            let Some(departure) = self.after((motion, near), (t, state), ahead.copysign(scales.h)) else { continue };
+            let Some(departure) = self.after((motion, near), from, ahead.copysign(scales.h)) else { continue };
             let window = state_rounding + (departure.value - g).abs() * (rounding / ahead);
             let on = g.abs() <= window
                 // The function may jump across its surface.
                 || opposite_signs(g, departure.value)
-                    && self.after((motion, near), (t, state), rounding.copysign(scales.h)).is_some_and(|x| opposite_signs(g, x.value));
+                    && self.after((motion, near), from, rounding.copysign(scales.h)).is_some_and(|x| opposite_signs(g, x.value));
             if !on {
                 return None;
             }
@@ -317,47 +313,52 @@ impl<const N: usize> Event<'_, N> {
     /// The function on the motion at a time after a point; `None` if the motion or the function is not defined there.
     fn after(
         &mut self,
-        (motion, near): (&dyn Motion<N>, NearbyVelocity<N>),
-        (t, state): (f64, &PhasePoint<N>),
+        (motion, near): (&dyn Motion, NearbyVelocity<'_>),
+        from: &(f64, State),
         ahead: f64,
     ) -> Option<Departure> {
-        let there = t + ahead;
-        let (x, _) = motion.state_within_step(&(t, *state), there, near, None).ok()?;
+        let there = from.0 + ahead;
+        let (x, _) = motion.state_within_step(from, there, near, None).ok()?;
         let value = self.value(there, &x);
         value.is_finite().then_some(Departure { t: there, value })
     }
 
     /// The effect of the round-off of the time and of the coordinates on the function, each rounded relative to itself.
-    fn noise(&mut self, (t, state): (f64, &PhasePoint<N>), g: f64) -> f64 {
+    fn noise(&mut self, (t, state): (f64, &State), g: f64) -> f64 {
         let factor = 1.0 + RELATIVE_ROUND_OFF;
         let mut change =
-            |t: f64, x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
-        let mut sum = change(t * factor, *state) + change(t, PhasePoint { z: state.z * factor, ..*state });
-        for i in 0..N {
-            let mut rounded = *state;
+            |t: f64, x: &State| Some((self.value(t, x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
+        let mut rounded = state.clone();
+        rounded.z *= factor;
+        let mut sum = change(t * factor, state) + change(t, &rounded);
+        rounded.z = state.z;
+        for i in 0..state.q.len() {
             rounded.q[i] *= factor;
-            sum += change(t, rounded);
-            rounded = *state;
+            sum += change(t, &rounded);
+            rounded.q[i] = state.q[i];
             rounded.p[i] *= factor;
-            sum += change(t, rounded);
+            sum += change(t, &rounded);
+            rounded.p[i] = state.p[i];
         }
         sum
     }
 
     /// The effect of the round-off of a state on the function, with q, p and z each rounded relative to its own size.
     /// Perturbations for which the function is not defined contribute nothing.
-    fn rounding(&mut self, t: f64, state: &PhasePoint<N>, g: f64) -> f64 {
+    fn rounding(&mut self, t: f64, state: &State, g: f64) -> f64 {
         let [q, p, z] = [state.q.amax(), state.p.amax(), state.z.abs()].map(|size| RELATIVE_ROUND_OFF * size);
-        let mut change =
-            |x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
-        let mut sum = change(PhasePoint { z: state.z + z, ..*state });
-        for i in 0..N {
-            let mut distance = *state;
-            distance.q[i] += q;
-            sum += change(distance);
-            distance = *state;
-            distance.p[i] += p;
-            sum += change(distance);
+        let mut change = |x: &State| Some((self.value(t, x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
+        let mut moved = state.clone();
+        moved.z += z;
+        let mut sum = change(&moved);
+        moved.z = state.z;
+        for i in 0..state.q.len() {
+            moved.q[i] += q;
+            sum += change(&moved);
+            moved.q[i] = state.q[i];
+            moved.p[i] += p;
+            sum += change(&moved);
+            moved.p[i] = state.p[i];
         }
         sum
     }

@@ -17,16 +17,16 @@ use std::ops::ControlFlow;
 /// problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut csv).run(Until::Time(10.0))?;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-pub struct CsvRows<'f, W: Write, const N: usize> {
-    rows: Rows<'f, N>,
+pub struct CsvRows<'f, W: Write> {
+    rows: Rows<'f>,
     writer: csv::Writer<W>,
     /// The error with which writing a row failed; it ends the run.
     pub error: Option<csv::Error>,
 }
 
-impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
+impl<'f, W: Write> CsvRows<'f, W> {
     /// Writes these rows to a file or another writer.
-    pub fn new(rows: Rows<'f, N>, to: W) -> Self {
+    pub fn new(rows: Rows<'f>, to: W) -> Self {
         CsvRows { rows, writer: csv::Writer::from_writer(to), error: None }
     }
 
@@ -40,7 +40,7 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
         if last { Ok(self.writer.flush()?) } else { Ok(()) }
     }
 
-    fn written(&mut self, flow: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn written(&mut self, flow: ControlFlow<Stop>, at: &StepView<'_>) -> ControlFlow<Stop> {
         if let Err(error) = self.write(at.k, at.last || flow.is_break()) {
             self.error = Some(error);
             return ControlFlow::Break(Stop::here("a failure to write a row"));
@@ -49,7 +49,7 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
     }
 }
 
-impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
+impl<W: Write> Observer for CsvRows<'_, W> {
     fn needs(&self) -> OutputRequest {
         self.rows.needs()
     }
@@ -62,12 +62,12 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
         self.rows.next(taken)
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         let flow = self.rows.start(at);
         self.written(flow, at)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         let flow = self.rows.step(at);
         self.written(flow, at)
     }
@@ -81,14 +81,14 @@ mod tests {
     use contact_examples::systems::Pendulum;
     use contact_geom::VelocityPoint;
 
-    fn run(observer: &mut impl Observer<1>) -> Status {
+    fn run(observer: &mut impl Observer) -> Status {
         let pendulum = OnLine::from(Pendulum { gamma: -0.1 });
         let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).observe(observer);
         run.run(Until::Time(2.0)).unwrap().status
     }
 
-    fn rows<'f>() -> Rows<'f, 1> {
+    fn rows<'f>() -> Rows<'f> {
         Rows::every(3).unwrap().with_energy().column("q^2", |_, x| x.q[0] * x.q[0])
     }
 

@@ -1,7 +1,6 @@
 //! An event: a function of the state whose sign changes are located.
 
-use crate::StepError;
-use contact_geom::PhasePoint;
+use crate::{State, StepError};
 use std::cell::RefCell;
 
 /// The sign changes that count, in the direction of the run.
@@ -13,19 +12,19 @@ enum Direction {
 }
 
 /// `g(t, state)`.
-type Function<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>;
+type Function<'f> = Box<dyn FnMut(f64, &State) -> f64 + 'f>;
 
 /// A function `g(t, state)` whose sign changes are located: a Poincare section, a collision, a turning point.
-pub struct Event<'f, const N: usize> {
+pub struct Event<'f> {
     /// In a cell, since trial runs call it too.
-    function: RefCell<Function<'f, N>>,
+    function: RefCell<Function<'f>>,
     direction: Direction,
     pub(crate) terminal: bool,
 }
 
-impl<'f, const N: usize> Event<'f, N> {
+impl<'f> Event<'f> {
     /// All sign changes of a function; they do not end the run.
-    pub fn new(function: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
+    pub fn new(function: impl FnMut(f64, &State) -> f64 + 'f) -> Self {
         Event { function: RefCell::new(Box::new(function)), direction: Direction::Both, terminal: false }
     }
 
@@ -45,16 +44,16 @@ impl<'f, const N: usize> Event<'f, N> {
     }
 
     /// The same event for a trial run.
-    pub(crate) fn borrowed(&self) -> Event<'_, N> {
-        let function = |t: f64, x: &PhasePoint<N>| self.function.try_borrow_mut().map_or(f64::NAN, |mut f| f(t, x));
+    pub(crate) fn borrowed(&self) -> Event<'_> {
+        let function = |t: f64, x: &State| self.function.try_borrow_mut().map_or(f64::NAN, |mut f| f(t, x));
         Event { function: RefCell::new(Box::new(function)), direction: self.direction, terminal: self.terminal }
     }
 
-    pub(crate) fn value(&mut self, t: f64, state: &PhasePoint<N>) -> f64 {
+    pub(crate) fn value(&mut self, t: f64, state: &State) -> f64 {
         self.function.get_mut()(t, state)
     }
 
-    pub(crate) fn at(&mut self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
+    pub(crate) fn at(&mut self, t: f64, state: &State) -> Result<f64, StepError> {
         let value = self.value(t, state);
         if value.is_finite() { Ok(value) } else { Err(StepError::Event { t }) }
     }
@@ -70,12 +69,12 @@ impl<'f, const N: usize> Event<'f, N> {
 }
 
 /// A sign change that was located.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crossing {
     /// The time.
     pub t: f64,
     /// The index of the event.
     pub event: usize,
     /// The state there, from which another run can start.
-    pub state: PhasePoint<N>,
+    pub state: State,
 }

@@ -1,11 +1,10 @@
 //! The roots of an event function within a step.
 
-use crate::StepError;
 use crate::run::observers::event::Event;
 use crate::run::observers::last_step::{LastStep, TaylorPolynomial};
 use crate::solve::roots::{bracketed_root, bracketed_root_within};
 use crate::solve::sign_changes::opposite_signs;
-use contact_geom::PhasePoint;
+use crate::{State, StepError};
 
 /// The relative round-off of a time and of a state, from the sums of a step, the iteration that solves it, and the root
 /// search.
@@ -36,19 +35,19 @@ const MIN_DECREASE: f64 = 0.25;
 /// The largest number of corrections of a root; after these the root is bracketed on the motion itself.
 const MAX_CORRECTIONS: usize = 6;
 
-impl<const N: usize> Event<'_, N> {
+impl Event<'_> {
     /// The value on the interpolant at a fraction of a step.
-    pub(super) fn on_interpolant(&mut self, step: &mut LastStep<'_, N>, fraction: f64) -> Result<f64, StepError> {
+    pub(super) fn on_interpolant(&mut self, step: &mut LastStep<'_>, fraction: f64) -> Result<f64, StepError> {
         step.interpolate(fraction).map(|x| self.value(step.time(fraction), &x))
     }
 
     /// The root between two points of a step at which the function has opposite signs, to round-off.
     pub(super) fn root(
         &mut self,
-        step: &LastStep<'_, N>,
+        step: &LastStep<'_>,
         ends: [f64; 2],
         values: [f64; 2],
-    ) -> Result<(f64, PhasePoint<N>), StepError> {
+    ) -> Result<(f64, State), StepError> {
         let tau = bracketed_root(ends, values, |tau| self.at(step.time(tau), &step.at(step.time(tau))?))?;
         Ok((step.time(tau), step.at(step.time(tau))?))
     }
@@ -58,9 +57,9 @@ impl<const N: usize> Event<'_, N> {
     /// function jumps.
     pub(super) fn root_by_newton(
         &mut self,
-        step: &mut LastStep<'_, N>,
+        step: &mut LastStep<'_>,
         [a, b]: [f64; 2],
-    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+    ) -> Result<Option<(f64, State)>, StepError> {
         let mut interpolant = |tau: f64| self.on_interpolant(step, tau);
         let ends = [interpolant(a)?, interpolant(b)?];
         // Written so that a NaN is not a sign change.
@@ -73,7 +72,7 @@ impl<const N: usize> Event<'_, N> {
         let distance = SLOPE_DISTANCE * width;
         let (lower, upper) = ((tau - distance).max(0.0), (tau + distance).min(1.0));
         let mut slope = (interpolant(upper)? - interpolant(lower)?) / (upper - lower);
-        let mut last: Option<(f64, f64, (f64, PhasePoint<N>))> = None;
+        let mut last: Option<(f64, f64, (f64, State))> = None;
         for _ in 0..MAX_CORRECTIONS {
             let at = (step.time(tau), step.at(step.time(tau))?);
             let g = self.value(at.0, &at.1);
@@ -90,21 +89,24 @@ impl<const N: usize> Event<'_, N> {
             if change.abs() <= 0.5 * RELATIVE_ROUND_OFF {
                 return Ok(Some(at));
             }
-            if change.abs() <= TaylorPolynomial::<N>::MAX_DISTANCE
+            if change.abs() <= TaylorPolynomial::MAX_DISTANCE
                 && let Some(found) = self.root_by_taylor(step, (tau, &at.1), slope, change)?
             {
                 return Ok(Some(found));
             }
             // This close to two states the motion is linear to round-off, and the line through them replaces another
             // correction.
-            if let Some((before, _, (_, from))) = last
+            if let Some((before, _, (_, from))) = &last
                 && let gap = tau - before
                 && (change * gap).abs() <= f64::EPSILON / 16.0
                 && change * change < 0.5 * RELATIVE_ROUND_OFF * gap.abs()
             {
                 let part = -change / gap;
-                let (q, p) = (at.1.q + (at.1.q - from.q) * part, at.1.p + (at.1.p - from.p) * part);
-                let state = PhasePoint { q, p, z: at.1.z + (at.1.z - from.z) * part };
+                let state = State {
+                    q: &at.1.q + (&at.1.q - &from.q) * part,
+                    p: &at.1.p + (&at.1.p - &from.p) * part,
+                    z: at.1.z + (at.1.z - from.z) * part,
+                };
                 return Ok(Some((step.time(tau - change), state)));
             }
             // If two iterates differ by round-off only, the one with the smaller value is taken.
@@ -128,11 +130,11 @@ impl<const N: usize> Event<'_, N> {
     /// that no second state is needed.
     fn root_by_taylor(
         &mut self,
-        step: &mut LastStep<'_, N>,
-        (tau, state): (f64, &PhasePoint<N>),
+        step: &mut LastStep<'_>,
+        (tau, state): (f64, &State),
         slope: f64,
         mut ahead: f64,
-    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+    ) -> Result<Option<(f64, State)>, StepError> {
         let Some(polynomial) = step.taylor_polynomial(tau, state)? else { return Ok(None) };
         ahead = -ahead;
         for _ in 0..MAX_CORRECTIONS {
@@ -143,8 +145,7 @@ impl<const N: usize> Event<'_, N> {
             }
             ahead -= change;
             // Written so that a NaN is out of range.
-            let within =
-                ahead.abs() <= 2.0 * TaylorPolynomial::<N>::MAX_DISTANCE && (0.0..=1.0).contains(&(tau + ahead));
+            let within = ahead.abs() <= 2.0 * TaylorPolynomial::MAX_DISTANCE && (0.0..=1.0).contains(&(tau + ahead));
             if !within {
                 return Ok(None);
             }

@@ -1,12 +1,10 @@
 //! Events: sign changes of functions of the state along a run.
 
-use crate::numbers::order::sorted;
 use crate::run::observers::crossings::{LastSign, ScaledMotion, TimeScales};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
 use crate::solve::sign_changes::Separator;
-use crate::{InputError, StepError};
-use contact_geom::PhasePoint;
+use crate::{InputError, State, StepError};
 use std::ops::ControlFlow;
 
 /// Locates events along a run, each to the round-off of the time, for any integrator.
@@ -49,25 +47,25 @@ use std::ops::ControlFlow;
 /// println!("passes its lowest point at {:?}", lowest.crossings.iter().map(|c| c.t).collect::<Vec<_>>());
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-pub struct Events<'f, const N: usize> {
+pub struct Events<'f> {
     /// The sign changes so far, in the order of the run.
-    pub crossings: Vec<Crossing<N>>,
-    events: Vec<Event<'f, N>>,
+    pub crossings: Vec<Crossing>,
+    events: Vec<Event<'f>>,
     needs: OutputRequest,
-    last_signs: Vec<LastSign<N>>,
+    last_signs: Vec<LastSign>,
     scales: TimeScales,
     /// Interpolated states within the last step.
-    interpolated: Vec<PhasePoint<N>>,
+    interpolated: Vec<State>,
     /// Points that separate the sign changes of a function.
     points: Vec<Separator>,
     /// The time at the end of the last step, and the time derivatives of the state there if they were computed: they
     /// are those at the start of the next step.
-    rates: Option<(f64, PhasePoint<N>)>,
+    rates: Option<(f64, State)>,
 }
 
-impl<'f, const N: usize> Events<'f, N> {
+impl<'f> Events<'f> {
     /// An observer of these events; crossings refer to them by their index.
-    pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
+    pub fn new(events: impl IntoIterator<Item = Event<'f>>) -> Self {
         let events = events.into_iter().collect();
         let (crossings, last_signs, interpolated, points) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Events {
@@ -88,11 +86,7 @@ impl<'f, const N: usize> Events<'f, N> {
     }
 
     /// The crossings in a step, in the order of the run, and the error that ended the search, if there was one.
-    fn in_step(
-        &mut self,
-        step: &mut LastStep<'_, N>,
-        motion: ScaledMotion<'_, N>,
-    ) -> (Vec<Crossing<N>>, Option<StepError>) {
+    fn in_step(&mut self, step: &mut LastStep<'_>, motion: ScaledMotion<'_>) -> (Vec<Crossing>, Option<StepError>) {
         let (mut found, mut cause) = (Vec::new(), None);
         if let Err(cause) = step.interpolated_states(&mut self.interpolated) {
             return (found, Some(cause));
@@ -112,15 +106,13 @@ impl<'f, const N: usize> Events<'f, N> {
             // Only the crossings before the time at which a function is not defined or not resolved.
             found.retain(|crossing| !before(t, crossing.t));
         }
-        found = sorted(&found, |crossing| crossing.t, backward);
+        found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
         // Simultaneous crossings are ordered by their index.
         let mut rest = found.as_mut_slice();
         while let Some(first) = rest.first() {
             let (t, rounding) = (first.t, motion.scales.rounding(first.t));
             let (together, later) = rest.split_at_mut(rest.partition_point(|c| (c.t - t).abs() <= rounding));
-            if together.len() > 1 {
-                together.copy_from_slice(&sorted(together, |crossing| crossing.event as f64, false));
-            }
+            together.sort_by_key(|crossing| crossing.event);
             rest = later;
         }
         (found, cause)
@@ -128,25 +120,26 @@ impl<'f, const N: usize> Events<'f, N> {
 
     /// Whether a crossing is simultaneous with an earlier one: its time is the same up to round-off, or a run that
     /// starts at the earlier crossing would not count it.
-    fn together(&mut self, first: &Crossing<N>, other: &Crossing<N>, motion: ScaledMotion<'_, N>) -> bool {
+    fn together(&mut self, first: &Crossing, other: &Crossing, motion: ScaledMotion<'_>) -> bool {
         let event = &mut self.events[other.event];
         (other.t - first.t).abs() <= motion.scales.rounding(first.t)
             || event
                 .at(first.t, &first.state)
-                .is_ok_and(|value| event.departure_from(motion, (first.t, &first.state), value).is_some())
+                .is_ok_and(|value| event.departure_from(motion, &(first.t, first.state.clone()), value).is_some())
     }
 
     /// Takes the signs at the start of the run, or after a reset.
-    fn start_at(&mut self, at: &StepView<'_, N>, (t, state): (f64, PhasePoint<N>)) -> ControlFlow<Stop<N>> {
+    fn start_at(&mut self, at: &StepView<'_>, start: &(f64, State)) -> ControlFlow<Stop> {
         self.last_signs.clear();
         self.rates = None;
-        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
+        let near = at.stepper.last_velocity();
+        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: near.as_ref() };
         for event in &mut self.events {
-            match event.at(t, &state) {
+            match event.at(start.0, &start.1) {
                 Ok(value) => {
-                    let departure = event.departure_from(motion, (t, &state), value);
+                    let departure = event.departure_from(motion, start, value);
                     let side = departure.map_or(value, |departure| departure.value);
-                    let zero = (side == 0.0).then_some((t, state));
+                    let zero = (side == 0.0).then(|| start.clone());
                     let sign = if side == 0.0 { 0.0 } else { side.signum() };
                     self.last_signs.push(LastSign { value, sign, zero, departure });
                 }
@@ -157,23 +150,27 @@ impl<'f, const N: usize> Events<'f, N> {
     }
 
     /// Finds the sign changes in a step, or in a piece of one.
-    fn piece(&mut self, at: &StepView<'_, N>, step: LastStep<'_, N>) -> ControlFlow<Stop<N>> {
+    fn piece(&mut self, at: &StepView<'_>, step: LastStep<'_>) -> ControlFlow<Stop> {
         let from = step.span().0;
-        let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));
-        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: at.stepper.last_velocity() };
+        let rates = self.rates.take().filter(|(t, _)| *t == from).map(|(_, rates)| rates);
+        let mut step = step.with_rates_at_start(rates);
+        let near = at.stepper.last_velocity();
+        let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: near.as_ref() };
         let (found, cause) = self.in_step(&mut step, motion);
         let to = step.span().1;
-        self.rates = step.rates_at_end().map(|rates| (to, rates));
-        let mut end: Option<Crossing<N>> = None;
+        self.rates = step.into_rates_at_end().map(|rates| (to, rates));
+        let mut end: Option<Crossing> = None;
         for crossing in found {
             // An event has only one crossing at the time at which it ends the run.
-            if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, motion)) {
+            if let Some(end) = &end
+                && (end.event == crossing.event || !self.together(end, &crossing, motion))
+            {
                 continue;
             }
-            self.crossings.push(crossing);
-            if self.events[crossing.event].terminal {
-                end = end.or(Some(crossing));
+            if end.is_none() && self.events[crossing.event].terminal {
+                end = Some(crossing.clone());
             }
+            self.crossings.push(crossing);
         }
         if let Some(end) = end {
             return ControlFlow::Break(Stop { at: Some((end.t, end.state)), ..Stop::here("an event") });
@@ -193,7 +190,7 @@ fn time_of(error: StepError) -> Option<f64> {
     }
 }
 
-impl<const N: usize> Observer<N> for Events<'_, N> {
+impl Observer for Events<'_> {
     fn needs(&self) -> OutputRequest {
         self.needs
     }
@@ -206,11 +203,11 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         Ok(())
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
-        self.start_at(at, (at.t, at.state))
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        self.start_at(at, &(at.t, at.state.clone()))
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
         for (k, piece) in step.pieces().into_iter().enumerate() {
             if k > 0 {
@@ -221,8 +218,8 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         ControlFlow::Continue(())
     }
 
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         let events: Vec<_> = self.events.iter().filter(|event| event.terminal).map(Event::borrowed).collect();
-        (!events.is_empty()).then(|| Box::new(Events { needs: self.needs, ..Events::new(events) }) as Terminal<'_, N>)
+        (!events.is_empty()).then(|| Box::new(Events { needs: self.needs, ..Events::new(events) }) as Terminal<'_>)
     }
 }

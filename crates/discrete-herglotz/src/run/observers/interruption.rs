@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 /// Ends a run when its [`Interrupt`] requests it.
 pub(crate) struct Interruption<'a>(pub Interrupt<'a>);
 
-impl<const N: usize> Observer<N> for Interruption<'_> {
+impl Observer for Interruption<'_> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::default()
     }
@@ -16,11 +16,11 @@ impl<const N: usize> Observer<N> for Interruption<'_> {
         (taken / STEPS_BETWEEN_QUERIES + 1) * STEPS_BETWEEN_QUERIES
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         // A run that has reached its end is complete.
         if !at.last && self.0.is_requested() {
             return ControlFlow::Break(Stop::here(INTERRUPTION));

@@ -3,9 +3,7 @@
 use crate::integration::Piece;
 use crate::integration::motion::Motion;
 use crate::solve::chebyshev::node;
-use crate::{DenseStep, StepError, Stepper};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{DenseStep, State, StepError, Stepper, Vector};
 
 /// The degree of interpolation of a function along a step, if the method has no dense output: larger by one than that
 /// of the cubic curve through both ends.
@@ -19,50 +17,46 @@ const CURVATURE_DISTANCE: f64 = 1e-3;
 const MAX_SLOPE_DIFFERENCE: f64 = 1e-4;
 
 /// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.
-pub(crate) struct TaylorPolynomial<const N: usize> {
-    state: PhasePoint<N>,
-    slope: PhasePoint<N>,
-    curvature: PhasePoint<N>,
+pub(crate) struct TaylorPolynomial {
+    state: State,
+    slope: State,
+    curvature: State,
 }
 
-impl<const N: usize> TaylorPolynomial<N> {
+impl TaylorPolynomial {
     /// The fraction of a step up to which the third-order term is below round-off, if the step resolves the motion.
     pub(crate) const MAX_DISTANCE: f64 = 1e-6;
 
     /// The state at a distance `ahead`, in fractions of the step.
-    pub(crate) fn at(&self, ahead: f64) -> PhasePoint<N> {
+    pub(crate) fn at(&self, ahead: f64) -> State {
         let TaylorPolynomial { state, slope, curvature } = self;
         let half = 0.5 * ahead;
-        PhasePoint {
-            q: state.q + (slope.q + curvature.q * half) * ahead,
-            p: state.p + (slope.p + curvature.p * half) * ahead,
+        State {
+            q: &state.q + (&slope.q + &curvature.q * half) * ahead,
+            p: &state.p + (&slope.p + &curvature.p * half) * ahead,
             z: state.z + (slope.z + curvature.z * half) * ahead,
         }
     }
 }
 
 /// A step, with dense output between its ends.
-pub struct LastStep<'r, const N: usize> {
+pub struct LastStep<'r> {
     /// The start of the whole step, from which steps to points within it are taken.
-    origin: (f64, PhasePoint<N>),
-    from: (f64, PhasePoint<N>),
-    to: (f64, PhasePoint<N>),
-    motion: &'r dyn Motion<N>,
-    stepper: &'r dyn Stepper<N>,
+    origin: (f64, State),
+    from: (f64, State),
+    to: (f64, State),
+    motion: &'r dyn Motion,
+    stepper: &'r dyn Stepper,
     /// The curve of the step, if the method has one; computed on demand.
-    curve: Option<Option<DenseStep<N>>>,
+    curve: Option<Option<DenseStep>>,
     /// The time derivatives of the state at both ends, computed on demand.
-    rates: [Option<PhasePoint<N>>; 2],
+    rates: [Option<State>; 2],
 }
 
-impl<'r, const N: usize> LastStep<'r, N> {
+impl<'r> LastStep<'r> {
     /// The step between two times with their states.
-    pub(crate) fn new(
-        [from, to]: [(f64, PhasePoint<N>); 2],
-        motion: &'r dyn Motion<N>,
-        stepper: &'r dyn Stepper<N>,
-    ) -> Self {
-        LastStep { origin: from, from, to, motion, stepper, curve: None, rates: [None; 2] }
+    pub(crate) fn new([from, to]: [(f64, State); 2], motion: &'r dyn Motion, stepper: &'r dyn Stepper) -> Self {
+        LastStep { origin: from.clone(), from, to, motion, stepper, curve: None, rates: [None, None] }
     }
 
     /// The pieces of this step between its resets, in their order; the step itself if it has none.
@@ -72,14 +66,14 @@ impl<'r, const N: usize> LastStep<'r, N> {
             return vec![self];
         }
         let LastStep { origin, motion, stepper, .. } = self;
-        let of = |Piece { from, to, dense }: &Piece<N>| LastStep {
-            origin,
-            from: *from,
-            to: *to,
+        let of = |Piece { from, to, dense }: &Piece| LastStep {
+            origin: origin.clone(),
+            from: from.clone(),
+            to: to.clone(),
             motion,
             stepper,
-            curve: Some(*dense),
-            rates: [None; 2],
+            curve: Some(dense.clone()),
+            rates: [None, None],
         };
         pieces.iter().map(of).collect()
     }
@@ -90,8 +84,8 @@ impl<'r, const N: usize> LastStep<'r, N> {
     }
 
     /// The times and states of both ends.
-    pub fn ends(&self) -> ((f64, PhasePoint<N>), (f64, PhasePoint<N>)) {
-        (self.from, self.to)
+    pub fn ends(&self) -> (&(f64, State), &(f64, State)) {
+        (&self.from, &self.to)
     }
 
     /// The time at a fraction of the step.
@@ -104,33 +98,34 @@ impl<'r, const N: usize> LastStep<'r, N> {
     ///
     /// # Errors
     /// Those of a step.
-    pub fn at(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
-        if t == self.to.0 { Ok(self.to.1) } else { self.step_to(t).map(|(state, _)| state) }
+    pub fn at(&self, t: f64) -> Result<State, StepError> {
+        if t == self.to.0 { Ok(self.to.1.clone()) } else { self.step_to(t).map(|(state, _)| state) }
     }
 
     /// The same state with the `sigma_d` of the step that ends there; always computed by a step, except at the start.
-    pub(crate) fn step_to(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
+    pub(crate) fn step_to(&self, t: f64) -> Result<(State, f64), StepError> {
         if t == self.from.0 {
-            return Ok((self.from.1, 1.0));
+            return Ok((self.from.1.clone(), 1.0));
         }
         let is_whole = self.origin.0 == self.from.0;
         let curve = self.curve.as_ref().and_then(Option::as_ref).filter(|_| is_whole);
-        self.motion.state_within_step(&self.origin, t, self.stepper.last_velocity(), curve)
+        self.motion.state_within_step(&self.origin, t, self.stepper.last_velocity().as_ref(), curve)
     }
 
     /// The same step with the time derivatives at its start, as computed for the preceding step.
-    pub(crate) fn with_rates_at_start(self, rates: Option<PhasePoint<N>>) -> Self {
+    pub(crate) fn with_rates_at_start(self, rates: Option<State>) -> Self {
         LastStep { rates: [rates, None], ..self }
     }
 
     /// The time derivatives at the end, if they have been computed.
-    pub(crate) fn rates_at_end(&self) -> Option<PhasePoint<N>> {
-        self.rates[1]
+    pub(crate) fn into_rates_at_end(self) -> Option<State> {
+        let [_, at_end] = self.rates;
+        at_end
     }
 
     /// Interpolated states at the Chebyshev-Lobatto nodes between the ends of the step, at which a search along it
     /// first evaluates a function; no step is taken.
-    pub(crate) fn interpolated_states(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
+    pub(crate) fn interpolated_states(&mut self, to: &mut Vec<State>) -> Result<(), StepError> {
         to.clear();
         if let Some(curve) = self.curve() {
             curve.states_at_nodes(to);
@@ -148,57 +143,68 @@ impl<'r, const N: usize> LastStep<'r, N> {
     pub(crate) fn taylor_polynomial(
         &mut self,
         fraction: f64,
-        state: &PhasePoint<N>,
-    ) -> Result<Option<TaylorPolynomial<N>>, StepError> {
+        state: &State,
+    ) -> Result<Option<TaylorPolynomial>, StepError> {
         let (t0, t1) = self.span();
         let near = self.stepper.last_velocity();
-        let Ok(rates) = self.motion.rates(self.time(fraction), state, near) else { return Ok(None) };
+        let Ok(rates) = self.motion.rates(self.time(fraction), state, near.as_ref()) else { return Ok(None) };
         let distance = CURVATURE_DISTANCE.min(fraction).min(1.0 - fraction);
         let (below, here, above) = (
             self.interpolate(fraction - distance)?,
             self.interpolate(fraction)?,
             self.interpolate(fraction + distance)?,
         );
-        let part = |of: fn(&PhasePoint<N>) -> SVector<f64, N>| {
+        let part = |of: fn(&State) -> &Vector| {
             let slope = of(&rates) * (t1 - t0);
             let [below, here, above] = [&below, &here, &above].map(of);
-            let agrees = ((above - below) / (2.0 * distance) - slope).amax() <= MAX_SLOPE_DIFFERENCE * slope.amax();
+            let agrees = ((above - below) / (2.0 * distance) - &slope).amax() <= MAX_SLOPE_DIFFERENCE * slope.amax();
             (agrees, slope, (above - here * 2.0 + below) / (distance * distance))
         };
-        let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| x.q), part(|x| x.p));
+        let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| &x.q), part(|x| &x.p));
         let z_curvature = (above.z - 2.0 * here.z + below.z) / (distance * distance);
         Ok((q_agrees && p_agrees).then_some(TaylorPolynomial {
-            state: *state,
-            slope: PhasePoint { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
-            curvature: PhasePoint { q: q_curvature, p: p_curvature, z: z_curvature },
+            state: state.clone(),
+            slope: State { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
+            curvature: State { q: q_curvature, p: p_curvature, z: z_curvature },
         }))
     }
 
-    fn curve(&mut self) -> Option<&DenseStep<N>> {
+    fn curve(&mut self) -> Option<&DenseStep> {
         self.curve.get_or_insert_with(|| self.stepper.dense()).as_ref()
     }
 
     /// The interpolated state at a fraction of the step, without taking a step: by the collocation polynomial if there
     /// is one, otherwise by the cubic Hermite polynomial through both ends.
-    pub(crate) fn interpolate(&mut self, fraction: f64) -> Result<PhasePoint<N>, StepError> {
+    pub(crate) fn interpolate(&mut self, fraction: f64) -> Result<State, StepError> {
         if let Some(curve) = self.curve() {
             return Ok(curve.at_fraction(fraction));
         }
-        let ((t0, a), (t1, b)) = (self.from, self.to);
-        let ([ra, rb], near) = (self.rates, self.stepper.last_velocity());
-        let ra = ra.map_or_else(|| self.motion.rates(t0, &a, near), Ok)?;
-        let rb = rb.map_or_else(|| self.motion.rates(t1, &b, near), Ok)?;
-        self.rates = [Some(ra), Some(rb)];
+        let LastStep { from, to, motion, stepper, rates: [at_start, at_end], .. } = self;
+        let ra = rates_at(from, at_start, (*motion, *stepper))?;
+        let rb = rates_at(to, at_end, (*motion, *stepper))?;
+        let ((t0, a), (t1, b)) = (&*from, &*to);
         let (u, rest, h) = (fraction, 1.0 - fraction, t1 - t0);
         let weights =
             [rest * rest * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * rest), h * u * rest * rest, -h * u * u * rest];
-        let of = |a: &SVector<f64, N>, b: &SVector<f64, N>, ra: &SVector<f64, N>, rb: &SVector<f64, N>| {
+        let of = |a: &Vector, b: &Vector, ra: &Vector, rb: &Vector| {
             a * weights[0] + b * weights[1] + ra * weights[2] + rb * weights[3]
         };
-        Ok(PhasePoint {
+        Ok(State {
             q: of(&a.q, &b.q, &ra.q, &rb.q),
             p: of(&a.p, &b.p, &ra.p, &rb.p),
             z: a.z * weights[0] + b.z * weights[1] + ra.z * weights[2] + rb.z * weights[3],
         })
+    }
+}
+
+/// The time derivatives at an end of a step, computed if they are not known.
+fn rates_at<'k>(
+    (t, state): &(f64, State),
+    known: &'k mut Option<State>,
+    (motion, stepper): (&dyn Motion, &dyn Stepper),
+) -> Result<&'k State, StepError> {
+    match known {
+        Some(rates) => Ok(rates),
+        None => Ok(known.insert(motion.rates(*t, state, stepper.last_velocity().as_ref())?)),
     }
 }

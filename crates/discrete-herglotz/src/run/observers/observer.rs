@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 /// An observer of a run. It is called at the start, at least at the steps that it requests, and at the last step.
 ///
 /// Pairs, triples and vectors of observers are called in their order.
-pub trait Observer<const N: usize> {
+pub trait Observer {
     /// The quantities that it requests of the run; by default the action.
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
@@ -29,34 +29,34 @@ pub trait Observer<const N: usize> {
     }
 
     /// Called at the start, before the first step.
-    fn start(&mut self, _at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
     }
 
     /// Called at the end of a step that this or another observer has requested, and of the last step; `Break` ends the
     /// run.
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>>;
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop>;
 
     /// An observer that ends trial runs where this one ends its run, and has no other effect; `None`, the default, if
     /// it never ends a run. An accuracy is then not refused because of the motion after that end.
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         None
     }
 }
 
 /// An observer that only ends runs; see [`Observer::terminal`].
-pub type Terminal<'o, const N: usize> = Box<dyn Observer<N> + 'o>;
+pub type Terminal<'o> = Box<dyn Observer + 'o>;
 
 /// Combines the terminal observers of several observers.
-fn all_terminal<'o, const N: usize>(of: impl IntoIterator<Item = Option<Terminal<'o, N>>>) -> Option<Terminal<'o, N>> {
+fn all_terminal<'o>(of: impl IntoIterator<Item = Option<Terminal<'o>>>) -> Option<Terminal<'o>> {
     let all: Vec<_> = of.into_iter().flatten().collect();
-    (!all.is_empty()).then(|| Box::new(all) as Terminal<'o, N>)
+    (!all.is_empty()).then(|| Box::new(all) as Terminal<'o>)
 }
 
 /// Implements [`Observer`] for tuples of observers.
 macro_rules! one_after_the_other {
     ($($name:ident $field:tt),+) => {
-        impl<const N: usize, $($name: Observer<N>),+> Observer<N> for ($($name,)+) {
+        impl<$($name: Observer),+> Observer for ($($name,)+) {
             fn needs(&self) -> OutputRequest {
                 OutputRequest::default()$(.and(self.$field.needs()))+
             }
@@ -67,15 +67,15 @@ macro_rules! one_after_the_other {
             fn next(&self, taken: usize) -> usize {
                 usize::MAX$(.min(self.$field.next(taken)))+
             }
-            fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+            fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
                 $(self.$field.start(at)?;)+
                 ControlFlow::Continue(())
             }
-            fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+            fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
                 $(self.$field.step(at)?;)+
                 ControlFlow::Continue(())
             }
-            fn terminal(&self) -> Option<Terminal<'_, N>> {
+            fn terminal(&self) -> Option<Terminal<'_>> {
                 all_terminal([$(self.$field.terminal()),+])
             }
         }
@@ -85,7 +85,7 @@ macro_rules! one_after_the_other {
 one_after_the_other!(A 0, B 1);
 one_after_the_other!(A 0, B 1, C 2);
 
-impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
+impl<O: Observer> Observer for Vec<O> {
     fn needs(&self) -> OutputRequest {
         self.iter().fold(OutputRequest::default(), |needs, observer| needs.and(observer.needs()))
     }
@@ -95,13 +95,13 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
     fn next(&self, taken: usize) -> usize {
         self.iter().map(|observer| observer.next(taken)).min().unwrap_or(usize::MAX)
     }
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.iter_mut().try_for_each(|observer| observer.start(at))
     }
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.iter_mut().try_for_each(|observer| observer.step(at))
     }
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         all_terminal(self.iter().map(Observer::terminal))
     }
 }
@@ -109,7 +109,7 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
 /// An observer that is borrowed from its owner.
 pub(crate) struct Borrowed<'o, O>(pub &'o mut O);
 
-impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
+impl<O: Observer> Observer for Borrowed<'_, O> {
     fn needs(&self) -> OutputRequest {
         self.0.needs()
     }
@@ -119,18 +119,18 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
     fn next(&self, taken: usize) -> usize {
         self.0.next(taken)
     }
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0.start(at)
     }
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0.step(at)
     }
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         self.0.terminal()
     }
 }
 
-impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
+impl Observer for Box<dyn Observer + '_> {
     fn needs(&self) -> OutputRequest {
         (**self).needs()
     }
@@ -140,13 +140,13 @@ impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
     fn next(&self, taken: usize) -> usize {
         (**self).next(taken)
     }
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         (**self).start(at)
     }
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         (**self).step(at)
     }
-    fn terminal(&self) -> Option<Terminal<'_, N>> {
+    fn terminal(&self) -> Option<Terminal<'_>> {
         (**self).terminal()
     }
 }

@@ -29,6 +29,8 @@ impl OutputRequest {
 /// The data of a run before it starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunInfo {
+    /// The number of coordinates.
+    pub dimension: usize,
     /// The start time.
     pub t0: f64,
     /// The end time; before the start time if the run goes backward in time.
@@ -41,5 +43,5 @@ pub struct RunInfo {
 
 impl RunInfo {
     /// The value before an observer has been prepared.
-    pub(crate) const NONE: RunInfo = RunInfo { t0: 0.0, t_end: 0.0, h: None, count: None };
+    pub(crate) const NONE: RunInfo = RunInfo { dimension: 0, t0: 0.0, t_end: 0.0, h: None, count: None };
 }

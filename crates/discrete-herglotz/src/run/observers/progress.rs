@@ -36,7 +36,7 @@ impl<F: FnMut(f64)> Progress<F> {
     }
 }
 
-impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
+impl<F: FnMut(f64)> Observer for Progress<F> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::default()
     }
@@ -50,11 +50,11 @@ impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
         (taken / self.stride() + 1).saturating_mul(self.stride())
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if at.last || at.k.is_multiple_of(self.stride()) {
             let RunInfo { t0, t_end, .. } = self.run;
             (self.report)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });

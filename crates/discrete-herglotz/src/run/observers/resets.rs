@@ -26,24 +26,24 @@ use std::ops::ControlFlow;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct Resets<const N: usize> {
+pub struct Resets {
     /// The resets so far, in the order of the run.
-    pub resets: Vec<Reset<N>>,
+    pub resets: Vec<Reset>,
 }
 
-impl<const N: usize> Resets<N> {
+impl Resets {
     /// An observer that has seen no resets.
     pub fn new() -> Self {
         Resets { resets: Vec::new() }
     }
 }
 
-impl<const N: usize> Observer<N> for Resets<N> {
+impl Observer for Resets {
     fn needs(&self) -> OutputRequest {
         OutputRequest::default()
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.resets.extend_from_slice(at.resets());
         ControlFlow::Continue(())
     }

@@ -1,23 +1,21 @@
 //! Rows: the states of a motion at steps or at times.
 
 use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
-use crate::{InputError, StepError};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{InputError, State, StepError, Vector};
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
 /// A recorded state of a motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row<const N: usize> {
+pub struct Row {
     /// The time.
     pub t: f64,
     /// The position.
-    pub q: SVector<f64, N>,
+    pub q: Vector,
     /// The velocity, if it is [requested](Rows::with_velocity).
-    pub v: Option<SVector<f64, N>>,
+    pub v: Option<Vector>,
     /// The momentum.
-    pub p: SVector<f64, N>,
+    pub p: Vector,
     /// The action, unless it is [omitted](Rows::without_action).
     pub z: Option<f64>,
     /// The energy `E_L = v.p - L`, if it is [requested](Rows::with_energy).
@@ -29,7 +27,7 @@ pub struct Row<const N: usize> {
     pub columns: Vec<f64>,
 }
 
-impl<const N: usize> Row<N> {
+impl Row {
     /// All numbers of the row, in the order of [`Rows::header`].
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let vectors = self.q.iter().chain(self.v.iter().flatten()).chain(self.p.iter());
@@ -39,7 +37,7 @@ impl<const N: usize> Row<N> {
 }
 
 /// A function of time and state, with the name of its column.
-type Column<'f, const N: usize> = (String, Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>);
+type Column<'f> = (String, Box<dyn FnMut(f64, &State) -> f64 + 'f>);
 
 /// The times at which states are recorded.
 #[derive(Clone, Debug)]
@@ -51,21 +49,21 @@ enum RowTimes {
 }
 
 /// Records the states of a motion.
-pub struct Rows<'f, const N: usize> {
+pub struct Rows<'f> {
     /// The rows so far.
-    pub rows: Vec<Row<N>>,
+    pub rows: Vec<Row>,
     when: RowTimes,
-    columns: Vec<Column<'f, N>>,
+    columns: Vec<Column<'f>>,
     needs: OutputRequest,
     velocity: bool,
     energy: bool,
     run: RunInfo,
 }
 
-/// The largest number of rows: a few gigabytes.
+/// The largest number of rows: some tens of gigabytes.
 const MAX_ROWS: usize = 1 << 26;
 
-impl<'f, const N: usize> Rows<'f, N> {
+impl<'f> Rows<'f> {
     /// The start, the state after each `stride` steps, and the end.
     ///
     /// # Errors
@@ -108,7 +106,7 @@ impl<'f, const N: usize> Rows<'f, N> {
     }
 
     /// Adds a column: a function of time and state, with a name.
-    pub fn column(mut self, name: impl Into<String>, f: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
+    pub fn column(mut self, name: impl Into<String>, f: impl FnMut(f64, &State) -> f64 + 'f) -> Self {
         self.columns.push((name.into(), Box::new(f)));
         self
     }
@@ -135,9 +133,16 @@ impl<'f, const N: usize> Rows<'f, N> {
 
     /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`,
     /// and those of the columns.
+    ///
+    /// The number of coordinates is that of the run for which the rows were prepared; before a run that of the first
+    /// row, and 0 if there is none.
     pub fn header(&self) -> Vec<String> {
+        let n = match self.run.dimension {
+            0 => self.rows.first().map_or(0, |row| row.q.len()),
+            n => n,
+        };
         let of =
-            |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));
+            |letter: &'static str, there: bool| (0..if there { n } else { 0 }).map(move |i| format!("{letter}{i}"));
         let one = |name: &str, there: bool| there.then(|| name.to_owned());
         let vectors = of("q", true).chain(of("v", self.velocity)).chain(of("p", true));
         let numbers =
@@ -146,19 +151,19 @@ impl<'f, const N: usize> Rows<'f, N> {
         one("t", true).into_iter().chain(vectors).chain(numbers.into_iter().flatten()).chain(columns).collect()
     }
 
-    fn record(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
+    fn record(&mut self, at: &StepView<'_>) -> Result<(), StepError> {
         let v = if self.velocity { Some(at.velocity()?) } else { None };
         let energy = if self.energy { Some(at.energy()?) } else { None };
-        let StepView { t, state, log_factor, .. } = *at;
-        let columns = self.columns.iter_mut().map(|(_, f)| f(t, &state)).collect();
+        let StepView { t, state, log_factor, .. } = at;
+        let columns = self.columns.iter_mut().map(|(_, f)| f(*t, state)).collect();
         let z = self.needs.action.then_some(state.z);
         let log_factor = log_factor.filter(|_| self.needs.conformal_factor);
-        self.rows.push(Row { t, q: state.q, v, p: state.p, z, energy, log_factor, columns });
+        self.rows.push(Row { t: *t, q: state.q.clone(), v, p: state.p.clone(), z, energy, log_factor, columns });
         Ok(())
     }
 
     /// Records the rows up to the time of the view.
-    fn record_up_to(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
+    fn record_up_to(&mut self, at: &StepView<'_>) -> Result<(), StepError> {
         let (times, recorded) = match &self.when {
             RowTimes::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
             RowTimes::Every(_) => return Ok(()),
@@ -174,7 +179,7 @@ impl<'f, const N: usize> Rows<'f, N> {
             } else if passed(t) {
                 self.record(&at.within(t)?)?;
             } else {
-                self.record(&StepView { t, ..*at })?;
+                self.record(&StepView { t, state: at.state.clone(), before: None, ..*at })?;
             }
             if let RowTimes::At { recorded, .. } = &mut self.when {
                 *recorded += 1;
@@ -184,7 +189,7 @@ impl<'f, const N: usize> Rows<'f, N> {
     }
 }
 
-impl<const N: usize> Observer<N> for Rows<'_, N> {
+impl Observer for Rows<'_> {
     fn needs(&self) -> OutputRequest {
         // The energy depends on L, and so on z.
         OutputRequest { action: self.needs.action || self.energy, ..self.needs }
@@ -225,7 +230,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         }
     }
 
-    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         let backward = self.run.t_end < self.run.t0;
         if let RowTimes::At { times, recorded } = &mut self.when
             && at.k > 0
@@ -236,7 +241,7 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if self.rows.len() >= MAX_ROWS {
             return ControlFlow::Break(Stop::here("the limit on the number of rows"));
         }

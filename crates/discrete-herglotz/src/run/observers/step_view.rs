@@ -4,23 +4,21 @@ use crate::integration::motion::Motion;
 use crate::run::findings::Findings;
 use crate::run::observers::last_step::LastStep;
 use crate::run::resume_state::ResumeState;
-use crate::{Reset, StepError, Stepper};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{Reset, State, StepError, Stepper, Vector};
 
 /// The request of an observer to end the run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stop<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
     /// The cause, for the status.
     pub by: &'static str,
     /// The error, if the run ends because of one.
     pub cause: Option<StepError>,
     /// The time and the state at which the run ends, within the step that the observer saw; `None` for the end of that
     /// step.
-    pub at: Option<(f64, PhasePoint<N>)>,
+    pub at: Option<(f64, State)>,
 }
 
-impl<const N: usize> Stop<N> {
+impl Stop {
     /// Ends the run at the end of the step that the observer saw, with this cause.
     pub fn here(by: &'static str) -> Self {
         Stop { by, cause: None, at: None }
@@ -33,13 +31,13 @@ impl<const N: usize> Stop<N> {
 }
 
 /// The end of a step, or the start of a run.
-pub struct StepView<'r, const N: usize> {
+pub struct StepView<'r> {
     /// The number of steps taken.
     pub k: usize,
     /// The time.
     pub t: f64,
     /// The state `(q, p, z)`; z is the initial action if the action was not requested.
-    pub state: PhasePoint<N>,
+    pub state: State,
     /// `sigma_d` of the last step, the factor by which it scales the contact form and every momentum of a symmetry; 1
     /// at the start.
     pub sigma: f64,
@@ -48,28 +46,28 @@ pub struct StepView<'r, const N: usize> {
     /// Whether the run ends here.
     pub last: bool,
     pub(crate) findings: Findings,
-    pub(crate) before: Option<(f64, PhasePoint<N>)>,
-    pub(crate) motion: &'r dyn Motion<N>,
-    pub(crate) stepper: &'r dyn Stepper<N>,
+    pub(crate) before: Option<(f64, State)>,
+    pub(crate) motion: &'r dyn Motion,
+    pub(crate) stepper: &'r dyn Stepper,
     /// Whether the last step is a part of a step that failed as a whole.
     pub(crate) in_failed_step: bool,
 }
 
-impl<'r, const N: usize> StepView<'r, N> {
+impl<'r> StepView<'r> {
     /// The velocity, by the inverse Legendre transformation of the state.
     ///
     /// # Errors
     /// A [`StepError`] if no velocity has this momentum.
-    pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
-        self.motion.velocity(self.t, &self.state, self.stepper.last_velocity())
+    pub fn velocity(&self) -> Result<Vector, StepError> {
+        self.motion.velocity(self.t, &self.state, self.stepper.last_velocity().as_ref())
     }
 
     /// The velocity at another state of the motion.
     ///
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
-    pub fn velocity_at(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
-        self.motion.velocity(t, state, self.stepper.last_velocity())
+    pub fn velocity_at(&self, t: f64, state: &State) -> Result<Vector, StepError> {
+        self.motion.velocity(t, state, self.stepper.last_velocity().as_ref())
     }
 
     /// The state from which [`Run::resume`](crate::run::Run::resume) continues the run; `None` if the stepper cannot be
@@ -92,7 +90,7 @@ impl<'r, const N: usize> StepView<'r, N> {
     }
 
     /// The resets in the steps since the last view, in their order.
-    pub fn resets(&self) -> &'r [Reset<N>] {
+    pub fn resets(&self) -> &'r [Reset] {
         self.stepper.resets()
     }
 
@@ -101,12 +99,12 @@ impl<'r, const N: usize> StepView<'r, N> {
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
     pub fn energy(&self) -> Result<f64, StepError> {
-        self.motion.energy(self.t, &self.state, self.stepper.last_velocity())
+        self.motion.energy(self.t, &self.state, self.stepper.last_velocity().as_ref())
     }
 
     /// The step that ends here; `None` at the start, and where several steps were taken at once.
-    pub fn last_step(&self) -> Option<LastStep<'r, N>> {
-        let from = self.before?;
-        Some(LastStep::new([from, (self.t, self.state)], self.motion, self.stepper))
+    pub fn last_step(&self) -> Option<LastStep<'r>> {
+        let from = self.before.clone()?;
+        Some(LastStep::new([from, (self.t, self.state.clone())], self.motion, self.stepper))
     }
 }

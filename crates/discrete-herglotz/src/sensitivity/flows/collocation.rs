@@ -18,11 +18,11 @@ pub(super) struct HamiltonianSteps<'a, L> {
 impl<L: Parametric<N>, const N: usize> SubFlows<N> for HamiltonianSteps<'_, L> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let StepEnds { t, h, start, .. } = *step;
+        let (t, h, start) = (step.t, step.h, step.start.fixed::<N>());
         let at = |explicit| step_derivatives(self.lagrangian, self.stages, h, (t, &start), explicit);
         let StepDerivatives { state: columns, sources } = match of {
             None => at(None)?,

@@ -3,31 +3,42 @@
 use super::SubFlows;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
-use crate::integration::{QuantityDerivatives, SharedIntegrator, StepEnds};
+use crate::integration::{QuantityDerivatives, SharedIntegrator, StepEnds, SystemProblem};
 use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use crate::{Problem, StepError};
+use crate::{Components, Point, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
 
 /// Steps whose derivative in the state is computed by the integrator: for a custom discrete Lagrangian that of the discrete
 /// Hamiltonian flow, by the implicit function theorem and the second jet. How it depends on parameters and on the step
 /// size is known where the integrator computes derivatives along variations of the Lagrangian.
-pub(super) struct DiscreteSteps<'a, L, const N: usize> {
-    pub problem: Problem<'a, L, N>,
-    pub integrator: SharedIntegrator<'a, N>,
+pub(super) struct DiscreteSteps<'a, L> {
+    pub lagrangian: &'a L,
+    pub problem: SystemProblem<'a>,
+    pub integrator: SharedIntegrator<'a>,
     /// Whether it computes these.
     pub varies: bool,
 }
 
-impl<L: Parametric<N>, const N: usize> DiscreteSteps<'_, L, N> {
+impl<L> DiscreteSteps<'_, L> {
     /// The derivatives of a step in each parameter, in its time and in its length.
-    fn sources(&self, step: &StepEnds<N>, of: &mut ParameterDerivatives<N>) -> Result<Vec<ChartVector<N>>, StepError> {
+    fn sources<const N: usize>(
+        &self,
+        step: &StepEnds,
+        of: &mut ParameterDerivatives<N>,
+    ) -> Result<Vec<ChartVector<N>>, StepError>
+    where
+        L: Parametric<N>,
+    {
         let StepEnds { t, h, start, end } = step;
-        let lagrangian = self.problem.lagrangian;
-        let problem = self.problem.of_system();
+        let lagrangian = self.lagrangian;
         let along = |variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>)| {
-            let source = self.integrator.step_variation(&problem, *h, (*t, start, end), variation)?;
-            source.ok_or(StepError::NonFinite)
+            let mut variation = |s: f64, x: &Point| {
+                let (l, gradient) = variation(s, &x.fixed());
+                (l, Components::from(gradient))
+            };
+            let source = self.integrator.step_variation(&self.problem, *h, (*t, start, end), &mut variation)?;
+            source.map(|source| source.fixed::<N>()).ok_or(StepError::NonFinite)
         };
         // The value with the gradient, which contains the force.
         let varied = |of: &mut ParameterDerivatives<N>, quantity: Quantity, s: f64, x: &VelocityPoint<N>| {
@@ -54,15 +65,15 @@ impl<L: Parametric<N>, const N: usize> DiscreteSteps<'_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> SubFlows<N> for DiscreteSteps<'_, L, N> {
+impl<L: Parametric<N>, const N: usize> SubFlows<N> for DiscreteSteps<'_, L> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let StepEnds { t, h, start, end } = *step;
-        let jacobian = self.integrator.step_jacobian(&self.problem.of_system(), h, (t, &start, &end))?;
+        let StepEnds { t, h, start, end } = step;
+        let jacobian = self.integrator.step_jacobian(&self.problem, *h, (*t, start, end))?;
         let matrix = jacobian.filter(|m| m.shape() == (2 * N + 1, 2 * N + 1)).ok_or(StepError::NonFinite)?;
         let mut state = TangentMatrix::identity();
         // The coordinates are in the order q, p, z.

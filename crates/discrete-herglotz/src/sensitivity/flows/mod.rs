@@ -40,7 +40,7 @@ trait SubFlows<const N: usize> {
     /// [`StepError`] for a step of a rule that cannot be solved.
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError>;
@@ -71,11 +71,15 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
     pub fn new<L: Parametric<N>>(
         problem: &Problem<'a, L, N>,
         formula: StepFormula,
-        integrator: &SharedIntegrator<'a, N>,
+        integrator: &SharedIntegrator<'a>,
     ) -> Result<Self, SensitivityError> {
         let lagrangian = problem.lagrangian;
         let mut of_parameters = ParameterDerivatives::new(lagrangian);
         let of = &mut of_parameters;
+        let discrete = |varies| {
+            let (problem, integrator) = (problem.of_system(), integrator.clone());
+            Box::new(DiscreteSteps { lagrangian, problem, integrator, varies })
+        };
         let method: Box<dyn SubFlows<N> + 'a> = match formula {
             StepFormula::Splitting(scheme) if !problem.structure.is_affine_in_z() => {
                 Box::new(ActionFlows::new(problem, &scheme, of)?)
@@ -96,15 +100,10 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
                     return Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" });
                 }
             }
-            StepFormula::Jacobian => {
-                Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone(), varies: false })
-            }
+            StepFormula::Jacobian => discrete(false),
             // The variation of a Lagrangian that is given by a contact Hamiltonian is that of its Legendre transform, which
             // is not implemented.
-            StepFormula::Derivatives => {
-                let varies = const { !L::HINTS.hamiltonian };
-                Box::new(DiscreteSteps { problem: *problem, integrator: integrator.clone(), varies })
-            }
+            StepFormula::Derivatives => discrete(const { !L::HINTS.hamiltonian }),
         };
         let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
         Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
@@ -120,7 +119,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
         self.method.only_in_start()
     }
 
-    fn linearise(&mut self, step: &StepEnds<N>, with_sources: bool) -> Result<(), StepError> {
+    fn linearise(&mut self, step: &StepEnds, with_sources: bool) -> Result<(), StepError> {
         self.flows.clear();
         let of = with_sources.then_some(&mut self.of_parameters);
         self.method.linearise(step, of, &mut self.flows)?;
@@ -138,7 +137,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
     ///
     /// # Errors
     /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
-    pub fn push(&mut self, step: &StepEnds<N>, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+    pub fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
         let with_sources =
             columns.iter().any(|column| column.parameter.is_some() || column.dt0 != 0.0 || column.dh != 0.0);
         self.linearise(step, with_sources)?;
@@ -154,7 +153,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &StepEnds<N>, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+    pub fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
         self.linearise(step, true)?;
         for covector in covectors {
             self.flows.iter().rev().for_each(|flow| flow.pull(k, covector));

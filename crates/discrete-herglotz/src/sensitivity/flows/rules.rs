@@ -7,7 +7,7 @@ use crate::StepError;
 use crate::integration::StepEnds;
 use crate::rules::Node;
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
-use contact_geom::Parametric;
+use contact_geom::{Parametric, PhasePoint};
 
 /// Steps of the quadrature rule with these nodes, over these fractions of a step. A step over a negative fraction is that
 /// of the rule with a negative step size; for a symmetric rule it is the step backward.
@@ -20,12 +20,12 @@ pub(super) struct Rules<'a, L> {
 impl<L: Parametric<N>, const N: usize> SubFlows<N> for Rules<'_, L> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         mut of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let StepEnds { t, h, start, end } = *step;
-        let mut state = start;
+        let StepEnds { t, h, .. } = *step;
+        let (mut state, end): (PhasePoint<N>, PhasePoint<N>) = (step.start.fixed(), step.end.fixed());
         let mut start = 0.0;
         let mut velocity = (end.q - state.q) / h;
         let mut rate = (end.z - state.z) / h;

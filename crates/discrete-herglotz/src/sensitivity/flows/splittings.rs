@@ -79,11 +79,11 @@ impl<'a, L: Parametric<N>, const N: usize> LinearDragFlows<'a, L, N> {
 impl<L: Parametric<N>, const N: usize> SubFlows<N> for LinearDragFlows<'_, L, N> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         mut of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let mut state = step.start;
+        let mut state = step.start.fixed();
         for part in &self.parts {
             let of = of.as_deref_mut();
             flows.push(match *part {
@@ -152,11 +152,11 @@ impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
 impl<L: Parametric<N>, const N: usize> SubFlows<N> for DragFlows<'_, L, N> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         mut of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let mut state = step.start;
+        let mut state = step.start.fixed();
         for part in &self.parts {
             let of = of.as_deref_mut();
             flows.push(match *part {
@@ -220,11 +220,11 @@ impl<'a, L: Parametric<N>, const N: usize> ActionFlows<'a, L, N> {
 impl<L: Parametric<N>, const N: usize> SubFlows<N> for ActionFlows<'_, L, N> {
     fn linearise(
         &self,
-        step: &StepEnds<N>,
+        step: &StepEnds,
         mut of: Option<&mut ParameterDerivatives<N>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
-        let mut state: PhasePoint<N> = step.start;
+        let mut state: PhasePoint<N> = step.start.fixed();
         let Riccati { b, c } = self.flow;
         let constant = Self::constant([b, c], self.z);
         let constants: Vec<f64> = self.of_flow.iter().map(|of| Self::constant(*of, self.z)).collect();

@@ -18,9 +18,9 @@ fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
 }
 
 /// The state after this number of steps.
-fn run<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> PhasePoint<N> {
+fn run<const N: usize>(mut motion: impl Stepper, steps: usize) -> PhasePoint<N> {
     assert_eq!(motion.advance(steps), Ok(()));
-    motion.state()
+    motion.state().fixed()
 }
 
 static SCHEMES: [SplittingScheme; 15] = SplittingScheme::ALL;

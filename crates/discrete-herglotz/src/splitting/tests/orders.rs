@@ -20,7 +20,7 @@ fn by_midpoint<const N: usize>(l: &impl Lagrangian<N>, start: PhasePoint<N>) -> 
 /// Asserts that the observed order of each scheme agrees with its order to 0.15: the slope of the error over the last
 /// four of a sequence of finer resolutions above round-off. The reference is a run with small steps, which agrees with
 /// another method.
-fn assert_orders<const N: usize, S: Stepper<N>>(
+fn assert_orders<const N: usize, S: Stepper>(
     name: &str,
     schemes: impl Iterator<Item = &'static SplittingScheme>,
     other_code: PhasePoint<N>,

@@ -18,29 +18,28 @@ use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::stepper::solved_parts::EndOfPart;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
-use crate::{InputError, Problem, StepError, UnresolvedStep, theory::legendre_inverse};
-use contact_geom::VelocityPoint;
+use crate::{InputError, StepError, UnresolvedStep};
 
 /// Constructs a stepper for a problem and a step length; the last argument is whether the steps are parts that end on
 /// zeros.
-pub(crate) type MakeStepper<'a, const N: usize> =
-    Box<dyn Fn(&SystemProblem<'a, N>, f64, bool) -> Result<PartStepper<'a, N>, InputError> + 'a>;
+pub(crate) type MakeStepper<'a> =
+    Box<dyn Fn(&SystemProblem<'a>, f64, bool) -> Result<PartStepper<'a>, InputError> + 'a>;
 
 /// Steps of constant length with any integrator. A step along which a switching function changes its sign consists of
 /// parts that end on the zeros.
-pub(crate) struct SwitchingStepper<'a, const N: usize> {
-    problem: SystemProblem<'a, N>,
-    make: MakeStepper<'a, N>,
+pub(crate) struct SwitchingStepper<'a> {
+    problem: SystemProblem<'a>,
+    make: MakeStepper<'a>,
     range: EvaluationRange,
     h: f64,
     /// The number of steps taken.
     k: usize,
     /// The stepper since the last step with parts; its initial state (`origin`) and the number of steps before it
     /// (`before`).
-    base: PartStepper<'a, N>,
-    origin: TimedState<N>,
+    base: PartStepper<'a>,
+    origin: TimedState,
     before: usize,
-    here: TimedState<N>,
+    here: TimedState,
     surfaces: Surfaces,
     /// The bound for the defect of a step; a step with a larger one is divided.
     max_defect: f64,
@@ -49,37 +48,39 @@ pub(crate) struct SwitchingStepper<'a, const N: usize> {
     spent: u64,
     unresolved: Option<UnresolvedStep>,
     /// The steppers of the parts of the last step that had parts, if they are kept.
-    parts: Option<Vec<PartStepper<'a, N>>>,
+    parts: Option<Vec<PartStepper<'a>>>,
     /// The ends of these parts.
-    ends: Vec<EndOfPart<N>>,
+    ends: Vec<EndOfPart>,
     switched: bool,
     /// The resets in the last steps, and the pieces of the last step between them.
-    resets: Vec<Reset<N>>,
-    pieces: Vec<Piece<N>>,
+    resets: Vec<Reset>,
+    pieces: Vec<Piece>,
     accumulation: Accumulation,
     changed_energy: bool,
 }
 
-impl<'a, const N: usize> SwitchingStepper<'a, N> {
+impl<'a> SwitchingStepper<'a> {
     pub fn new(
-        problem: &SystemProblem<'a, N>,
+        problem: &SystemProblem<'a>,
         h: f64,
         range: EvaluationRange,
-        make: MakeStepper<'a, N>,
+        make: MakeStepper<'a>,
     ) -> Result<Self, InputError> {
         let base = make(problem, h, false)?;
-        let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v, rests: StepStart::ZERO };
+        let (state, v) = (problem.state.clone(), problem.start.v.clone());
+        let rests = StepStart::zeros(v.len());
+        let here = TimedState { t: problem.t0, state, v, rests };
         Ok(SwitchingStepper {
-            problem: *problem,
+            problem: problem.clone(),
             make,
             range,
             h,
             k: 0,
             base,
-            origin: here,
+            origin: here.clone(),
             before: 0,
             here,
-            surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start, h),
+            surfaces: Surfaces::at(&*problem.system, problem.t0, &problem.start, h),
             max_defect: f64::INFINITY,
             sigma: 1.0,
             spent: 0,
@@ -105,7 +106,7 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
     }
 
     /// Whether a step is to be divided.
-    fn is_too_long(&self, step: &PartStepper<'a, N>) -> bool {
+    fn is_too_long(&self, step: &PartStepper<'a>) -> bool {
         if self.max_defect == f64::INFINITY {
             return false;
         }
@@ -114,7 +115,7 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
     }
 
     /// The steppers of the last step: those of its parts if it had some, otherwise the common stepper of all steps.
-    fn last_step(&self) -> &[PartStepper<'a, N>] {
+    fn last_step(&self) -> &[PartStepper<'a>] {
         match &self.parts {
             Some(parts) if self.switched => parts,
             _ => std::slice::from_ref(&self.base),
@@ -122,24 +123,23 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
     }
 
     /// The integrator's stepper at a state.
-    fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<PartStepper<'a, N>, StepError> {
-        let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
-        let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
+    fn stepper_at(&self, at: &TimedState, h: f64, is_part: bool) -> Result<PartStepper<'a>, StepError> {
+        let problem = SystemProblem { t0: at.t, start: at.point(), state: at.state.clone(), ..self.problem.clone() };
         let mut stepper = (self.make)(&problem, h, is_part).map_err(step_error)?;
         stepper.set_compensation(&at.rests);
         Ok(stepper)
     }
 
     /// The state of a stepper, with its velocity.
-    fn reached(&self, stepper: &PartStepper<'a, N>, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
-        let (state, rests) = (stepper.stepper().state(), stepper.compensation());
-        let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
+    fn reached(&self, stepper: &PartStepper<'a>, t: f64, guess: &TimedState) -> Result<TimedState, StepError> {
+        let (state, rests) = (stepper.stepper().state(), stepper.compensation(guess.v.len()));
+        let v = self.problem.system.legendre_inverse(t, &state, &guess.v)?.v;
         Ok(TimedState { t, state, v, rests })
     }
 
     /// Whether a break lies in a step, or so close to it that the integrator may evaluate L on its other side.
     fn has_break_near(&self, from: f64, to: f64) -> bool {
-        let breaks = self.problem.lagrangian.breaks();
+        let breaks = self.problem.system.breaks();
         if breaks.is_empty() {
             return false;
         }
@@ -159,7 +159,7 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
 
     /// The first break after a time in the direction of the run, at a distance of more than `spacing`, or the end.
     fn next_end(&self, t: f64, t_end: f64, spacing: f64) -> f64 {
-        let breaks = self.problem.lagrangian.breaks();
+        let breaks = self.problem.system.breaks();
         let forward = t_end > t;
         let next = if forward {
             breaks.get(breaks.partition_point(|b| *b <= t + spacing)).filter(|b| **b < t_end - spacing)
@@ -172,7 +172,7 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
 
     /// The next step.
     fn step(&mut self) -> Result<(), StepError> {
-        let from = self.here;
+        let from = self.here.clone();
         let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
         self.switched = false;
         self.pieces.clear();
@@ -181,14 +181,14 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
             && self.base.stepper_mut().advance(1).is_ok()
             && let Ok(to) = self.reached(&self.base, t, &from)
         {
-            let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
-            let (lagrangian, surfaces) = (self.problem.lagrangian, &mut self.surfaces);
+            let curve = StepCurve { from: from.clone(), to, dense: self.base.stepper().dense() };
+            let (system, surfaces) = (&*self.problem.system, &mut self.surfaces);
             let quiet = match self.range {
                 EvaluationRange::Within => true,
-                EvaluationRange::Extended(part) => !surfaces.are_near(lagrangian, &curve, part),
+                EvaluationRange::Extended(part) => !surfaces.are_near(system, &curve, part),
             };
-            if quiet && surfaces.first_change(lagrangian, &curve).is_none() && !self.is_too_long(&self.base) {
-                (self.here, self.sigma) = (to, self.base.stepper().sigma());
+            if quiet && surfaces.first_change(system, &curve).is_none() && !self.is_too_long(&self.base) {
+                (self.here, self.sigma) = (curve.to, self.base.stepper().sigma());
                 return Ok(());
             }
         }
@@ -201,9 +201,11 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
             parts.clear();
         }
         let (sides, resets) = ((self.surfaces.clone(), self.accumulation), self.resets.len());
-        match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h, false)?))) {
-            Ok((to, sigma, base)) => {
-                (self.here, self.sigma, self.base) = (to, sigma, base);
+        let stepped =
+            self.in_parts(&from, t).and_then(|(to, sigma)| Ok((self.stepper_at(&to, self.h, false)?, to, sigma)));
+        match stepped {
+            Ok((base, to, sigma)) => {
+                (self.here, self.sigma, self.base) = (to.clone(), sigma, base);
                 (self.origin, self.before, self.switched) = (to, self.k + 1, true);
                 Ok(())
             }

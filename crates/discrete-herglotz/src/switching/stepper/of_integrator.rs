@@ -22,13 +22,13 @@ const MAX_PART_ORDER: u32 = 2 * MAX_STAGES as u32;
 /// An integrator that evaluates L at the ends of its steps, or beyond, would mix both sides of a surface there. The
 /// parts of its steps, and its steps near a surface, are therefore taken by contact Gauss collocation of the same
 /// order.
-pub(crate) fn of_integrator<'a, const N: usize>(
-    integrator: SharedIntegrator<'a, N>,
-    collocation: Collocation<'a, N>,
-    problem: &SystemProblem<'a, N>,
+pub(crate) fn of_integrator<'a>(
+    integrator: SharedIntegrator<'a>,
+    collocation: Collocation<'a>,
+    problem: &SystemProblem<'a>,
     h: f64,
     options: StepperOptions,
-) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+) -> Result<Box<dyn Stepper + 'a>, InputError> {
     let info = integrator.info();
     let within = info.collocation.is_some() || info.order > MAX_PART_ORDER;
     let range = match (within, info.substeps) {
@@ -37,7 +37,7 @@ pub(crate) fn of_integrator<'a, const N: usize>(
         (false, false) => EvaluationRange::Extended(END_EXTENSION),
     };
     let parts = collocation.gauss((info.order.div_ceil(2) as usize).clamp(1, MAX_STAGES));
-    let make = move |problem: &SystemProblem<'a, N>, h: f64, is_part: bool| {
+    let make = move |problem: &SystemProblem<'a>, h: f64, is_part: bool| {
         let by = if is_part && !within { &parts } else { &integrator };
         by.stepper(problem, h, options).map(PartStepper::Any)
     };

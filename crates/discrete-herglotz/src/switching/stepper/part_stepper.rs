@@ -5,33 +5,34 @@ use crate::gauss::{CollocationStepper, DefectSample, StepStart};
 use contact_geom::numbers::max_or_nan;
 
 /// A stepper of parts of steps.
-pub(crate) enum PartStepper<'a, const N: usize> {
-    Collocation(Box<dyn CollocationStepper<N> + 'a>),
-    Any(Box<dyn Stepper<N> + 'a>),
+pub(crate) enum PartStepper<'a> {
+    Collocation(Box<dyn CollocationStepper + 'a>),
+    Any(Box<dyn Stepper + 'a>),
 }
 
-impl<'a, const N: usize> PartStepper<'a, N> {
-    pub fn stepper(&self) -> &(dyn Stepper<N> + 'a) {
+impl<'a> PartStepper<'a> {
+    pub fn stepper(&self) -> &(dyn Stepper + 'a) {
         match self {
             PartStepper::Collocation(stepper) => &**stepper,
             PartStepper::Any(stepper) => &**stepper,
         }
     }
 
-    pub fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + 'a) {
+    pub fn stepper_mut(&mut self) -> &mut (dyn Stepper + 'a) {
         match self {
             PartStepper::Collocation(stepper) => &mut **stepper,
             PartStepper::Any(stepper) => &mut **stepper,
         }
     }
 
-    /// The compensation terms of its sums, beyond the last digits of the state.
+    /// The compensation terms of its sums, beyond the last digits of the state, of n coordinates.
     /// [`set_compensation`](Self::set_compensation) restores them.
-    pub fn compensation(&self) -> StepStart<N> {
-        if let PartStepper::Collocation(stepper) = self { stepper.compensation() } else { StepStart::ZERO }
+    pub fn compensation(&self, n: usize) -> StepStart {
+        let known = if let PartStepper::Collocation(stepper) = self { stepper.compensation() } else { None };
+        known.unwrap_or_else(|| StepStart::zeros(n))
     }
 
-    pub fn set_compensation(&mut self, rests: &StepStart<N>) {
+    pub fn set_compensation(&mut self, rests: &StepStart) {
         if let PartStepper::Collocation(stepper) = self {
             stepper.set_compensation(rests);
         }

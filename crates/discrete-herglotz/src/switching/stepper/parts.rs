@@ -27,29 +27,29 @@ const FLIGHTS_PER_PART: f64 = 4.0;
 const MAX_NEWTON_ITERATIONS: usize = 8;
 
 /// A piece of a step since the last reset.
-struct OpenPiece<const N: usize> {
-    from: TimedState<N>,
+struct OpenPiece {
+    from: TimedState,
     /// The number of its parts, and the dense output of the last one.
     parts: usize,
-    dense: Option<DenseStep<N>>,
+    dense: Option<DenseStep>,
 }
 
-impl<const N: usize> OpenPiece<N> {
-    fn add(&mut self, part: &PartStepper<'_, N>) {
+impl OpenPiece {
+    fn add(&mut self, part: &PartStepper<'_>) {
         self.parts += 1;
         self.dense = part.stepper().dense();
     }
 }
 
 /// A part of a step.
-struct Part<'a, const N: usize> {
-    stepper: Option<PartStepper<'a, N>>,
-    to: TimedState<N>,
+struct Part<'a> {
+    stepper: Option<PartStepper<'a>>,
+    to: TimedState,
 }
 
-impl<'a, const N: usize> SwitchingStepper<'a, N> {
+impl<'a> SwitchingStepper<'a> {
     /// One part of a step, from a state to the time t.
-    fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(PartStepper<'a, N>, TimedState<N>), StepError> {
+    fn part(&mut self, at: &TimedState, t: f64) -> Result<(PartStepper<'a>, TimedState), StepError> {
         let mut stepper = self.stepper_at(at, t - at.t, true)?;
         let taken = stepper.stepper_mut().advance(1).map_err(|failure| failure.cause);
         self.spent += stepper.stepper().evaluations();
@@ -59,12 +59,12 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
     }
 
     /// A step in parts that end on zeros.
-    pub(super) fn in_parts(&mut self, from: TimedState<N>, t_end: f64) -> Result<(TimedState<N>, f64), StepError> {
-        let (mut at, mut sigma, mut changes_at_point) = (from, 1.0, 0);
+    pub(super) fn in_parts(&mut self, from: &TimedState, t_end: f64) -> Result<(TimedState, f64), StepError> {
+        let (mut at, mut sigma, mut changes_at_point) = (from.clone(), 1.0, 0);
         let span = t_end - from.t;
         let spacing = 4.0 * f64::EPSILON * max_or_nan(max_or_nan(from.t.abs(), t_end.abs()), span.abs());
         let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
-        let mut piece = OpenPiece { from, parts: 0, dense: None };
+        let mut piece = OpenPiece { from: from.clone(), parts: 0, dense: None };
         for _ in 0..MAX_PARTS {
             if (t_end - at.t) * span <= 0.0 {
                 self.end_piece(&mut piece, &at);
@@ -88,8 +88,8 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
                     continue;
                 }
             };
-            let curve = StepCurve { from: at, to, dense: stepper.stepper().dense() };
-            let change = self.surfaces.first_change(self.problem.lagrangian, &curve);
+            let curve = StepCurve { from: at.clone(), to, dense: stepper.stepper().dense() };
+            let change = self.surfaces.first_change(&*self.problem.system, &curve);
             too_long = change.is_none() && self.is_too_long(&stepper);
             if too_long {
                 longest = 0.5 * (t - at.t).abs();
@@ -99,7 +99,9 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
                 sigma *= stepper.stepper().sigma();
                 piece.add(&stepper);
                 self.keep(stepper);
-                self.ends.push(EndOfPart { from: at, to, next: to, has_stepper: true, end: plain_end(t) });
+                let StepCurve { to, .. } = curve;
+                let (next, end) = (to.clone(), plain_end(t));
+                self.ends.push(EndOfPart { from: at, to: to.clone(), next, has_stepper: true, end });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
@@ -126,27 +128,27 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
             if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
-            let together = self.surfaces.simultaneous(self.problem.lagrangian, &curve, &change, &to, self.h);
+            let together = self.surfaces.simultaneous(&*self.problem.system, &curve, &change, &to, self.h);
             let mut start = std::mem::replace(&mut at, to);
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
                 if index != change.index
-                    && !self.surfaces.is_on(self.problem.lagrangian, index, (at.t, &at.point()), self.h)
+                    && !self.surfaces.is_on(&*self.problem.system, index, (at.t, &at.point()), self.h)
                 {
                     continue;
                 }
                 let resets = self.resets.len();
                 let rising = self.surfaces.side(index) < 0.0;
-                let Passed { to: next, factor, passage } = self.through(at, index, span, spacing)?;
+                let Passed { to: next, factor, passage } = self.through(at.clone(), index, span, spacing)?;
                 let end = PartEnd::Switch { index, rising, passage };
                 // Further passages at the same point are ends of parts of length zero.
                 let has_stepper = std::mem::take(&mut has_stepper);
-                self.ends.push(EndOfPart { from: start, to: at, next, has_stepper, end });
+                self.ends.push(EndOfPart { from: start, to: at.clone(), next: next.clone(), has_stepper, end });
                 if self.resets.len() > resets {
                     self.end_piece(&mut piece, &at);
-                    piece = OpenPiece { from: next, parts: 0, dense: None };
+                    piece = OpenPiece { from: next.clone(), parts: 0, dense: None };
                 }
-                (at, start, sigma) = (next, next, sigma * factor);
+                (at, start, sigma) = (next.clone(), next, sigma * factor);
             }
             // The curve of a part that is much longer than the next flight would round it away.
             longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
@@ -156,35 +158,36 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
     }
 
-    fn keep(&mut self, stepper: PartStepper<'a, N>) {
+    fn keep(&mut self, stepper: PartStepper<'a>) {
         if let Some(parts) = &mut self.parts {
             parts.push(stepper);
         }
     }
 
     /// Ends the piece of a step that has resets.
-    fn end_piece(&mut self, piece: &mut OpenPiece<N>, to: &TimedState<N>) {
+    fn end_piece(&mut self, piece: &mut OpenPiece, to: &TimedState) {
         if !self.resets.is_empty() {
-            let dense = piece.dense.filter(|_| piece.parts == 1);
-            self.pieces.push(Piece { from: (piece.from.t, piece.from.state), to: (to.t, to.state), dense });
+            let dense = piece.dense.take().filter(|_| piece.parts == 1);
+            let from = (piece.from.t, piece.from.state.clone());
+            self.pieces.push(Piece { from, to: (to.t, to.state.clone()), dense });
         }
     }
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.
     /// `None` where the motion does not cross the surface.
-    fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<'a, N>> {
+    fn locate(&mut self, curve: &StepCurve, change: &SignChange, spacing: f64) -> Option<Part<'a>> {
         let SignChange { index, ends, estimate, slope } = *change;
-        let (lagrangian, from, span) = (self.problem.lagrangian, curve.from, curve.span());
-        let at_start = Part { stepper: None, to: from };
+        let (system, from, span) = (self.problem.system.clone(), &curve.from, curve.span());
+        let at_start = || Part { stepper: None, to: from.clone() };
         let mut slope = slope;
         let mut length = estimate * span;
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..MAX_NEWTON_ITERATIONS {
             if length.abs() <= spacing {
-                return Some(at_start);
+                return Some(at_start());
             }
-            let (stepper, to) = self.part(&from, from.t + length).ok()?;
-            let value = self.surfaces.value(lagrangian, index, (to.t, &to.point()));
+            let (stepper, to) = self.part(from, from.t + length).ok()?;
+            let value = self.surfaces.value(&*system, index, (to.t, &to.point()));
             if let Some((l, g)) = last
                 && l != length
                 && (value - g) / (length - l) * slope > 0.0
@@ -210,8 +213,8 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
             if fraction * span.abs() <= spacing {
                 return Ok(f64::MIN_POSITIVE);
             }
-            let (_, to) = self.part(&from, from.t + fraction * span)?;
-            Ok(side * self.surfaces.value(lagrangian, index, (to.t, &to.point())))
+            let (_, to) = self.part(from, from.t + fraction * span)?;
+            Ok(side * self.surfaces.value(&*system, index, (to.t, &to.point())))
         };
         let [before, after] = [toward(ends[0]).ok()?, toward(ends[1]).ok()?];
         if before.is_nan() || after.is_nan() || before <= 0.0 || after >= 0.0 {
@@ -219,9 +222,9 @@ impl<'a, const N: usize> SwitchingStepper<'a, N> {
         }
         let root = bracketed_root(ends, [before, after], toward).ok()?;
         if root * span.abs() <= spacing {
-            return Some(at_start);
+            return Some(at_start());
         }
-        let (stepper, to) = self.part(&from, from.t + root * span).ok()?;
+        let (stepper, to) = self.part(from, from.t + root * span).ok()?;
         Some(Part { stepper: Some(stepper), to })
     }
 }

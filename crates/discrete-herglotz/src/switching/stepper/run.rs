@@ -8,13 +8,11 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::surfaces::TimedState;
 use crate::{
-    DenseStep, PlanEntry, StepFailure, Stepper, UnresolvedStep,
+    DenseStep, PlanEntry, State, StepFailure, Stepper, UnresolvedStep, Vector,
     integration::{Piece, Reset, SuspectInterval},
 };
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
 
-impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
+impl Stepper for SwitchingStepper<'_> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.resets.clear();
         for taken in 0..steps {
@@ -24,16 +22,16 @@ impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
         Ok(())
     }
 
-    fn state(&self) -> PhasePoint<N> {
-        self.here.state
+    fn state(&self) -> State {
+        self.here.state.clone()
     }
 
     fn time(&self) -> f64 {
         self.problem.t0 + self.k as f64 * self.h
     }
 
-    fn last_velocity(&self) -> Option<SVector<f64, N>> {
-        (self.k > 0).then_some(self.here.v)
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.k > 0).then(|| self.here.v.clone())
     }
 
     fn sigma(&self) -> f64 {
@@ -44,23 +42,23 @@ impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
         self.spent + self.base.stepper().evaluations()
     }
 
-    fn dense(&self) -> Option<DenseStep<N>> {
+    fn dense(&self) -> Option<DenseStep> {
         if self.switched { None } else { self.base.stepper().dense() }
     }
 
-    fn solved_stages(&self) -> Option<SolvedStages<N>> {
+    fn solved_stages(&self) -> Option<SolvedStages> {
         if self.switched { None } else { self.base.stepper().solved_stages() }
     }
 
-    fn solved_parts(&self) -> Vec<SolvedPart<N>> {
+    fn solved_parts(&self) -> Vec<SolvedPart> {
         self.parts_with_stages()
     }
 
-    fn resets(&self) -> &[Reset<N>] {
+    fn resets(&self) -> &[Reset] {
         &self.resets
     }
 
-    fn pieces(&self) -> &[Piece<N>] {
+    fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
@@ -80,7 +78,8 @@ impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
     fn save(&self) -> Option<Vec<u64>> {
         let mut words = Vec::new();
         [self.k, self.before].save(&mut words);
-        [self.origin, self.here].save(&mut words);
+        self.origin.save(&mut words);
+        self.here.save(&mut words);
         self.surfaces.sides.save(&mut words);
         self.accumulation.save(&mut words);
         u64::from(self.changed_energy).save(&mut words);
@@ -99,13 +98,13 @@ impl<const N: usize> Stepper<N> for SwitchingStepper<'_, N> {
         first(self.unresolved, of_base)
     }
 
-    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
         let suspect = self.base.stepper_mut().suspect_interval()?;
         Some(SuspectInterval { step: suspect.step + self.before, ..suspect })
     }
 }
 
-impl<const N: usize> CollocationStepper<N> for SwitchingStepper<'_, N> {
+impl CollocationStepper for SwitchingStepper<'_> {
     /// That of all its parts, if the last step had some.
     fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         let samples = self.last_step().iter().map(|part| part.sample_defect(sets));
@@ -118,14 +117,14 @@ impl<const N: usize> CollocationStepper<N> for SwitchingStepper<'_, N> {
     }
 }
 
-saved!([const N: usize] TimedState<N> { t, state, v, rests });
+saved!([] TimedState { t, state, v, rests });
 
-impl<const N: usize> SwitchingStepper<'_, N> {
+impl SwitchingStepper<'_> {
     /// Loads everything except the words of `base`, which is constructed again at its origin.
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
         let mut counts = [self.k, self.before];
         counts.load(from)?;
-        let mut states = [self.origin, self.here];
+        let mut states = [self.origin.clone(), self.here.clone()];
         states.load(from)?;
         self.surfaces.sides.load(from)?;
         self.accumulation.load(from)?;

@@ -6,25 +6,25 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::surfaces::TimedState;
 
 /// The end of a part of a step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct EndOfPart<const N: usize> {
+#[derive(Clone, Debug)]
+pub(crate) struct EndOfPart {
     /// The point at which the part begins, the point at which it ends, before anything happens there, and the point from
     /// which the motion continues.
-    pub from: TimedState<N>,
-    pub to: TimedState<N>,
-    pub next: TimedState<N>,
+    pub from: TimedState,
+    pub to: TimedState,
+    pub next: TimedState,
     /// Whether the part has a stepper; otherwise its length is zero.
     pub has_stepper: bool,
     pub end: PartEnd,
 }
 
-impl<const N: usize> SwitchingStepper<'_, N> {
+impl SwitchingStepper<'_> {
     /// The parts of the last step, if it had parts and their steppers are kept.
-    pub(super) fn parts_with_stages(&self) -> Vec<SolvedPart<N>> {
+    pub(super) fn parts_with_stages(&self) -> Vec<SolvedPart> {
         let (true, Some(steppers)) = (self.switched, &self.parts) else { return Vec::new() };
         let mut steppers = steppers.iter();
-        let point = |at: &TimedState<N>| PartPoint { t: at.t, state: at.state, v: at.v };
-        let part = |of: &EndOfPart<N>| {
+        let point = |at: &TimedState| PartPoint { t: at.t, state: at.state.clone(), v: at.v.clone() };
+        let part = |of: &EndOfPart| {
             let stages = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
             let step = stages.map(WholeStep::Collocation);
             let known = step.is_some() || !of.has_stepper;

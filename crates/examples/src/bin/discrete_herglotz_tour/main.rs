@@ -58,8 +58,8 @@ fn main() -> ExitCode {
 /// The smallest conformal factor of a step.
 struct SmallestFactor(f64);
 
-impl Observer<2> for SmallestFactor {
-    fn step(&mut self, at: &StepView<'_, 2>) -> ControlFlow<Stop<2>> {
+impl Observer for SmallestFactor {
+    fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0 = self.0.min(at.sigma);
         ControlFlow::Continue(())
     }
@@ -73,7 +73,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     // The observers: every fifth state, a momentum with its prediction, the smallest conformal factor, and a progress
     // bar.
     let mut states = Rows::every(5)?;
-    let mut momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
+    let mut momentum = MomentumDecay::new(Symmetry::<2>::rotation(0, 1)?);
     let mut factor = SmallestFactor(f64::INFINITY);
     let bar = ProgressBar::new(steps as u64);
     let mut progress = Progress::new(|part| bar.set_position((part * steps as f64) as u64));
@@ -117,7 +117,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Writes the orbit as a table, and as a figure beside the angular momentum.
-fn write(out: &Directory, rows: &[Row<2>], momentum: &[MomentumRow]) -> Result<(), Failure> {
+fn write(out: &Directory, rows: &[Row], momentum: &[MomentumRow]) -> Result<(), Failure> {
     let entries = rows.iter().map(|x| [x.t, x.q[0], x.q[1], x.p[0], x.p[1]].into_iter().chain(x.z).map(number));
     out.table("star.csv", &["t", "q1", "q2", "p1", "p2", "z"], entries)?;
     let orbit = Panel::new(

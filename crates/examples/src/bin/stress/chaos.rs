@@ -12,7 +12,7 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::gauss::{Gauss, GaussStepper};
-use discrete_herglotz::{AnyIntegrator, InputError, Rows, Run, Stepper, StepperOptions, Steps, rules::Flow};
+use discrete_herglotz::{AnyIntegrator, InputError, Rows, Run, State, Stepper, StepperOptions, Steps, rules::Flow};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
 fn chaotic(gamma: f64) -> Formula<2> {
@@ -59,7 +59,7 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let plan = motion.by(integrator).steps(Steps::Count(count)).plan(problem.end())?;
             let mut stepper = plan.stepper()?;
             let ended = stepper.advance(count).is_err();
-            let state = stepper.state();
+            let state: PhasePoint<2> = stepper.state().fixed();
             Ok(if ended { PhasePoint { z: f64::NAN, q: state.q * f64::NAN, ..state } } else { state })
         };
         let turned = |x: &PhasePoint<2>| PhasePoint { q: x.q, p: -x.p, z: -x.z };
@@ -141,9 +141,8 @@ fn growth(
     Ok(largest)
 }
 
-fn bits<const N: usize>(x: &PhasePoint<N>) -> Vec<u64> {
-    let x = ChartVector::from(*x);
-    (0..=2 * N).map(|i| x.component(i).to_bits()).collect()
+fn bits(x: &State) -> Vec<u64> {
+    x.q.iter().chain(&x.p).chain([&x.z]).map(|x| x.to_bits()).collect()
 }
 
 /// Repeated runs, runs in pieces, with rows and with the conformal factor must have the same bits.
@@ -163,7 +162,7 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
             let problem = Problem { system, t0: 0.0, start, span: H * f64::from(steps) };
             let motion = problem.motion()?;
             let count = Steps::Count(steps as usize);
-            let whole = |run: Run<'_, '_, Formula<2>, 2>| -> Result<Vec<u64>, InputError> {
+            let whole = |run: Run<'_, '_, discrete_herglotz::Problem<'_, Formula<2>, 2>>| -> Result<Vec<u64>, InputError> {
                 Ok(bits(&run.run(problem.end())?.state()))
             };
             let one = whole(motion.by(integrator).steps(count))?;
@@ -207,7 +206,7 @@ fn lanes(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
         let mut fast = GaussStepper::new(&motion, stages, H, options)?;
         let mut plain = Flow::with_guess(&gauss, 0.0, problem.state(), start.v)?;
         let ended = fast.advance(8).is_err() || Stepper::advance(&mut plain, 8).is_err();
-        let (a, b) = (ChartVector::from(Stepper::state(&fast)), ChartVector::from(Stepper::state(&plain)));
+        let (a, b) = (ChartVector::from(Stepper::state(&fast).fixed()), ChartVector::from(*plain.state()));
         let ulps = max_abs_or_nan(a.minus(b).to_vector().iter().copied()) / f64::EPSILON;
         let ulps = if ended { f64::NAN } else { ulps };
         rows.push(vec!["lanes against single numbers".into(), stages.to_string(), "8".into(), number(ulps)]);

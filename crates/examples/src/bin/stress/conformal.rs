@@ -59,7 +59,7 @@ fn step(integrator: AnyIntegrator, from: &ChartVector<2>) -> Result<(PhasePoint<
     let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
     let mut stepper = plan.stepper()?;
     let ended = stepper.advance(1).is_err();
-    Ok((stepper.state(), if ended { f64::NAN } else { stepper.sigma() }))
+    Ok((stepper.state().fixed(), if ended { f64::NAN } else { stepper.sigma() }))
 }
 
 /// The defect between a step's pullback of `dz - p dq` and `sigma_d` times the form, by differences of fourth order.
@@ -92,7 +92,7 @@ fn along(integrator: AnyIntegrator, power: u32) -> Result<Vec<Row>, InputError> 
     let motion = problem.motion()?;
     let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
     let mut stepper = plan.stepper()?;
-    let (mut rows, mut taken, first) = (Vec::new(), 0, angular(&stepper.state()));
+    let (mut rows, mut taken, first) = (Vec::new(), 0, angular(&stepper.state().fixed()));
     // The compensated sum of the logarithms.
     let (mut sum, mut lost) = (0.0, 0.0);
     for k in 4..=power {
@@ -106,12 +106,12 @@ fn along(integrator: AnyIntegrator, power: u32) -> Result<Vec<Row>, InputError> 
             sum = next;
         }
         let predicted = factor(integrator) * taken as f64;
-        let momentum = (angular(&stepper.state()) / first / predicted.exp() - 1.0).abs();
+        let momentum = (angular(&stepper.state().fixed()) / first / predicted.exp() - 1.0).abs();
         rows.push(Row {
             steps: taken as f64,
             momentum: if ended { f64::NAN } else { momentum },
             product: (sum - predicted).abs(),
-            contact: contact_defect(integrator, &stepper.state())?,
+            contact: contact_defect(integrator, &stepper.state().fixed())?,
         });
     }
     Ok(rows)

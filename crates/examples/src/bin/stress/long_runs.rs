@@ -117,7 +117,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             next *= 2;
             let t = taken as f64 * H;
             let true_one = truth(t);
-            let error = if ended { f64::NAN } else { distance(&stepper.state(), &true_one, 0.0) };
+            let error = if ended { f64::NAN } else { distance(&stepper.state().fixed(), &true_one, 0.0) };
             let walk = remembered(taken as f64).min(taken as f64).sqrt();
             seen.push((taken as f64, error, f64::EPSILON * (ROUNDINGS * walk + frequency * t)));
         }
@@ -186,7 +186,7 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             times.push(clock.elapsed().as_secs_f64());
             if part == 1 && integrator.order() >= 16 {
                 let exact = HarmonicOscillator { gamma }.solution(250.0, &problem.start);
-                let error = distance(&stepper.state(), &PhasePoint { q: exact.q, p: exact.v, z: exact.z }, 0.0);
+                let error = distance(&stepper.state().fixed(), &PhasePoint { q: exact.q, p: exact.v, z: exact.z }, 0.0);
                 // A random walk of relative rounding errors, and the rounding of the phase of the closed form.
                 let bound = ROUNDINGS * f64::EPSILON * (2000.0f64.sqrt() + 250.0);
                 let name = format!("decayed to {:.0e} by {integrator}", exact.q.amax());
@@ -194,7 +194,7 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
                 rows.push([name, "2000".into(), number(error), number(bound)].into());
             }
         }
-        let end = stepper.state();
+        let end: PhasePoint<1> = stepper.state().fixed();
         broken += u32::from(fails || !ChartVector::from(end).is_finite());
         left = max_or_nan(left, max_abs_or_nan([end.q[0], end.p[0], end.z]));
         slower.push(quantile(&times[11..], 0.5) / quantile(&times[..8], 0.5));

@@ -175,11 +175,11 @@ impl<const N: usize> Problem<N> {
         let mut stepper = plan.stepper().ok()?;
         let mut worst = 0.0;
         for _ in 0..count {
-            let (before, t0) = (stepper.state(), stepper.time());
+            let (before, t0): (PhasePoint<N>, f64) = (stepper.state().fixed(), stepper.time());
             stepper.advance(1).ok()?;
             let start = VelocityPoint { q: before.q, v: self.system.velocity(&before.q, &before.p), z: before.z };
             let exact = Problem { t0, start, span: plan.step_size(), ..*self }.exact().ok()?;
-            worst = max_or_nan(worst, distance(&stepper.state(), &exact, scale));
+            worst = max_or_nan(worst, distance(&stepper.state().fixed(), &exact, scale));
             if worst > ORDER_ONE {
                 break;
             }
@@ -193,7 +193,10 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The outcome of a run.
-    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> RunEnd<N> {
+    fn run(
+        &self,
+        run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Motion<'p, N>>,
+    ) -> RunEnd<N> {
         match caught(|| run_of(&self.motion()?).run(self.end())) {
             None => RunEnd::Panicked,
             Some(Err(refused)) => RunEnd::Refused(refused),
@@ -220,8 +223,8 @@ impl<const N: usize> Problem<N> {
 }
 
 /// Converts an outcome of the library.
-pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> RunEnd<N> {
-    let state = outcome.state();
+pub fn end_of_outcome<const N: usize>(outcome: &Outcome) -> RunEnd<N> {
+    let state = outcome.state().fixed();
     match outcome.status {
         Status::Completed if outcome.unresolved.is_some() => RunEnd::Unresolved(state),
         Status::Completed => RunEnd::Completed(state),

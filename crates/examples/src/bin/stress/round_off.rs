@@ -277,15 +277,16 @@ impl Ensemble {
                 let mut moved = |x: &f64| x * (1.0 + self.apart() * random.between(-1.0, 1.0));
                 let start = VelocityPoint { q: orbit.q.map(|x| moved(&x)), v: orbit.v.map(|x| moved(&x)), z: 0.0 };
                 let problem = Problem { system, t0: 0.0, start, span: self.h };
-                let walk = |stepper: &mut dyn Stepper<N>| {
-                    let mut states = vec![(0.0, stepper.state())];
+                let walk = |stepper: &mut dyn Stepper| {
+                    let mut states = vec![(0.0, stepper.state().fixed())];
                     let mut taken = 0;
                     for sample in samples {
                         // After a failed step, the positions and the invariant are NaN.
                         let ended = stepper.advance(sample - taken).is_err();
                         taken = *sample;
-                        let gone = PhasePoint { q: SVector::from_element(f64::NAN), ..stepper.state() };
-                        states.push((stepper.time(), if ended { gone } else { stepper.state() }));
+                        let state: PhasePoint<N> = stepper.state().fixed();
+                        let gone = PhasePoint { q: SVector::from_element(f64::NAN), ..state };
+                        states.push((stepper.time(), if ended { gone } else { state }));
                     }
                     states
                 };

@@ -94,10 +94,10 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
 }
 
 /// The state after one step; `None` if the step fails.
-fn first_step(stepper: Result<impl Stepper<1>, InputError>) -> Option<PhasePoint<1>> {
+fn first_step(stepper: Result<impl Stepper, InputError>) -> Option<PhasePoint<1>> {
     let mut stepper = stepper.ok()?;
     stepper.advance(1).ok()?;
-    Some(stepper.state())
+    Some(stepper.state().fixed())
 }
 
 /// The velocity for a momentum.

@@ -2,7 +2,7 @@
 
 use crate::problems::Problem;
 use crate::row::Action;
-use contact_geom::Lagrangian;
+use contact_geom::{Lagrangian, PhasePoint};
 use discrete_herglotz::theory::legendre_inverse;
 use discrete_herglotz::{AnyIntegrator, InputError, StepError, StepFailure, Steps, Until};
 use std::time::Instant;
@@ -107,7 +107,7 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
         let clock = Instant::now();
         stepper.advance(plan.count()).map_err(RunError::StepFailure)?;
         let seconds = clock.elapsed().as_secs_f64();
-        let end = stepper.state();
+        let end: PhasePoint<N> = stepper.state().fixed();
         let v = match self.problem.has_unit_mass() {
             true => end.p,
             false => legendre_inverse(&self.lagrangian, self.problem.duration, &end, &end.p)?.v,

@@ -85,7 +85,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
             for i in 0..N {
                 let mut change = zero;
                 for j in 0..N {
-                    change = (self.inverse.entry::<S, N>(i, j, r) * inverse).mul_add(excess[j], change);
+                    change = (self.inverse.entry::<S>(N, i, j, r) * inverse).mul_add(excess[j], change);
                 }
                 let to = v[i].block::<S>(r) + change;
                 seen.see(0, change, to);

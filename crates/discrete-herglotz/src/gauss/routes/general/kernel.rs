@@ -5,7 +5,7 @@ use crate::gauss::routes::general::General;
 use crate::gauss::routes::general::iteration::Iteration;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::mass_matrix::Mass;
-use crate::gauss::stages::stage_newton::StagesInIteration;
+use crate::gauss::stages::stage_newton::{StageNewton, StagesInIteration};
 use crate::gauss::system::Typed;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::blocks;
@@ -83,13 +83,12 @@ impl<L: Lagrangian<N>, const N: usize, const TRANSFORMED: bool> WithSimd for Sol
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let SolveStages { lagrangian, t, given, general } = self;
-        let mut iteration = FixedPointIteration::until(1.0, 0.25);
         if !invert_mass::<S, L, N>(general, lagrangian, t) {
-            return (IterationOutcome::NonFinite, iteration);
+            return (IterationOutcome::NonFinite, FixedPointIteration::default());
         }
         let General { newton, arch, evaluations, .. } = general;
-        let (mut newton, arch) = (newton.as_deref_mut(), *arch);
-        let mut stages = Iteration::<N, TRANSFORMED> {
+        let (newton, arch) = (newton.as_deref_mut(), *arch);
+        let stages = Iteration::<N, TRANSFORMED> {
             m: &general.m,
             table: &general.table,
             vectors: general.vectors.for_dimension(N),
@@ -99,64 +98,117 @@ impl<L: Lagrangian<N>, const N: usize, const TRANSFORMED: bool> WithSimd for Sol
             z_stages: &mut general.z_stages,
             g: &mut general.extension.g,
             p_t: general.extension.p_t.value,
-            inverse: general.mass.inverse::<N>(),
+            inverse: general.mass.inverse(N),
             follows: general.follows,
             q: &general.q[..N],
             p: &general.p[..N],
             z: general.z.value,
         };
-        // The extrapolated L_v are not those of the extrapolated velocities. A small first change is then no sign
-        // of convergence, and the convergence test starts again with the next iteration.
-        let mut carried = given == GivenStages::WithGradients;
-        let mut first = !carried;
-        // L is evaluated at one place in the code, so that it is inlined into this loop and compiled for its
-        // instruction set.
-        loop {
-            let change = if first {
-                f64::INFINITY
-            } else if let Some(newton) = &mut newton {
-                let (change, moved) = newton.correct(
-                    arch,
-                    StagesInIteration {
-                        table: stages.table,
-                        start: (stages.q, stages.p, stages.z),
-                        l_v: stages.vectors.l_v,
-                        l: stages.l,
-                        force: stages.vectors.force,
-                        rate: stages.rate,
-                        v: stages.vectors.v,
-                        z: stages.z_stages,
-                        one_minus_rho_stages: stages.one_minus_rho_stages,
-                        moved: stages.vectors.moved,
-                        x: stages.vectors.x,
-                    },
-                );
-                iteration.still = moved <= 4.0 * f64::EPSILON;
-                change
-            } else {
-                stages.iterate::<S>()
-            };
-            let of_transformed = stages.evaluate::<S, L>(lagrangian, t);
-            *evaluations += stages.table.s as u64;
-            if given == GivenStages::Solution {
-                return (IterationOutcome::Done, iteration);
-            }
-            if first {
-                first = false;
-                continue;
-            }
-            // `f64::max` would hide a NaN.
-            let change = if const { TRANSFORMED } && (of_transformed > change || of_transformed.is_nan()) {
-                of_transformed
-            } else {
-                change
-            };
-            match iteration.assess(change, 1.0) {
-                IterationOutcome::Continue => {}
-                IterationOutcome::Done if carried => iteration = FixedPointIteration::until(1.0, 0.25),
-                outcome => return (outcome, iteration),
-            }
-            carried = false;
+        solve::<S, _>(OfLagrangian { lagrangian, stages }, newton, arch, evaluations, t, given)
+    }
+}
+
+/// The stages of a step, as the solution of their equations moves them.
+pub(crate) trait MovingStages {
+    /// The number of stages.
+    fn count(&self) -> usize;
+
+    /// One fixed-point iteration: moves the stages, and returns the largest relative change.
+    fn iterate<S: Simd>(&mut self) -> f64;
+
+    /// Evaluates L and its gradient at the stages. Returns the largest relative change of the rates dt/dtau, or 0 in
+    /// physical time.
+    fn evaluate<S: Simd>(&mut self, t: f64) -> f64;
+
+    /// The stages for a correction by simplified Newton iteration.
+    fn in_newton(&mut self) -> StagesInIteration<'_>;
+}
+
+/// Solves the stage equations of a step from the time t.
+#[inline(always)]
+pub(crate) fn solve<S: Simd, M: MovingStages>(
+    mut stages: M,
+    mut newton: Option<&mut StageNewton>,
+    arch: Instructions,
+    evaluations: &mut u64,
+    t: f64,
+    given: GivenStages,
+) -> (IterationOutcome, FixedPointIteration) {
+    let mut iteration = FixedPointIteration::until(1.0, 0.25);
+    // The extrapolated L_v are not those of the extrapolated velocities. A small first change is then no sign
+    // of convergence, and the convergence test starts again with the next iteration.
+    let mut carried = given == GivenStages::WithGradients;
+    let mut first = !carried;
+    // L is evaluated at one place in the code, so that it is inlined into this loop and compiled for its
+    // instruction set.
+    loop {
+        let change = if first {
+            f64::INFINITY
+        } else if let Some(newton) = &mut newton {
+            let (change, moved) = newton.correct(arch, stages.in_newton());
+            iteration.still = moved <= 4.0 * f64::EPSILON;
+            change
+        } else {
+            stages.iterate::<S>()
+        };
+        let of_transformed = stages.evaluate::<S>(t);
+        *evaluations += stages.count() as u64;
+        if given == GivenStages::Solution {
+            return (IterationOutcome::Done, iteration);
+        }
+        if first {
+            first = false;
+            continue;
+        }
+        // `f64::max` would hide a NaN.
+        let larger = of_transformed > change || of_transformed.is_nan();
+        let change = if larger { of_transformed } else { change };
+        match iteration.assess(change, 1.0) {
+            IterationOutcome::Continue => {}
+            IterationOutcome::Done if carried => iteration = FixedPointIteration::until(1.0, 0.25),
+            outcome => return (outcome, iteration),
+        }
+        carried = false;
+    }
+}
+
+/// The stages of a step of a Lagrangian.
+struct OfLagrangian<'k, L, const N: usize, const TRANSFORMED: bool> {
+    lagrangian: &'k L,
+    stages: Iteration<'k, N, TRANSFORMED>,
+}
+
+impl<L: Lagrangian<N>, const N: usize, const TRANSFORMED: bool> MovingStages for OfLagrangian<'_, L, N, TRANSFORMED> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.stages.table.s
+    }
+
+    #[inline(always)]
+    fn iterate<S: Simd>(&mut self) -> f64 {
+        self.stages.iterate::<S>()
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
+        self.stages.evaluate::<S, L>(self.lagrangian, t)
+    }
+
+    #[inline(always)]
+    fn in_newton(&mut self) -> StagesInIteration<'_> {
+        let stages = &mut self.stages;
+        StagesInIteration {
+            table: stages.table,
+            start: (stages.q, stages.p, stages.z),
+            l_v: stages.vectors.l_v,
+            l: stages.l,
+            force: stages.vectors.force,
+            rate: stages.rate,
+            v: stages.vectors.v,
+            z: stages.z_stages,
+            one_minus_rho_stages: stages.one_minus_rho_stages,
+            moved: stages.vectors.moved,
+            x: stages.vectors.x,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Steps of contact Gauss collocation for every regular Lagrangian.
 
 mod acceptance;
+mod by_points;
 mod evaluation;
 mod iteration;
 mod kernel;
@@ -9,7 +10,7 @@ mod start;
 mod state_words;
 mod vectors;
 
-use crate::gauss::limits::{MAX_DIMENSION_IN_LANES, MIN_JACOBIAN_AGE, SLOW_NEWTON};
+use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON};
 use crate::gauss::resolution::tail::Tail;
 use crate::gauss::stages::equations::{Products, Workspace};
 use crate::gauss::stages::fixed_point::IterationOutcome;
@@ -304,7 +305,7 @@ impl General {
         };
         self.warm = false;
         self.arch.dispatch(StartStep { general: self, extrapolates });
-        if self.q.len() > MAX_DIMENSION_IN_LANES && !self.invert_one_by_one(system, t) {
+        if self.mass.is_inverted_by_stages() && !self.invert_one_by_one(system, t) {
             return IterationOutcome::NonFinite;
         }
         let (outcome, iteration) = kernel.solve_general_stages(self.arch, t, given, self);
@@ -328,11 +329,8 @@ impl General {
         self.arch.dispatch(FinishStep { general: self, first })
     }
 
-    /// Inverts W at one stage after another, if it is not constant; `false` if it is singular.
+    /// Inverts W at one stage after another; `false` if it is singular.
     fn invert_one_by_one(&mut self, system: &dyn SystemAtPoints, t: f64) -> bool {
-        if let Mass::Constant(_) = self.mass {
-            return true;
-        }
         (0..self.table.s).all(|i| {
             self.take_stage(i);
             self.mass.invert_stage(system, i, t + self.table.times.0[i], self.point.at())

@@ -21,7 +21,7 @@ pub(crate) enum IterationStart {
     LastIterate,
 }
 
-/// The part of a step that evaluates the contact Hamiltonian.
+/// The part of a step that evaluates the contact Hamiltonian. The default is for systems that take other routes.
 pub(crate) trait HamiltonianKernel {
     /// Solves the stage equations of a step from the time `t` by fixed-point iteration or simplified Newton iteration,
     /// to convergence or failure.
@@ -31,7 +31,10 @@ pub(crate) trait HamiltonianKernel {
         t: f64,
         start: IterationStart,
         stages: &mut HamiltonianStages,
-    ) -> (IterationOutcome, FixedPointIteration);
+    ) -> (IterationOutcome, FixedPointIteration) {
+        let _ = (arch, t, start, stages);
+        (IterationOutcome::NonFinite, FixedPointIteration::default())
+    }
 }
 
 impl<L: Lagrangian<N>, const N: usize> HamiltonianKernel for Typed<'_, L, N> {

@@ -1,6 +1,6 @@
 //! Steps of a linear motion by its precomputed map.
 
-use crate::gauss::dense::StartValues;
+use crate::gauss::dense::StepStart;
 use crate::gauss::routes::linear::coefficients::StepMap;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated, copy_values};
 use pulp::{Simd, WithSimd};
@@ -14,7 +14,7 @@ pub(crate) struct Advance<'a> {
     pub z: &'a mut CompensatedSum,
     /// Workspace for many coordinates.
     pub trial: &'a mut [Vec<CompensatedSum>; 4],
-    pub last: &'a mut StartValues,
+    pub last: &'a mut StepStart,
     pub steps: usize,
 }
 
@@ -57,7 +57,7 @@ fn advance(
     [q, v]: [&mut [CompensatedSum]; 2],
     z: &mut CompensatedSum,
     [trial_q, trial_v, q_before, v_before]: [&mut [CompensatedSum]; 4],
-    last: &mut StartValues,
+    last: &mut StepStart,
     steps: usize,
 ) -> bool {
     let mut trial_z = *z;

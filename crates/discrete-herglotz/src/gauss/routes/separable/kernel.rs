@@ -17,14 +17,20 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, vector};
 use pulp::{Simd, WithSimd};
 
-/// What is compiled for each Lagrangian.
+/// What is compiled for each Lagrangian. The defaults are for systems that take other routes.
 pub(crate) trait SeparableKernel {
     /// Solves the stage equations of a step by fixed-point iteration, or by simplified Newton iteration, and evaluates
     /// `L - gamma z` at the solution if z is advanced.
-    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated;
+    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated {
+        let _ = (arch, run, start);
+        Iterated { outcome: IterationOutcome::NonFinite, iteration: FixedPointIteration::default(), change: f64::NAN }
+    }
 
     /// `L(t, q, v, 0)` at the stages of a solved step, and the velocities there.
-    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages;
+    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages {
+        let _ = (arch, solved);
+        Stages::ZERO
+    }
 }
 
 /// The start of an iteration; its initial guess is `rest`, or is extrapolated from it.
