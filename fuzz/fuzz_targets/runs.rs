@@ -22,7 +22,7 @@ fuzz_target!(|input: ([f64; 6], u8, u16, Option<u16>, bool)| {
     }
 });
 
-fn run(input: ([f64; 6], u8, u16, Option<u16>, bool)) -> Result<(Outcome<1>, Vec<Row<1>>), InputError> {
+fn run(input: ([f64; 6], u8, u16, Option<u16>, bool)) -> Result<(Outcome, Vec<Row>), InputError> {
     let ([q, v, z, t0, span, gamma], integrator, count, stride, action) = input;
     let all = AnyIntegrator::all();
     let system = Pendulum { gamma };

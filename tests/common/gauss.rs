@@ -6,9 +6,9 @@ use discrete_herglotz::gauss::{Gauss, GaussStepper, TransformedStepper};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Problem, Start, StepperOptions};
 
 /// The steppers of a discrete Lagrangian's method, with its stages and its step.
-pub trait GaussSteppers<L, const N: usize> {
+pub trait GaussSteppers<const N: usize> {
     /// A stepper that computes the action.
-    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_, L, N>, InputError>;
+    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_>, InputError>;
 
     /// A stepper that computes the action only where it acts on the motion.
     fn stepper_without_action(
@@ -16,7 +16,7 @@ pub trait GaussSteppers<L, const N: usize> {
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<GaussStepper<'_, L, N>, InputError>;
+    ) -> Result<GaussStepper<'_>, InputError>;
 
     /// A stepper with equal steps in transformed time.
     fn transformed_stepper(
@@ -24,11 +24,11 @@ pub trait GaussSteppers<L, const N: usize> {
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<TransformedStepper<'_, L, N>, InputError>;
+    ) -> Result<TransformedStepper<'_>, InputError>;
 }
 
-impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
-    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_, L, N>, InputError> {
+impl<L: Lagrangian<N>, const N: usize> GaussSteppers<N> for Gauss<L> {
+    fn stepper(&self, t: f64, state: PhasePoint<N>, v: SVector<f64, N>) -> Result<GaussStepper<'_>, InputError> {
         let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
         let options = StepperOptions { action: true, ..StepperOptions::default() };
         GaussStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), options)
@@ -39,7 +39,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<GaussStepper<'_, L, N>, InputError> {
+    ) -> Result<GaussStepper<'_>, InputError> {
         let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
         GaussStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self), StepperOptions::default())
     }
@@ -49,7 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussSteppers<L, N> for Gauss<L> {
         t: f64,
         state: PhasePoint<N>,
         v: SVector<f64, N>,
-    ) -> Result<TransformedStepper<'_, L, N>, InputError> {
+    ) -> Result<TransformedStepper<'_>, InputError> {
         let problem = Problem::new(self.lagrangian(), t, Start::Momentum(state, v))?;
         TransformedStepper::new(&problem, self.stages(), DiscreteLagrangian::<N>::step_size(self))
     }

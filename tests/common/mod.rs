@@ -8,10 +8,8 @@ pub mod lagrangians;
 pub mod observers;
 pub mod oracle;
 
-use contact_geom::{
-    ChartVector, DiscretePoint, PhasePoint, VelocityPoint,
-    numbers::{MaxAbsOrNan, MaxOrNan},
-};
+use contact_geom::{DiscretePoint, VelocityPoint, numbers::MaxOrNan};
+use discrete_herglotz::State;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 
 /// The bound on the residuals of sections 2 and 3, relative to the size of the terms: 5e4 eps, which is the product of
@@ -71,7 +69,10 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
 }
 
 /// The largest difference of the components of two states, relative to the largest component.
-pub fn relative_distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
-    ChartVector::from(a).minus(b.into()).max_abs_or_nan()
-        / ChartVector::from(a).max_abs_or_nan().max_or_nan(ChartVector::from(b).max_abs_or_nan())
+pub fn relative_distance(a: impl Into<State>, b: impl Into<State>) -> f64 {
+    let (a, b) = (a.into(), b.into());
+    assert_eq!((a.q.len(), a.p.len()), (b.q.len(), b.p.len()), "states of different systems");
+    let size = |x: &State| x.q.amax().max_or_nan(x.p.amax()).max_or_nan(x.z.abs());
+    let difference = State { q: &a.q - &b.q, p: &a.p - &b.p, z: a.z - b.z };
+    size(&difference) / size(&a).max_or_nan(size(&b))
 }

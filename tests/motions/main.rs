@@ -14,6 +14,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod any_system;
 mod boundary_paths;
 mod ensembles;
 mod forces;

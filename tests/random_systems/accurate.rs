@@ -46,7 +46,7 @@ pub fn accurate<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers
         }
         Err(_) => return Ok(Verdict::NoReference),
     };
-    let error = truth.error_at_end(&outcome.q, &outcome.p);
+    let error = truth.error_at_end(&outcome.q.fixed(), &outcome.p.fixed());
     let floor = truth.rounding(*t0, plan.count());
     if 10.0 * tolerance < floor {
         return Ok(Verdict::NoReference);

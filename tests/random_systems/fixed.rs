@@ -36,8 +36,8 @@ struct Outputs<const N: usize> {
 impl<const N: usize> Outputs<N> {
     fn of<'p, 'o>(
         &self,
-        run: Run<'p, 'o, Problem<'p, RandomSystem<N>, N>>,
-    ) -> Run<'p, 'o, Problem<'p, RandomSystem<N>, N>> {
+        run: Run<'p, 'o, discrete_herglotz::Problem<'p, RandomSystem<N>, N>>,
+    ) -> Run<'p, 'o, discrete_herglotz::Problem<'p, RandomSystem<N>, N>> {
         let run = if self.action { run } else { run.without_action() };
         if self.conformal_factor { run.with_conformal_factor() } else { run }
     }
@@ -46,7 +46,7 @@ impl<const N: usize> Outputs<N> {
         let rows = Rows::every(self.rows?).ok()?;
         let rows = if self.action { rows } else { rows.without_action() };
         Some(match &self.momentum {
-            Some(group) => rows.column("J", |_, x| group.momentum(&x.q, &x.p)),
+            Some(group) => rows.column("J", |_, x| group.momentum(&x.q.fixed(), &x.p.fixed())),
             None => rows,
         })
     }
@@ -86,7 +86,8 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
         Err(error) => return Ok(refused(&error)),
     };
     finite(&outcome, rows.iter().flat_map(|rows| &rows.rows))?;
-    let Outcome { status, q, p, z, .. } = outcome;
+    let Outcome { status, z, .. } = outcome;
+    let (q, p) = (outcome.q.fixed::<N>(), outcome.p.fixed::<N>());
     if let Status::Failed { cause, step, t } = status {
         ensure(t == outcome.t, Kind::RoutesDiffer, || format!("failed at t = {t}, ended at {}", outcome.t))?;
         ensure(step == outcome.steps, Kind::RoutesDiffer, || format!("step {step} failed after {}", outcome.steps))?;
@@ -105,7 +106,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
     let bare = stepper.state();
     let same = halted.is_ok() && bare.q == q && bare.p == p && z.is_none_or(|z| z == bare.z);
     ensure(same, Kind::ObservedDiffers, || {
-        let apart = larger_of(&(bare.q - q), &(bare.p - p));
+        let apart = larger_of(&(bare.q.fixed::<N>() - q), &(bare.p.fixed::<N>() - p));
         format!("{integrator}: {apart:e} between a run with {outputs:?} and one without, {halted:?}")
     })?;
     if outcome.unresolved.is_some() {
@@ -136,7 +137,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
     while refined <= REFINED && (errors.len() == 1 || !small_enough(errors[errors.len() - 1], error)) {
         // A poor step may continue where a good one refuses to.
         let run = finer.of(posed.by(integrator).steps(Steps::Count(refined))).run(problem.until()).ok();
-        let end = run.filter(|o| o.status == Status::Completed).map(|o| (o.q, o.p, o.z));
+        let end = run.filter(|o| o.status == Status::Completed).map(|o| (o.q.fixed(), o.p.fixed(), o.z));
         errors.push(end.as_ref().map_or(f64::INFINITY, |(q, p, z)| truth.error(q, p, *z)));
         ends.push(end);
         refined *= 2;
@@ -180,7 +181,7 @@ fn larger_of<const N: usize>(
 }
 
 /// Fails for an outcome with a number that is not finite; a factor may underflow or overflow in one step.
-fn finite<'r, const N: usize>(outcome: &Outcome, rows: impl Iterator<Item = &'r Row>) -> Result<(), Wrong> {
+fn finite<'r>(outcome: &Outcome, rows: impl Iterator<Item = &'r Row>) -> Result<(), Wrong> {
     let end = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z).chain([outcome.t]);
     let rows = rows.flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.columns.clone()).chain([r.t]));
     let good = end.chain(rows).all(f64::is_finite) && outcome.log_factor.is_none_or(|f| !f.is_nan());
@@ -210,7 +211,7 @@ fn worst_step<const N: usize>(
         if stepper.advance(1).is_err() {
             return Ok(worst);
         }
-        let to = stepper.state();
+        let to = stepper.state().fixed::<N>();
         // Where the motion from the start of a step is not defined up to its end, the step should not exist.
         let error = match exact.forward(t, &from, &guess, &mut Solver::default()) {
             Ok(motion) => {

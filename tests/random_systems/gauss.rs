@@ -6,7 +6,7 @@ use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use crate::gauss_steppers::GaussSteppers;
 use contact_geom::{
-    ChartVector, PhasePoint, legendre,
+    ChartVector, legendre,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
@@ -28,7 +28,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
     };
     let all = whole.advance(steps);
     let end = whole.state();
-    ensure(ChartVector::from(end).is_finite(), Kind::NotFinite, || format!("gauss_{stages}: {end:?}"))?;
+    ensure(end.is_finite(), Kind::NotFinite, || format!("gauss_{stages}: {end:?}"))?;
 
     // The same in chunks, with dense output between them.
     let Ok(mut parts) = stepper() else { return Ok(Verdict::NoReference) };
@@ -39,11 +39,11 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -
         halted = parts.advance(chunk).map_err(|halt| StepFailure { taken: taken + halt.taken, ..halt });
         taken += chunk;
         if halted.is_ok() {
-            check_dense_output(&parts, stages, random)?;
+            check_dense_output::<N>(&parts, stages, random)?;
             if chunk == 1 && random.chance(0.1) {
-                step_solves_its_equations(&gauss, last.0, &last.1, &parts.state())?;
+                step_solves_its_equations(&gauss, last.0, &last.1, &parts.state().fixed())?;
             }
-            last = (parts.time(), parts.state());
+            last = (parts.time(), parts.state().fixed());
         }
     }
     ensure(halted == all && parts.state() == end, Kind::ObservedDiffers, || {
@@ -81,7 +81,7 @@ fn with_events<const N: usize>(
 ) -> Result<(), Wrong> {
     let Problem { system, t0, start, .. } = problem;
     let level = start.q[0] + random.between(-0.5, 0.5);
-    let event = Event::new(|_, x: &PhasePoint<N>| x.q[0] - level);
+    let event = Event::new(|_, x| x.q[0] - level);
     let event = match random.below(3) {
         0 => event,
         1 => event.rising(),
@@ -109,11 +109,12 @@ fn with_events<const N: usize>(
     for crossing in &events.crossings {
         let off = (crossing.state.q[0] - level).abs();
         // The rounding of the sums of a step of up to 16 terms, and the motion in the spacing of the time.
-        let size = ChartVector::from(crossing.state).amax()
-            + ChartVector::from(end).amax()
+        let size = ChartVector::from(crossing.state.fixed::<N>()).amax()
+            + ChartVector::from(end.fixed::<N>()).amax()
             + ChartVector::from(*at).amax()
             + 1.0;
-        let from_there = discrete_herglotz::Problem::new(system, crossing.t, Start::Momentum(crossing.state, start.v));
+        let from_there =
+            discrete_herglotz::Problem::new(system, crossing.t, Start::Momentum(crossing.state.fixed(), start.v));
         let speed = from_there.map_or(f64::INFINITY, |from_there| from_there.start().v[0].abs());
         let bound = f64::EPSILON * (1e3 * size + 4.0 * crossing.t.abs() * speed);
         ensure(off <= bound && crossing.t >= before, Kind::Residual, || {
@@ -126,7 +127,7 @@ fn with_events<const N: usize>(
             format!("gauss_{stages}: with events {state:?}, without {end:?}")
         }),
         Status::Stopped { t, .. } => {
-            let there = events.crossings.last().map(|c| (c.t, c.state)) == Some((t, state)) && t == outcome.t;
+            let there = events.crossings.last().map(|c| (c.t, &c.state)) == Some((t, &state)) && t == outcome.t;
             ensure(terminal && there, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}"))
         }
         // The failure is that of the run, or an earlier one: a part of a step cannot be taken.
@@ -144,7 +145,7 @@ fn with_events<const N: usize>(
 
 /// The dense output of the last step: at its ends it is the states, and between them finite.
 fn check_dense_output<const N: usize>(
-    stepper: &discrete_herglotz::gauss::GaussStepper<'_, super::system::RandomSystem<N>, N>,
+    stepper: &discrete_herglotz::gauss::GaussStepper<'_>,
     stages: usize,
     random: &mut RandomNumbers,
 ) -> Result<(), Wrong> {
@@ -153,11 +154,11 @@ fn check_dense_output<const N: usize>(
     };
     let (from, to) = curve.span();
     let within = curve.at(from + (to - from) * random.between(0.0, 1.0));
-    let (end, state) = (curve.at(to), stepper.state());
+    let (end, state) = (curve.at(to).fixed::<N>(), stepper.state().fixed::<N>());
     let apart = ChartVector::from(end).minus(state.into());
     // The times are `t0 + k h`, from a start that may be ten units away.
     let spacing = 64.0 * f64::EPSILON * (1.0 + to.abs());
-    ensure(ChartVector::from(within).is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
+    ensure(within.is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
         format!("gauss_{stages}: {within:?} between {from} and {to}")
     })?;
     // In a step that is too long, and flagged, the stages are so large that their sums lose all digits.
@@ -167,7 +168,7 @@ fn check_dense_output<const N: usize>(
     // Sums of up to 16 terms with weights to 33, of the largest numbers in the step; and the motion in the spacing of
     // the time.
     let places: Vec<_> =
-        (0..=16).map(|i| ChartVector::from(curve.at(from + (to - from) * f64::from(i) / 16.0))).collect();
+        (0..=16).map(|i| ChartVector::from(curve.at(from + (to - from) * f64::from(i) / 16.0).fixed::<N>())).collect();
     let fastest = (0..=16)
         .map(|i| max_abs_or_nan(curve.velocity(from + (to - from) * f64::from(i) / 16.0).iter().copied()))
         .fold(0.0, max_or_nan);

@@ -22,7 +22,9 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumber
         })
     };
     match (linear(false, true), linear(true, true), linear(false, false)) {
-        (Ok(plain), Ok(compensated), Ok(bare)) => judge([plain.clone(), plain, compensated, bare], steps, &chunks),
+        (Ok(plain), Ok(compensated), Ok(bare)) => {
+            judge::<_, N>([plain.clone(), plain, compensated, bare], steps, &chunks)
+        }
         (Err(error), ..) => {
             let of = |compensated| {
                 let made = ActionSplitting::new(system, &scheme, h, *t0, state)?;
@@ -30,7 +32,7 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumber
             };
             match (of(false), of(true)) {
                 (Ok(plain), Ok(compensated)) => {
-                    judge([plain.clone(), plain.clone(), compensated, plain], steps, &chunks)
+                    judge::<_, N>([plain.clone(), plain.clone(), compensated, plain], steps, &chunks)
                 }
                 _ => Ok(refused(&error)),
             }
@@ -42,7 +44,7 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumber
 /// Compares four steppers from one start: the first in one piece, the second in chunks, the third with compensated
 /// sums, the last without the action where the scheme has it.
 fn judge<S: Stepper, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
-    let start = four[0].state();
+    let start = four[0].state().fixed::<N>();
     let all = four[0].advance(steps);
     let (mut taken, mut halted) = (0, Ok(()));
     for chunk in chunks {
@@ -54,7 +56,7 @@ fn judge<S: Stepper, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[u
     }
     let compensated = four[2].advance(steps);
     let bare = four[3].advance(steps);
-    let ends: [PhasePoint<N>; 4] = std::array::from_fn(|i| four[i].state());
+    let ends: [PhasePoint<N>; 4] = std::array::from_fn(|i| four[i].state().fixed());
     let finite = ends.iter().all(|e| e.check().is_ok()) && four.iter().all(|s| s.sigma() >= 0.0);
     ensure(finite, Kind::NotFinite, || format!("{ends:?}"))?;
     ensure(halted == all && ends[0] == ends[1], Kind::ObservedDiffers, || {

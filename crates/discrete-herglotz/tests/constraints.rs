@@ -19,7 +19,7 @@ use contact_geom::support::linear::solve;
 use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, ContactLobatto, DragRattle, OffConstraint};
 use discrete_herglotz::groups::{GroupGauss, GroupMotion, GroupState};
-use discrete_herglotz::{InputError, SplittingScheme, StepError, Stepper};
+use discrete_herglotz::{InputError, SplittingScheme, State, StepError, Stepper};
 
 /// A bead on a closed curve, with a Lagrangian that is nonlinear in q, v and z.
 struct Bead;
@@ -89,8 +89,9 @@ fn slopes(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect()
 }
 
-fn distance<const N: usize>(a: &PhasePoint<N>, b: &PhasePoint<N>) -> f64 {
-    (a.q - b.q).max_abs_or_nan().max_or_nan((a.p - b.p).max_abs_or_nan()).max_or_nan((a.z - b.z).abs())
+fn distance(a: &State, b: &State) -> f64 {
+    assert_eq!((a.q.len(), a.p.len()), (b.q.len(), b.p.len()), "states of different systems");
+    (&a.q - &b.q).amax().max_or_nan((&a.p - &b.p).amax()).max_or_nan((a.z - b.z).abs())
 }
 
 /// Over 1e5 steps the pendulum stays on its circle up to the rounding of its coordinates, and each step is conformally
@@ -105,12 +106,12 @@ fn pendulum_keeps_constraint_and_contact() {
         let (mut off, mut contact) = (0f64, 0f64);
         for k in 0..100_000 {
             if k % 10 == 0 {
-                let from = tangent(&system, &motion.state(), f64::from(k));
+                let from = tangent(&system, &motion.state().fixed(), f64::from(k));
                 let to = motion.step(motion.time(), &from).unwrap().end;
                 contact = contact.max_or_nan((eta(&to) - (gamma * h).exp() * eta(&from)).abs());
             }
             motion.advance(1).unwrap();
-            let q = motion.state().q;
+            let q = motion.state().q.fixed();
             off = off.max_or_nan(Constraint::value(&system, &q)[0].abs());
         }
         assert!(off < 1e-15, "constraint {off:e}");
@@ -127,7 +128,7 @@ fn pendulum_returns_after_its_period() {
     let h = 2.367841947576237 / 64.0;
     let mut motion = DragRattle::new(system, system, &SplittingScheme::SOFRONIOU_SPALETTA_10, h, &start).unwrap();
     motion.advance(64).unwrap();
-    let end = motion.state();
+    let end = motion.state().fixed::<2>();
     // The round-off of 64 * 35 substeps with momenta below 5.
     let off = (end.q - SVector::from([1.0, 0.0])).max_abs_or_nan().max_or_nan(end.p.max_abs_or_nan());
     assert!(off < 1e-12, "{off:e}");
@@ -187,12 +188,12 @@ fn lobatto_steps_are_contact() {
     for stages in 2..=5 {
         let mut motion = ContactLobatto::new(Bead, Bead, stages, 0.25, &bead()).unwrap();
         for k in 0..40 {
-            let from = tangent(&Bead, &motion.state(), f64::from(k));
+            let from = tangent(&Bead, &motion.state().fixed(), f64::from(k));
             let to = motion.step(motion.time(), &from, &motion.velocity_point().v).unwrap();
             let defect = eta(&to.end) - to.sigma.re * eta(&from);
             assert!(defect.abs() < 1e-13, "{stages} stages, step {k}: {defect:e}");
             motion.advance(1).unwrap();
-            let PhasePoint { q, .. } = motion.state();
+            let PhasePoint::<2> { q, .. } = motion.state().fixed();
             // Some roundings of a sum of three terms of order one.
             assert!(Constraint::value(&Bead, &q)[0].abs() < 4e-15);
             assert!((Bead.with_jacobian(&q).1 * motion.velocity_point().v)[0].abs() < 1e-14);
@@ -215,7 +216,7 @@ fn spherical_pendulum_by_both_methods() {
         // The error of order 8 of the second.
         let off = distance(&rattle.state(), &lobatto.state());
         assert!(off < 1e-11, "{off:e}");
-        for PhasePoint { q, p, .. } in [rattle.state(), lobatto.state()] {
+        for State { q, p, .. } in [rattle.state(), lobatto.state()] {
             let momentum = q[0] * p[1] - q[1] * p[0];
             let expected = 0.06 * (-0.1 * 0.5 * f64::from(k)).exp();
             let off = (momentum - expected).abs();
@@ -254,7 +255,7 @@ fn spherical_pendulum_by_a_constraint_and_by_a_group() {
         (highest, lowest) = (highest.max_or_nan(axis[2]), -(-lowest).max_or_nan(-axis[2]));
         for motion in &mut under_constraint {
             motion.advance(1).unwrap();
-            let PhasePoint { q, z, .. } = motion.state();
+            let PhasePoint::<3> { q, z, .. } = motion.state().fixed();
             // The errors of order 10 and more of steps of a twentieth, and of round-off.
             assert!((q - axis).max_abs_or_nan() < 1e-11 && (z - on_group.state().z).abs() < 1e-11);
         }
@@ -278,7 +279,7 @@ fn squeezer_reaches_its_reference() {
     let count = 300;
     let mut motion = ContactLobatto::new(system, system, 5, 0.03 / f64::from(count), &start).unwrap();
     motion.advance(count as usize).unwrap();
-    let end = motion.state().q;
+    let end: SVector<f64, 7> = motion.state().q.fixed();
     let extrapolated = SVector::from([
         15.81077119515395,
         -15.75637105841233,
@@ -326,10 +327,10 @@ fn redundant_constraints() {
         cranks.advance(1).unwrap();
         by_lobatto.advance(1).unwrap();
         single.advance(1).unwrap();
-        let (q, all) = (single.state().q, cranks.state().q);
+        let (q, all) = (single.state().q.fixed::<2>(), cranks.state().q.fixed::<6>());
         let off = (0..3).map(|i| (all.fixed_rows::<2>(2 * i) - q - SVector::from([i as f64, 0.0])).max_abs_or_nan());
         assert!(off.fold(0.0, f64::max_or_nan) < 1e-13);
-        assert!((by_lobatto.state().q - all).max_abs_or_nan() < 1e-9);
+        assert!((by_lobatto.state().q.fixed::<6>() - all).max_abs_or_nan() < 1e-9);
         let motion = cranks.constrained_motion().unwrap();
         let g = ConstraintDerivatives::<6, 6>::with_jacobian(&system, &all).1;
         // The multipliers are orthogonal to those without force, which are the kernel of G G^T.
@@ -360,6 +361,7 @@ fn pendulum_stays_in_its_equilibrium() {
     for (state, tension) in
         [(rattle.state(), rattle.multipliers().unwrap()), (lobatto.state(), lobatto.multipliers().unwrap())]
     {
+        let state = state.fixed::<2>();
         // The round-off of a weight of 10 in 100 steps.
         assert!((state.q - start.at.q).max_abs_or_nan().max_or_nan(state.p.max_abs_or_nan()) < 1e-13, "{state:?}");
         assert!((tension[0] + 0.5 * 9.81).abs() < 1e-13, "{tension}");
@@ -401,7 +403,7 @@ fn invalid_starts_are_refused() {
     );
     let project = |start: ConstrainedStart<2>| ConstrainedStart { off_constraint: OffConstraint::Project, ..start };
     let projected = DragRattle::new(system, system, &strang, 0.1, &project(at([1.1, 0.0], [0.1, 0.3]))).unwrap();
-    let PhasePoint { q, p, .. } = projected.state();
+    let State { q, p, .. } = projected.state();
     assert!((q[0] - 1.0).abs() < 1e-15 && p[0].abs() < 1e-15 && (p[1] - 0.3).abs() < 1e-15);
     let far = of(&project(at([0.0, 0.0], [0.0, 0.0])));
     assert!(

@@ -89,7 +89,7 @@ fn knife_edge_follows_its_closed_form() {
         let start = VelocityPoint::new([0.0; 3], [0.0, 0.0, w], 0.0);
         let mut motion = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, 3.0 / count as f64, start);
         motion.advance(count).unwrap();
-        let (q, turned) = (motion.state().q, w * 3.0);
+        let (q, turned) = (motion.state().q.fixed::<3>(), w * 3.0);
         let x = system.slope * turned.sin().powi(2) / (2.0 * w * w);
         let y = system.slope * (turned - 0.5 * (2.0 * turned).sin()) / (2.0 * w * w);
         (q - SVector::from([x, y, turned])).max_abs_or_nan()
@@ -122,7 +122,7 @@ fn rolling_disc_follows_its_circle() {
         let (heading, radius) = (0.3 + turn * tau, 0.5 * spin / turn);
         let x = radius * (heading.sin() - 0.3f64.sin());
         let y = -radius * (heading.cos() - 0.3f64.cos());
-        (motion.state().q - SVector::from([x, y, spin * tau, heading])).max_abs_or_nan()
+        (motion.state().q.fixed::<4>() - SVector::from([x, y, spin * tau, heading])).max_abs_or_nan()
     };
     let errors = [10, 20, 40].map(error);
     assert!((slope(&errors) - 4.0).abs() < 0.15, "{errors:?}");
@@ -134,17 +134,17 @@ fn steps_are_reversible() {
     let system = ChaplyginSleigh { mass: 1.0, arm: 0.7, inertia: 0.4, gamma: -0.3 };
     let start = VelocityPoint::new([0.2, -0.1, 0.4], [1.0, 0.5, 1.1], 0.3);
     let mut forward = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, 0.2, start);
-    let from = (forward.state(), forward.velocity_point());
+    let from = (forward.state().fixed::<3>(), forward.velocity_point());
     forward.advance(5).unwrap();
     let mut back = motion::<_, 3, 1>(system, &SplittingScheme::STRANG, -0.2, forward.velocity_point());
     back.advance(5).unwrap();
-    let end = back.state();
+    let end = back.state().fixed::<3>();
     let off = (end.q - from.0.q)
         .max_abs_or_nan()
         .max_or_nan((end.p - from.0.p).max_abs_or_nan())
         .max_or_nan((end.z - from.0.z).abs());
     assert!(off < 1e-13, "{off:e}");
-    assert!((forward.state().q - from.0.q).max_abs_or_nan() > 0.5);
+    assert!((forward.state().q.fixed::<3>() - from.0.q).max_abs_or_nan() > 0.5);
 }
 
 /// The energy is dissipated, `E' = L_z E`, with the order of the method; the contact form is not scaled.
@@ -166,7 +166,7 @@ fn energy_is_dissipated_and_contact_is_lost() {
     // Two nearby starts: the difference of the final states is not scaled by sigma under eta, by more than a thousand
     // times the error of difference quotients.
     let by = 1e-5;
-    let end = |s: f64| {
+    let end = |s: f64| -> [PhasePoint<3>; 2] {
         let turned = 0.4 + s;
         let v = SVector::from([turned.cos(), turned.sin(), 1.1]);
         let mut motion = motion::<_, 3, 1>(
@@ -175,13 +175,13 @@ fn energy_is_dissipated_and_contact_is_lost() {
             0.1,
             VelocityPoint { q: [0.2, -0.1, turned].into(), v, z: 0.3 },
         );
-        let from = motion.state();
+        let from = motion.state().fixed();
         motion.advance(10).unwrap();
-        [from, motion.state()]
+        [from, motion.state().fixed()]
     };
     let (ends, at) = ([end(-by), end(by)], end(0.0));
     let eta = |k: usize| {
-        let [a, b]: [PhasePoint<3>; 2] = [ends[0][k], ends[1][k]];
+        let [a, b] = [ends[0][k], ends[1][k]];
         ((b.z - a.z) - at[k].p.dot(&(b.q - a.q))) / (2.0 * by)
     };
     let defect = eta(1) - gamma.exp() * eta(0);

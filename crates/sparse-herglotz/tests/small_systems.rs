@@ -50,7 +50,7 @@ fn compare<const N: usize, L: Lagrangian<N>>(small: &L, large: &SparseSystem, ma
             let sigma = (a.sigma() - b.sigma()).abs();
             // One rounding of the product gamma h, and one of the exponential.
             assert!(sigma <= 2.0 * f64::EPSILON, "{}: sigma_d differs by {sigma:e}", scheme.name());
-            assert_same(scheme.name(), a.state(), b.state(), masses, tolerance(scheme.stages()));
+            assert_same(scheme.name(), a.state(), b.state().fixed(), masses, tolerance(scheme.stages()));
         }
         let mut a = SparseMidpoint::new(large, h, from, None).unwrap();
         let mut b = Flow::new(Rule::MIDPOINT.of(small, h).unwrap(), from.t, PhasePoint { q, p, z }).unwrap();
@@ -58,7 +58,7 @@ fn compare<const N: usize, L: Lagrangian<N>>(small: &L, large: &SparseSystem, ma
         let sigma = (a.sigma() - b.sigma()).abs();
         assert!(sigma <= 4.0 * f64::EPSILON, "midpoint: sigma_d differs by {sigma:e}");
         // Newton's method stops within its round-off, which has the size of q/h.
-        assert_same("midpoint", a.state(), Stepper::state(&b), masses, tolerance(1) / H);
+        assert_same("midpoint", a.state(), Stepper::state(&b).fixed(), masses, tolerance(1) / H);
     }
 }
 

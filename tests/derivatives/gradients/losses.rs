@@ -28,7 +28,13 @@ fn a_loss_of_the_end() {
     let found = run().gradient(&Mixed, Until::Time(2.0)).unwrap();
     let (value, gradient) = found.loss.unwrap();
     let outcome = found.outcome;
-    let end = EndState { t: outcome.t, q: outcome.q, v: outcome.v.unwrap(), p: outcome.p, z: outcome.z.unwrap() };
+    let end = EndState {
+        t: outcome.t,
+        q: outcome.q.fixed(),
+        v: outcome.v.unwrap().fixed(),
+        p: outcome.p.fixed(),
+        z: outcome.z.unwrap(),
+    };
     let (expected, EndCovector { t, q, v, p, z }) = end.differentiate(&Mixed);
     assert_eq!(value, expected);
     let tangent = run().tangent(&Variable::all(&problem), Until::Time(2.0)).unwrap();

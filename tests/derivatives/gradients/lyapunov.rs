@@ -20,7 +20,7 @@ fn exponents<const N: usize, S: System<N>, M: Method>(
     start: VelocityPoint<N>,
     method: M,
     steps: (f64, usize),
-) -> LyapunovExponents<N> {
+) -> LyapunovExponents {
     exponents_from(system, (system.initial_time(), start), method, steps)
 }
 
@@ -29,7 +29,7 @@ fn exponents_from<const N: usize, L: Parametric<N>, M: Method>(
     (t0, start): (f64, VelocityPoint<N>),
     method: M,
     (h, steps): (f64, usize),
-) -> LyapunovExponents<N> {
+) -> LyapunovExponents {
     let problem = Problem::new(lagrangian, t0, start).unwrap();
     let run = method.run(&problem).steps(Steps::Count(steps));
     let found = run.lyapunov_exponents(Until::Time(t0 + h * steps as f64)).unwrap();

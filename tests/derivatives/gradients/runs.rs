@@ -112,9 +112,9 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
                 let [a, b] = [by, -by].map(|by| self.moved(variable, by));
                 let over = |a: SVector<f64, N>, b: SVector<f64, N>| (a - b) / (2.0 * by);
                 StateDerivative {
-                    q: over(a.q, b.q),
-                    v: over(a.v.unwrap(), b.v.unwrap()),
-                    p: over(a.p, b.p),
+                    q: over(a.q.fixed(), b.q.fixed()),
+                    v: over(a.v.unwrap().fixed(), b.v.unwrap().fixed()),
+                    p: over(a.p.fixed(), b.p.fixed()),
                     z: (a.z.unwrap() - b.z.unwrap()) / (2.0 * by),
                 }
             })
@@ -141,7 +141,7 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
         let problem = self.problem();
         let end = |steps: usize| {
             let outcome = self.method.run(&problem).steps(Steps::Count(steps)).run(Until::Time(self.t_end)).ok()?;
-            (outcome.status == Status::Completed).then_some(outcome.q)
+            (outcome.status == Status::Completed).then_some(outcome.q.fixed::<N>())
         };
         match (end(self.steps), end(2 * self.steps)) {
             (Some(coarse), Some(fine)) => (coarse - fine).norm() <= 0.05 * (1.0 + fine.norm()),
@@ -172,11 +172,15 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
         let tangent = run().tangent(&variables, Until::Time(self.t_end)).unwrap();
         let plain = run().run(Until::Time(self.t_end)).unwrap();
         // The run that is differentiated is the run, bit for bit.
-        assert_eq!((tangent.outcome.q, tangent.outcome.p, tangent.outcome.z), (plain.q, plain.p, plain.z), "{name}");
+        assert_eq!(
+            (&tangent.outcome.q, &tangent.outcome.p, tangent.outcome.z),
+            (&plain.q, &plain.p, plain.z),
+            "{name}"
+        );
         let recorded = run().record(Until::Time(self.t_end)).unwrap();
         assert_eq!(
-            (recorded.outcome().q, recorded.outcome().p, recorded.outcome().z),
-            (plain.q, plain.p, plain.z),
+            (&recorded.outcome().q, &recorded.outcome().p, recorded.outcome().z),
+            (&plain.q, &plain.p, plain.z),
             "{name}"
         );
         let units: Vec<EndCovector<N>> = (0..3 * N + 1).map(unit).collect();

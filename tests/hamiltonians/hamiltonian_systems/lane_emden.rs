@@ -8,7 +8,7 @@ use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Steps, Until};
 /// The radius at which the density vanishes.
 fn surface(system: One, (t0, start): (f64, PhasePoint<1>)) -> f64 {
     let of = OfHamiltonian(system);
-    let mut surface = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0]).terminal()]);
+    let mut surface = Events::new([Event::new(|_, x| x.q[0]).terminal()]);
     let problem = Problem::of_hamiltonian(&of, t0, start).unwrap();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.02)).observe(&mut surface);
     let outcome = run.run(Until::Time(10.0)).unwrap();

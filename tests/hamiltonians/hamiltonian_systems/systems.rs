@@ -111,7 +111,7 @@ pub fn run<H: ContactHamiltonian<N>, const N: usize>(
     let mut log_factor = 0.0;
     let mut observer = Each(|at: &StepView<'_>| {
         log_factor += at.sigma.ln();
-        see(at.t, &at.state, log_factor);
+        see(at.t, &at.state.fixed(), log_factor);
     });
     let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(h)).observe(&mut observer);
     run.run(Until::Time(end)).unwrap()
@@ -126,7 +126,7 @@ pub fn end<H: ContactHamiltonian<N>, const N: usize>(
 ) -> PhasePoint<N> {
     let outcome = run(hamiltonian, start, method, end, |_, _, _| ());
     assert_eq!(outcome.status, Status::Completed, "{outcome:?}");
-    outcome.state()
+    outcome.state().fixed()
 }
 
 /// The slope of the line of least squares through `(ln h, ln error)`.

@@ -12,7 +12,7 @@ use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Status, Steps,
 fn the_limit_cycle() {
     let of = OfHamiltonian(Two::from(Lifted(VanDerPol::default())));
     let start = PhasePoint::new([2.0, 0.0], [0.0, 0.0], 0.0);
-    let mut turns = Events::new([Event::new(|_, x: &PhasePoint<2>| x.q[1]).falling()]);
+    let mut turns = Events::new([Event::new(|_, x| x.q[1]).falling()]);
     let problem = Problem::of_hamiltonian(&of, 0.0, start).unwrap();
     let method = GaussCollocation { stages: 8 };
     problem.by(method).steps(Steps::Size(0.05)).observe(&mut turns).run(Until::Time(60.0)).unwrap();

@@ -98,7 +98,12 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         let problem = Problem::new(changed.as_ref().unwrap_or(self.lagrangian), t0, start).unwrap();
         let outcome = self.run(&problem).run(Until::Time(t_end)).unwrap();
         assert_eq!(outcome.status, Status::Completed);
-        numbers(&StateDerivative { q: outcome.q, v: outcome.v.unwrap(), p: outcome.p, z: outcome.z.unwrap() })
+        numbers(&StateDerivative {
+            q: outcome.q.fixed::<N>(),
+            v: outcome.v.unwrap().fixed(),
+            p: outcome.p.fixed(),
+            z: outcome.z.unwrap(),
+        })
     }
 
     /// Central differences, extrapolated once: the error is of order four in the distance 1/512, below 1e-9, and the
@@ -203,7 +208,7 @@ fn the_tangent_is_conformally_contact() {
         for j in 0..2 * N {
             let dz = if j < N { p[j] } else { 0.0 };
             let (dq, dz) = (columns[j].q + columns[2 * N].q * dz, columns[j].z + columns[2 * N].z * dz);
-            let defect = (dz - tangent.outcome.p.dot(&dq)).abs();
+            let defect = (dz - tangent.outcome.p.fixed::<N>().dot(&dq)).abs();
             assert!(defect <= 1e3 * f64::EPSILON * largest(matrix.iter()), "{name}: {defect:e} in column {j}");
         }
     }

@@ -14,10 +14,10 @@ fn states(system: &OneCoordinate, start: VelocityPoint<1>, h: f64, steps: usize)
     let problem = Problem::new(system, 0.0, start).unwrap();
     let options = StepperOptions { action: true, check_resolution: false };
     let mut stepper = SplittingScheme::STRANG.stepper(&problem, h, options).unwrap();
-    let mut states = vec![stepper.state()];
+    let mut states = vec![stepper.state().fixed()];
     for _ in 0..steps {
         stepper.advance(1).unwrap();
-        states.push(stepper.state());
+        states.push(stepper.state().fixed());
     }
     (states, stepper.sigma())
 }

@@ -26,7 +26,7 @@ const BOUND: f64 = 1e-9;
 fn step<const N: usize>(stepper: Result<impl Stepper, InputError>) -> Result<(PhasePoint<N>, f64), String> {
     let mut stepper = stepper.map_err(|e| e.to_string())?;
     stepper.advance(1).map_err(|halt| halt.cause.to_string())?;
-    Ok((stepper.state(), stepper.sigma()))
+    Ok((stepper.state().fixed(), stepper.sigma()))
 }
 
 /// The derivative of a map by central differences, extrapolated to order 8.

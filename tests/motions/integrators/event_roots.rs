@@ -3,7 +3,7 @@
 use crate::lagrangians::{One, SwitchingOne, one};
 use contact_examples::systems::{FreeParticle, HarmonicOscillator, OneCoordinate};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Hints, Lagrangian, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Event, Events, GaussCollocation, Outcome, Problem, Status, StepError, Steps, Until, rules::Method,
 };
@@ -45,7 +45,7 @@ fn assert_times(name: &str, found: &[f64], expected: &[f64], bound: f64) {
 
 #[test]
 fn three_sign_changes_of_a_motion_in_one_step() {
-    let position = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+    let position = || Event::new(|_, x| x.q[0]);
     // The curve of a step with two stages is a parabola.
     let cubic = One::from(Cubic);
     for stages in 3..=16 {
@@ -66,13 +66,13 @@ fn three_sign_changes_of_a_motion_in_one_step() {
 fn three_sign_changes_of_a_function_in_one_step() {
     let product = |x: f64| (2.5 - x) * (5.0 - x) * -x;
     for stages in 1..=16 {
-        let event = Event::new(|_, x: &PhasePoint<1>| product(x.q[0]));
+        let event = Event::new(|_, x| product(x.q[0]));
         let (_, found) = times_of(&LINE, (0.0, -1.0, 1.0), (stages, 1, 8.0), event);
         assert_times(&format!("{stages} stages"), &found, &[1.0, 3.5, 6.0], 1e-13);
     }
     // Without dense output.
     for by in [AnyIntegrator::Discrete(Method::Midpoint), "strang".parse().unwrap()] {
-        let mut events = Events::new([Event::new(|_, x: &PhasePoint<1>| product(x.q[0]))]);
+        let mut events = Events::new([Event::new(|_, x| product(x.q[0]))]);
         let problem = Problem::new(&LINE, 0.0, VelocityPoint::new([-1.0], [1.0], 0.0)).unwrap();
         problem.by(by).steps(Steps::Count(1)).observe(&mut events).run(Until::Time(8.0)).unwrap();
         let found: Vec<f64> = events.crossings.iter().map(|crossing| crossing.t).collect();
@@ -86,7 +86,7 @@ fn an_oscillation_over_several_periods_of_one_step() {
     for way in [1.0, -1.0] {
         for stages in [1, 2, 4, 8, 16] {
             for span in [7.0, 20.0, 30.0, 61.7] {
-                let event = Event::new(|t: f64, _: &PhasePoint<1>| t.cos() + 0.9);
+                let event = Event::new(|t: f64, _| t.cos() + 0.9);
                 let (outcome, found) = times_of(&LINE, (0.0, 0.0, 1.0), (stages, 1, way * span), event);
                 let all = (0..).flat_map(|k| [angle, 2.0 * PI - angle].map(|x| x + 2.0 * PI * f64::from(k)));
                 let expected: Vec<f64> = all.take_while(|t| *t < span).map(|t| way * t).collect();
@@ -95,7 +95,7 @@ fn an_oscillation_over_several_periods_of_one_step() {
                 assert_eq!(outcome.status, Status::Completed, "{name}");
             }
         }
-        let event = Event::new(|t: f64, _: &PhasePoint<1>| (20.0 * t).sin());
+        let event = Event::new(|t: f64, _| (20.0 * t).sin());
         let (_, found) = times_of(&LINE, (0.05 * way, 0.0, 1.0), (4, 1, way * 10.05), event);
         let expected: Vec<f64> = (1..64).map(|k| way * f64::from(k) * PI / 20.0).collect();
         assert_times("sin(20 t)", &found, &expected, 1e-12);
@@ -109,7 +109,7 @@ fn an_almost_tangent_surface() {
     for stages in [2, 4, 8, 16] {
         for depth in [1e-4, 1e-8, 1e-12] {
             // The place is no node, nor a fraction of the step that a bisection meets.
-            let near = |offset: f64| Event::new(move |_, x: &PhasePoint<1>| (x.q[0] - 0.1234).powi(2) + offset);
+            let near = |offset: f64| Event::new(move |_, x| (x.q[0] - 0.1234).powi(2) + offset);
             let of = |offset| times_of(&LINE, (0.0, -1.0, 1.0), (stages, 1, 2.5), near(offset));
             let name = format!("{stages} stages, {depth:e}");
             let half = f64::sqrt(depth);
@@ -121,7 +121,7 @@ fn an_almost_tangent_surface() {
     // In the middle of a step of a motion that the curve of the step has only to 1e-6.
     let oscillator = one(HarmonicOscillator { gamma: 0.0 });
     let of = |offset: f64| {
-        let event = Event::new(move |_, x: &PhasePoint<1>| x.q[0] + 1.0 + offset);
+        let event = Event::new(move |_, x| x.q[0] + 1.0 + offset);
         times_of(&oscillator, (0.0, 1.0, 0.0), (8, 3, 6.0), event)
     };
     let half = f64::acos(1.0 - 1e-8);
@@ -136,7 +136,7 @@ fn an_almost_tangent_surface() {
 fn functions_that_are_not_smooth() {
     for stages in [2, 4, 8, 16] {
         let of = |g: fn(f64) -> f64| {
-            let event = Event::new(|_, x: &PhasePoint<1>| g(x.q[0]));
+            let event = Event::new(|_, x| g(x.q[0]));
             let (outcome, found) = times_of(&LINE, (0.0, 0.0, 1.0), (stages, 1, 1.0), event);
             assert_eq!(outcome.status, Status::Completed, "{stages} stages");
             found
@@ -154,7 +154,7 @@ fn functions_that_are_not_smooth() {
         assert_times(&name, &of(|x| f64::from(x as f32) + 0.7), &[], 0.0);
     }
     // A conserved quantity is zero up to round-off: whatever is found, the run continues.
-    let energy = Event::new(|_, x: &PhasePoint<1>| (x.q[0].powi(2) + x.p[0].powi(2)) * 0.5 - 0.5);
+    let energy = Event::new(|_, x| (x.q[0].powi(2) + x.p[0].powi(2)) * 0.5 - 0.5);
     let (outcome, _) = times_of(&one(HarmonicOscillator { gamma: 0.0 }), (0.0, 1.0, 0.0), (8, 400, 40.0), energy);
     assert_eq!(outcome.status, Status::Completed);
 }
@@ -168,7 +168,7 @@ fn saw() -> Vec<f64> {
 fn a_function_that_is_too_fast_is_a_status() {
     for way in [1.0, -1.0] {
         for (stages, steps) in [(1, 1), (4, 1), (8, 1), (16, 1), (4, 10)] {
-            let event = Event::new(|t: f64, _: &PhasePoint<1>| (1e6 * t).sin() + 0.3);
+            let event = Event::new(|t: f64, _| (1e6 * t).sin() + 0.3);
             let (outcome, found) = times_of(&LINE, (0.0, 0.0, 1.0), (stages, steps, way * 10.0), event);
             let Status::Failed { cause: cause @ StepError::EventUnresolved { t }, step: 1, .. } = outcome.status else {
                 panic!("{outcome:?}")
@@ -185,9 +185,9 @@ fn a_function_that_is_too_fast_is_a_status() {
         }
     }
     // Another event is found up to there, and a terminal one before ends the run.
-    let fast = || Event::new(|t: f64, _: &PhasePoint<1>| if t < 1.0 { 1.0 } else { (1e6 * (t - 1.0)).cos() });
+    let fast = || Event::new(|t: f64, _| if t < 1.0 { 1.0 } else { (1e6 * (t - 1.0)).cos() });
     for terminal in [false, true] {
-        let [early, late] = [0.5, 9.0].map(|at| Event::new(move |t: f64, _: &PhasePoint<1>| t - at));
+        let [early, late] = [0.5, 9.0].map(|at| Event::new(move |t: f64, _| t - at));
         let mut events = Events::new([late, fast(), if terminal { early.terminal() } else { early }]);
         let problem = Problem::new(&LINE, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
         let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(1)).observe(&mut events);

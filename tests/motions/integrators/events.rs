@@ -4,7 +4,7 @@ use crate::common::observers::StopsAt;
 use crate::lagrangians::{One, one};
 use contact_examples::systems::{HarmonicOscillator, Pendulum, UniformField};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, VelocityPoint};
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, Crossing, Event, Events, Problem, ResumeState, Rows, Start, Status, Steps, Until,
     rules::Method,
@@ -83,7 +83,7 @@ fn a_run_from_a_crossing_finds_the_next() {
                 let system = One::from(About(place));
                 let (mut t, mut start) = (0.0, Start::from(VelocityPoint::new([place + 1.0], [0.0], 0.0)));
                 for k in 0..12 {
-                    let event = Event::new(|_, x: &PhasePoint<1>| {
+                    let event = Event::new(|_, x| {
                         let g = x.q[0] - place;
                         if jump { if g > 0.0 { 1.0 } else { -1.0 } } else { g }
                     });
@@ -96,7 +96,7 @@ fn a_run_from_a_crossing_finds_the_next() {
                     let passed = (found[0].t - t).abs();
                     let expected = if k == 0 { 0.5 * PI } else { PI };
                     assert!((passed - expected).abs() <= 5e-3, "{name}: after {passed}");
-                    (t, start) = (if anew { 0.0 } else { found[0].t }, found[0].state.into());
+                    (t, start) = (if anew { 0.0 } else { found[0].t }, found[0].state.clone().into());
                 }
             }
         }
@@ -110,7 +110,7 @@ fn a_start_within_rounding_crosses_by_its_rate() {
     let ball = One::from(UniformField { field: [-9.81], gamma: 0.0 });
     for below in [-2e-16, 0.0, 2e-16, -1e-17] {
         for (count, h) in [(1, 20.0), (20, 1.0), (2000, 0.01)] {
-            let floor = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+            let floor = || Event::new(|_, x| x.q[0]);
             let start = VelocityPoint::new([below], [3.5], 0.0);
             let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(count));
             for event in [floor().terminal(), floor().falling().terminal()] {
@@ -125,11 +125,11 @@ fn a_start_within_rounding_crosses_by_its_rate() {
     // From rest on the floor it falls, and does not cross the floor.
     let rest = VelocityPoint::new([0.0], [0.0], 0.0);
     let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(20));
-    let (ended, found) = run_to(&ball, (0.0, rest), way, 2.0, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
+    let (ended, found) = run_to(&ball, (0.0, rest), way, 2.0, [Event::new(|_, x| x.q[0])]);
     assert_eq!((ended.status, found), (Status::Completed, vec![]));
     // A start off the surface by more than rounding crosses it.
     let off = VelocityPoint::new([-1e-12], [3.5], 0.0);
-    let (_, found) = run_to(&ball, (0.0, off), way, 0.5, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
+    let (_, found) = run_to(&ball, (0.0, off), way, 0.5, [Event::new(|_, x| x.q[0])]);
     assert_eq!(found.len(), 1);
 }
 
@@ -140,12 +140,12 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     let system = one(HarmonicOscillator { gamma: 0.0 });
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(8));
-    let at_one = || Event::new(|t, _: &PhasePoint<1>| t - 1.0);
+    let at_one = || Event::new(|t, _| t - 1.0);
     let (ended, found) = run_to(&system, (0.0, start), way, 1.0, [at_one(), at_one().rising(), at_one().falling()]);
     assert_eq!(found.iter().map(|c| (c.event, c.t)).collect::<Vec<_>>(), [(0, 1.0), (1, 1.0)]);
     assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [at_one()]).1, []);
     // The function touches zero where the runs meet.
-    let touches = || Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2));
+    let touches = || Event::new(|t, _| (t - 1.0).powi(2));
     assert_eq!(run_to(&system, (0.0, start), way, 1.0, [touches()]).1, []);
     assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [touches()]).1, []);
 
@@ -171,11 +171,11 @@ fn all_events_of_an_instant_are_reported() {
     for (stages, steps) in [(4, 7), (8, 3), (16, 1)] {
         let all = || {
             [
-                Event::new(|_, x: &PhasePoint<1>| x.q[0].sin()),
-                Event::new(|_, x: &PhasePoint<1>| x.q[0]).terminal(),
-                Event::new(|_, x: &PhasePoint<1>| -3.0 * x.q[0]),
-                Event::new(|_, x: &PhasePoint<1>| x.q[0] + 1e-3),
-                Event::new(|_, x: &PhasePoint<1>| x.q[0] * (2.0 + x.p[0])).terminal(),
+                Event::new(|_, x| x.q[0].sin()),
+                Event::new(|_, x| x.q[0]).terminal(),
+                Event::new(|_, x| -3.0 * x.q[0]),
+                Event::new(|_, x| x.q[0] + 1e-3),
+                Event::new(|_, x| x.q[0] * (2.0 + x.p[0])).terminal(),
             ]
         };
         let way = (AnyIntegrator::Gauss { stages }, Steps::Count(steps));
@@ -213,7 +213,7 @@ impl Lagrangian<1> for Well {
 #[test]
 fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
     let (ending, well) = (One::from(EndsAtZero), One::from(Well));
-    let floor = |at: f64| Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at).terminal();
+    let floor = |at: f64| Event::new(move |_, x| x.q[0] - at).terminal();
     for (to, at) in [(10.0, 1e-3), (1e3, 1e-3), (10.0, 1e-6), (10.0, 0.5)] {
         for v in [-1.0, 0.0, 0.5] {
             let problem = Problem::new(&ending, 0.0, VelocityPoint::new([1.0], [v], 0.0)).unwrap();
@@ -258,7 +258,7 @@ fn a_step_that_cannot_be_taken_may_end_in_an_event() {
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [-1.0], 0.0)).unwrap();
     let times: Vec<f64> = (0..64).map(|k| 0.01 * f64::from(k)).collect();
     for count in [20, 30, 50] {
-        let mut events = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0] - 1e-3).terminal()]);
+        let mut events = Events::new([Event::new(|_, x| x.q[0] - 1e-3).terminal()]);
         let mut rows = Rows::at(times.iter().copied()).unwrap();
         let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(count));
         let ended = run.observe(&mut rows).observe(&mut events).run(Until::Time(3.0)).unwrap();
@@ -274,7 +274,7 @@ fn a_step_that_cannot_be_taken_may_end_in_an_event() {
 #[test]
 fn a_crossing_before_the_function_ends_is_found() {
     let ball = One::from(UniformField { field: [-9.81], gamma: 0.0 });
-    let root = || Event::new(|_, x: &PhasePoint<1>| x.q[0].sqrt() - 0.5);
+    let root = || Event::new(|_, x| x.q[0].sqrt() - 0.5);
     let start = VelocityPoint::new([3.0], [0.0], 0.0);
     let expected = f64::sqrt(2.0 * 2.75 / 9.81);
     for count in [1, 3, 40] {
@@ -309,10 +309,10 @@ fn whole_and_divided(
     let way = (AnyIntegrator::Gauss { stages }, Steps::Size(0.05));
     let all = || {
         [
-            Event::new(|_, x: &PhasePoint<1>| x.q[0]),
-            Event::new(|_, x: &PhasePoint<1>| x.p[0]),
-            Event::new(|_, x: &PhasePoint<1>| x.q[0] - 0.5).rising(),
-            Event::new(|_, x: &PhasePoint<1>| 2.0 * x.q[0]).falling(),
+            Event::new(|_, x| x.q[0]),
+            Event::new(|_, x| x.p[0]),
+            Event::new(|_, x| x.q[0] - 0.5).rising(),
+            Event::new(|_, x| 2.0 * x.q[0]).falling(),
         ]
     };
     let start = VelocityPoint::new([x], [v], 0.0);
@@ -411,7 +411,7 @@ fn a_crossing_is_a_state_of_the_motion() {
         let by: AnyIntegrator = by.parse().unwrap();
         for at in [0.0, 0.4, -0.7] {
             let run = || problem.by(by).steps(Steps::Size(h));
-            let of = || Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at);
+            let of = || Event::new(move |_, x| x.q[0] - at);
             let (mut whole, mut bare) = (Events::new([of()]), Events::new([of()]).without_action());
             run().observe(&mut whole).run(until).unwrap();
             run().without_action().observe(&mut bare).run(until).unwrap();
@@ -421,11 +421,11 @@ fn a_crossing_is_a_state_of_the_motion() {
             for ((crossing, other), row) in whole.crossings.iter().zip(&bare.crossings).zip(&rows.rows) {
                 let (state, bare) = (&crossing.state, &other.state);
                 // 16 roundings of a time of 40 at speeds up to 2, and of states of size one.
-                let off = [(state.q - row.q).norm(), (state.p - row.p).norm(), (state.z - row.z.unwrap()).abs()];
+                let off = [(&state.q - &row.q).norm(), (&state.p - &row.p).norm(), (state.z - row.z.unwrap()).abs()];
                 let most = 16.0 * f64::EPSILON * (40.0 + 1.0);
                 assert!(off.iter().all(|off| *off <= most), "{by}, {at}, t = {}: {off:?}", crossing.t);
                 assert!((state.q[0] - at).abs() <= 2.0 * most, "{by}, {at}: {:e}", state.q[0] - at);
-                let apart = [(crossing.t - other.t).abs(), (state.q - bare.q).norm(), (state.p - bare.p).norm()];
+                let apart = [(crossing.t - other.t).abs(), (&state.q - &bare.q).norm(), (&state.p - &bare.p).norm()];
                 assert!(apart.iter().all(|apart| *apart <= most), "{by}, {at}: {apart:?}");
             }
         }

@@ -27,7 +27,7 @@ fn gauss<const N: usize>(
     let mut stepper = GaussStepper::new(&problem, stages, h, options).unwrap();
     let taken = stepper.advance(steps);
     assert!(taken.is_ok(), "{taken:?}");
-    (stepper.state(), stepper.route())
+    (stepper.state().fixed(), stepper.route())
 }
 
 /// A fall with quadratic drag from rest covers the distance `(1/k) ln cosh(sqrt(gk) t)`, to 1e-12: as a force on a

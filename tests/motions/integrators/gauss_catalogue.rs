@@ -135,21 +135,22 @@ fn curves_meet_the_states() {
                 let Ok(Ok(mut stepper)) = stepper else { panic!("{}: no stepper", system.name()) };
                 assert!(stepper.dense().is_none());
                 for _ in 0..4 {
-                    let (from, t) = (stepper.state(), stepper.time());
+                    let (from, t) = (stepper.state().fixed::<N>(), stepper.time());
                     assert_eq!(stepper.advance(1), Ok(()), "{}", system.name());
                     let Some(curve) = stepper.dense() else { panic!("{}: no curve", system.name()) };
                     assert_eq!(curve.span(), (t, t + 0.02));
                     let off = |t: f64, x: PhasePoint<N>| {
                         let size =
                             ChartVector::from(x).max_abs_or_nan().max_or_nan(ChartVector::from(from).max_abs_or_nan());
-                        ChartVector::from(curve.at(t)).minus(x.into()).max_abs_or_nan() / (size * f64::EPSILON)
+                        ChartVector::from(curve.at(t).fixed::<N>()).minus(x.into()).max_abs_or_nan()
+                            / (size * f64::EPSILON)
                     };
-                    let (there, here) = (off(t, from), off(stepper.time(), stepper.state()));
+                    let (there, here) = (off(t, from), off(stepper.time(), stepper.state().fixed()));
                     assert!(there <= 100.0 && here <= 100.0, "{} s = {s}: {there}, {here} eps", system.name());
                     if s % 2 == 1 {
                         let middle = t + 0.01;
-                        let at = curve.at(middle);
-                        let v = VelocityPoint { q: at.q, v: curve.velocity(middle), z: at.z };
+                        let at = curve.at(middle).fixed::<N>();
+                        let v = VelocityPoint { q: at.q, v: curve.velocity(middle).fixed(), z: at.z };
                         let off =
                             (system.gradient(middle, &v).y - at.p).max_abs_or_nan() / (1.0 + at.p.max_abs_or_nan());
                         assert!(off <= 1e-12, "{} s = {s}: momentum off by {off:e}", system.name());

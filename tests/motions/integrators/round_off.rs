@@ -45,7 +45,7 @@ fn check<const N: usize>(
 fn runner<const N: usize>(mut stepper: impl Stepper + 'static) -> Box<dyn FnMut(usize) -> PhasePoint<N>> {
     Box::new(move |n| {
         stepper.advance(n).unwrap();
-        stepper.state()
+        stepper.state().fixed()
     })
 }
 

@@ -4,10 +4,10 @@ use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{one, two};
 use contact_examples::systems::{Kepler, Pendulum, PerturbedKepler, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Hints, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre, numbers::MaxOrNan};
+use contact_geom::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, legendre, numbers::MaxOrNan};
 use discrete_herglotz::{
-    AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, TransformedGauss,
-    Until,
+    AnyIntegrator, InputError, MethodInfo, Outcome, Problem, Rows, State, Status, StepError, Stepper, Steps,
+    TransformedGauss, Until,
     gauss::{Gauss, TransformedStepper},
 };
 
@@ -18,21 +18,21 @@ fn pericentre(e: f64) -> VelocityPoint<2> {
     VelocityPoint::new([1.0 - e, 0.0], [0.0, ((1.0 + e) / (1.0 - e)).sqrt()], 0.0)
 }
 
-fn transformed<L: Lagrangian<2>>(gauss: &Gauss<L>, e: f64) -> TransformedStepper<'_, L, 2> {
+fn transformed<L: Lagrangian<2>>(gauss: &Gauss<L>, e: f64) -> TransformedStepper<'_> {
     let start = pericentre(e);
     gauss.transformed_stepper(0.0, legendre(gauss.lagrangian(), 0.0, &start), start.v).unwrap()
 }
 
-fn distance(a: &PhasePoint<2>, b: &PhasePoint<2>) -> f64 {
-    (a.q - b.q).norm().max_or_nan((a.p - b.p).norm()).max_or_nan((a.z - b.z).abs())
+fn distance(a: &State, b: &State) -> f64 {
+    (&a.q - &b.q).norm().max_or_nan((&a.p - &b.p).norm()).max_or_nan((a.z - b.z).abs())
 }
 
-fn angular_momentum(x: &PhasePoint<2>) -> f64 {
+fn angular_momentum(x: &State) -> f64 {
     x.q[0] * x.p[1] - x.q[1] * x.p[0]
 }
 
-fn energy(kepler: &Planar, x: &PhasePoint<2>) -> f64 {
-    kepler.hamiltonian(0.0, x).unwrap()
+fn energy(kepler: &Planar, x: &State) -> f64 {
+    kepler.hamiltonian(0.0, &x.fixed()).unwrap()
 }
 
 /// A rate dt/dtau.
@@ -196,7 +196,7 @@ fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, O
     let outcome = plan.run().unwrap();
     assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
     assert_eq!(outcome.steps, plan.count(), "{plan}");
-    let (q, p, truth) = (outcome.q, outcome.p, on_orbit(e, span));
+    let (q, p, truth) = (&outcome.q, &outcome.p, on_orbit(e, span));
     let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
     (plan.integrator().clone(), outcome, error)
 }
@@ -273,9 +273,9 @@ fn rows_of_a_transformed_run_change_nothing() {
         let rows = rows.rows;
         assert_eq!((nothing.status, nothing.unresolved), (Status::Completed, None));
         assert_eq!((all.status, all.unresolved), (Status::Completed, None));
-        assert_eq!((nothing.q, nothing.p, nothing.t, nothing.steps), (all.q, all.p, all.t, all.steps));
+        assert_eq!((&nothing.q, &nothing.p, nothing.t, nothing.steps), (&all.q, &all.p, all.t, all.steps));
         assert_eq!(rows.len(), all.steps.div_ceil(7) + 1);
-        assert_eq!(rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
+        assert_eq!(rows.last().map(|row| (row.t, &row.q, row.z)), Some((all.t, &all.q, all.z)));
         assert!(rows.windows(2).all(|rows| rows[0].t < rows[1].t));
         assert_eq!(all.t, 20.0);
         let factor = all.log_factor.unwrap().exp();

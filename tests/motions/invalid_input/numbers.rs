@@ -4,6 +4,7 @@ use crate::lagrangians::One;
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{ChartVector, DiscretePoint, Dual, PhasePoint, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::{State, Vector};
 
 /// The values that replace a coordinate, a time or a step.
 pub const EXTREME: [f64; 16] = [
@@ -178,6 +179,18 @@ impl<const N: usize> Numbers for VelocityPoint<N> {
 impl<const N: usize> Numbers for PhasePoint<N> {
     fn numbers(&self) -> Vec<f64> {
         ChartVector::from(*self).numbers()
+    }
+}
+
+impl Numbers for Vector {
+    fn numbers(&self) -> Vec<f64> {
+        self.to_vec()
+    }
+}
+
+impl Numbers for State {
+    fn numbers(&self) -> Vec<f64> {
+        self.q.iter().chain(&self.p).copied().chain([self.z]).collect()
     }
 }
 

@@ -99,7 +99,7 @@ fn a_guess_of_the_velocity_may_be_of_any_size() {
         let (found, right) = (end(guess), end(0.4));
         // One or two roundings of numbers below one.
         assert!(
-            (found.q - right.q).norm() + (found.p - right.p).norm() <= 4.0 * f64::EPSILON,
+            (&found.q - right.q).norm() + (&found.p - right.p).norm() <= 4.0 * f64::EPSILON,
             "from {guess:e}: {found:?}"
         );
     }

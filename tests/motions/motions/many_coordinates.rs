@@ -74,14 +74,14 @@ fn splitting<const N: usize>() {
     let chain = chain::<N>();
     let mut strang = Splitting::new(&chain, &SplittingScheme::STRANG, STEP, 0.0, start()).unwrap();
     strang.advance(10).unwrap();
-    check::<N>("Strang", 10.0, &strang.state(), 10.0 * second::<N>());
+    check::<N>("Strang", 10.0, &strang.state().fixed(), 10.0 * second::<N>());
 }
 
 fn collocation<const N: usize>() {
     let gauss = Gauss::new(chain::<N>(), 2, STEP).unwrap();
     let mut run = gauss.stepper(0.0, start(), SVector::zeros()).unwrap();
     run.advance(10).unwrap();
-    check::<N>("Gauss", 10.0, &run.state(), 1e-3 * second::<N>());
+    check::<N>("Gauss", 10.0, &run.state().fixed(), 1e-3 * second::<N>());
 }
 
 fn collocation_by_newton<const N: usize>() {
@@ -95,7 +95,7 @@ fn collocation_of_values<const N: usize>() {
     let gauss = Gauss::new(WithoutClosedDerivatives(chain::<N>()), 2, STEP).unwrap();
     let mut run = gauss.stepper(0.0, start(), SVector::zeros()).unwrap();
     run.advance(2).unwrap();
-    check::<N>("Gauss by values", 2.0, &run.state(), 1e-3 * second::<N>());
+    check::<N>("Gauss by values", 2.0, &run.state().fixed(), 1e-3 * second::<N>());
 }
 
 /// Constructs, verifies and takes steps by a rule, a splitting and collocation.

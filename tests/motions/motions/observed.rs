@@ -69,7 +69,7 @@ fn there_and_back() {
             let transformed = matches!(integrator, AnyIntegrator::TransformedGauss { .. });
             let rounded = symmetric(integrator) && !transformed;
             let bound = if rounded { 1e-13 } else { 0.5 * f64::powi(0.3, integrator.order().min(24) as i32) + 1e-13 };
-            let off = distance(&back.state(), problem.state());
+            let off = distance(&back.state().fixed(), problem.state());
             assert!(off <= bound, "{integrator}: {off:e}");
             assert!(rounded || off > 0.0, "{integrator}");
             count += 1;
@@ -90,7 +90,7 @@ fn rows_at_times() {
     let start = kepler.initial();
     let fine = |t: f64| run_of(&kepler, start, t, AnyIntegrator::Gauss { stages: 12 }, Steps::Count(40)).unwrap();
     let times: Vec<f64> = (0..=13).map(|k| span * f64::from(k) / 13.0).collect();
-    let truth: Vec<_> = times.iter().map(|t| if *t == 0.0 { None } else { Some(fine(*t).state()) }).collect();
+    let truth: Vec<_> = times.iter().map(|t| if *t == 0.0 { None } else { Some(fine(*t).state().fixed()) }).collect();
     let problem = Problem::new(&kepler, 0.0, start).unwrap();
     for integrator in applicable(&kepler) {
         let mut rows = Rows::at(times.iter().copied()).unwrap().with_velocity();
@@ -98,8 +98,8 @@ fn rows_at_times() {
         assert_eq!(observed, run_in(&problem, integrator, 40, span).run(Until::Time(span)).unwrap(), "{integrator}");
         assert_eq!(rows.rows.iter().map(|row| row.t).collect::<Vec<_>>(), times, "{integrator}");
         let error = |row: &discrete_herglotz::Row, truth: &Option<PhasePoint<2>>| {
-            let state = PhasePoint { q: row.q, p: row.p, z: row.z.unwrap() };
-            assert_eq!(row.v, Some(row.p));
+            let state = PhasePoint { q: row.q.fixed(), p: row.p.fixed(), z: row.z.unwrap() };
+            assert_eq!(row.v.as_ref(), Some(&row.p));
             truth.map_or(0.0, |truth| distance(&state, &truth))
         };
         let errors: Vec<f64> = rows.rows.iter().zip(&truth).map(|(row, truth)| error(row, truth)).collect();
@@ -114,7 +114,7 @@ fn rows_every_so_many_steps() {
     let pendulum = one(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 1.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     for (to, way) in [(2.0, 1.0), (0.0, -1.0)] {
-        let mut rows = Rows::every(4).unwrap().column("t + q", |t, x: &PhasePoint<1>| t + x.q[0]);
+        let mut rows = Rows::every(4).unwrap().column("t + q", |t, x| t + x.q[0]);
         let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Count(10)).observe(&mut rows);
         let outcome = run.run(Until::Time(to)).unwrap();
         let times: Vec<f64> = rows.rows.iter().map(|row| row.t).collect();
@@ -134,8 +134,8 @@ fn columns_of_rows() {
         let mut rows = Rows::at((0..=7).map(|k| f64::from(k) / 7.0)).unwrap();
         rows = rows.with_velocity().with_energy().with_conformal_factor();
         let names = ["t", "q0", "v0", "p0", "z", "energy", "log_factor"];
-        assert_eq!(rows.header(), names);
         run_in(&problem, integrator, 20, 1.0).observe(&mut rows).run(Until::Time(1.0)).unwrap();
+        assert_eq!(rows.header(), names);
         let numbers: Vec<Vec<f64>> = rows.rows.iter().map(|row| row.numbers().collect()).collect();
         assert_eq!((numbers.len(), numbers[0][6]), (8, 0.0), "{integrator}");
         for row in &numbers {
@@ -176,8 +176,8 @@ fn quotients_are_conserved() {
     let system = two(UniformField { field: [0.0, 0.0], gamma: -0.3 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0, 0.0], [0.3, 0.7], 0.0)).unwrap();
     for integrator in applicable(&system) {
-        let mut momenta = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1]);
-        let mut other = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1] * x.p[1]);
+        let mut momenta = Quotient::new(|_, x| x.p[0], |_, x| x.p[1]);
+        let mut other = Quotient::new(|_, x| x.p[0], |_, x| x.p[1] * x.p[1]);
         run_in(&problem, integrator, 30, 3.0).observe(&mut momenta).observe(&mut other).run(Until::Time(3.0)).unwrap();
         assert_eq!(momenta.rows.len(), 31, "{integrator}");
         assert!(momenta.largest_change() <= 30.0 * f64::EPSILON, "{integrator}: {:e}", momenta.largest_change());
@@ -191,7 +191,7 @@ fn events_by_every_integrator() {
     let pendulum = one(Pendulum { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
-    let lowest = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+    let lowest = || Event::new(|_, x| x.q[0]);
     let mut first = None;
     let all: Vec<AnyIntegrator> = applicable(&pendulum).collect();
     // The reference is found by the first integrator.
@@ -211,9 +211,9 @@ fn events_by_every_integrator() {
         }
         let mut end = Events::new([lowest().falling().terminal()]);
         let stopped = run_in(&problem, integrator, 60, 12.0).observe(&mut end).run(Until::Time(12.0)).unwrap();
-        let crossing = end.crossings[0];
+        let crossing = &end.crossings[0];
         assert_eq!(stopped.status, Status::Stopped { step: stopped.steps, t: crossing.t, by: "an event" });
-        assert_eq!((stopped.t, stopped.state()), (crossing.t, crossing.state), "{integrator}");
+        assert_eq!((stopped.t, stopped.state()), (crossing.t, crossing.state.clone()), "{integrator}");
         // A run in other steps from the crossing to the next event.
         let onward = Problem::new(&pendulum, stopped.t, &stopped).unwrap();
         let mut next = Events::new([lowest().rising().terminal()]);
@@ -229,7 +229,7 @@ fn the_factor_of_a_stop_is_that_up_to_it() {
     let system = one(QuadraticInZ::default());
     let problem = Problem::new(&system, 0.0, QuadraticInZ::default().initial()).unwrap();
     for integrator in applicable(&system) {
-        let mut events = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.53).terminal()]);
+        let mut events = Events::new([Event::new(|t, _| t - 0.53).terminal()]);
         let run = run_in(&problem, integrator, 20, 1.0).with_conformal_factor();
         let stopped = run.observe(&mut events).run(Until::Time(1.0)).unwrap();
         let mut rows = Rows::at([0.53]).unwrap().with_conformal_factor();
@@ -262,11 +262,11 @@ fn events_that_are_not_defined() {
         "{outcome:?}"
     );
     // The events of another function earlier in the same step of 2.0 to 2.2 are kept.
-    let undefined = || Event::new(|t, _: &PhasePoint<1>| if t < 2.1 { 1.0 } else { f64::NAN });
+    let undefined = || Event::new(|t, _| if t < 2.1 { 1.0 } else { f64::NAN });
     let mut with_another = Events::new([undefined(), Event::new(|t, _| t - 2.05)]);
     assert!(matches!(run(&mut with_another).status, Status::Failed { .. }));
     assert_eq!(with_another.crossings.iter().map(|c| (c.event, c.t)).collect::<Vec<_>>(), [(1, 2.05)]);
-    let mut from_zero = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
+    let mut from_zero = Events::new([Event::new(|_, x| x.q[0])]);
     assert_eq!(run(&mut from_zero).status, Status::Completed);
     assert_eq!(from_zero.crossings.len(), 1);
     assert!(from_zero.crossings[0].t > 3.0);

@@ -13,7 +13,7 @@ use discrete_herglotz::{
 type Outcome = Result<(), InputError>;
 
 /// Whether a run reports, by its status or as unresolved, that it is not reliable.
-fn is_reported<const N: usize>(mut motion: impl Stepper, steps: usize) -> bool {
+fn is_reported(mut motion: impl Stepper, steps: usize) -> bool {
     motion.advance(steps).is_err() || motion.unresolved().is_some()
 }
 
@@ -110,7 +110,7 @@ fn the_edge_of_stability_is_flagged() -> Outcome {
 }
 
 /// Runs a motion to its end, and asserts that no step is flagged.
-fn assert_not_flagged<const N: usize>(name: &str, mut motion: impl Stepper, steps: usize) {
+fn assert_not_flagged(name: &str, mut motion: impl Stepper, steps: usize) {
     assert_eq!(motion.advance(steps), Ok(()), "{name}");
     assert_eq!(motion.unresolved(), None, "{name}, until t = {}", motion.time());
 }

@@ -54,7 +54,7 @@ fn assert_random_walk(
             assert_eq!(motion.advance(length - taken), Ok(()), "{name}");
             taken = length;
             let expected = form(&start, share) * (rate * taken as f64).exp();
-            deviations[i][k] = form(&motion.state(), share) / expected - 1.0;
+            deviations[i][k] = form(&motion.state().fixed(), share) / expected - 1.0;
         }
     }
     let rms = deviations.map(|d| (d.iter().map(|d| d * d).sum::<f64>() / 64.0).sqrt());

@@ -5,6 +5,7 @@ use crate::common::draws::Draws;
 use crate::lagrangians::Two;
 use crate::motions::run_of;
 use contact_examples::systems::Kepler;
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Status, Steps, Until};
 
@@ -34,13 +35,7 @@ pub struct Plane {
 
 impl Lagrangian<2> for Plane {
     #[inline(always)]
-    fn value<T: Scalar>(
-        &self,
-        _t: T,
-        q: &contact_geom::nalgebra::SVector<T, 2>,
-        v: &contact_geom::nalgebra::SVector<T, 2>,
-        z: T,
-    ) -> T {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let (x, y) = (q[0], q[1]);
         let (xx, yy) = (x * x, y * y);
         let minus_v = match self.field {
@@ -71,7 +66,7 @@ fn an_energy_that_should_be_kept_is_watched() {
     for (stages, h) in [(8, 0.07), (16, 0.15), (4, 0.03)] {
         let end = run_of(&kepler, start, 100.0, AnyIntegrator::Gauss { stages }, Steps::Size(h)).unwrap();
         let truth = Problem::new(&kepler, 0.0, start).unwrap().accuracy(1e-8).run(Until::Time(100.0)).unwrap();
-        let off = (end.q - truth.q).norm() / truth.q.norm();
+        let off = (end.q - &truth.q).norm() / truth.q.norm();
         all += 1;
         if (end.status, end.unresolved) == (Status::Completed, None) {
             silent.push(format!("gauss_{stages}, h = {h}: off by {off}"));
@@ -141,15 +136,15 @@ fn steps_of_random_size_are_right_or_flagged() {
         if truth.status != Status::Completed {
             continue;
         }
-        let error = ((end.q - truth.q).norm_squared() + (end.p - truth.p).norm_squared()).sqrt();
+        let error = ((&end.q - &truth.q).norm_squared() + (&end.p - &truth.p).norm_squared()).sqrt();
         let size = (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
-        let (error, energy) = (error / size, |q: [f64; 2], p: [f64; 2], z: f64| {
-            let x = VelocityPoint::new(q, p, z);
+        let (error, energy) = (error / size, |q: SVector<f64, 2>, p: SVector<f64, 2>, z: f64| {
+            let x = VelocityPoint { q, v: p, z };
             0.5 * (p[0] * p[0] + p[1] * p[1]) * 2.0 - system.value(0.0, &x.q, &x.v, z)
         });
         let sigma = (gamma * span).exp();
-        let expected = energy(start.q.into(), start.v.into(), start.z) * sigma;
-        let off = (energy(end.q.into(), end.p.into(), end.z.unwrap()) - expected).abs();
+        let expected = energy(start.q, start.v, start.z) * sigma;
+        let off = (energy(end.q.fixed(), end.p.fixed(), end.z.unwrap()) - expected).abs();
         let kinetic = max_or_nan(truth.p.norm_squared(), end.p.norm_squared());
         // A motion that comes to rest may forget the errors of its first steps.
         let forgets = gamma * span < -1.0;
@@ -185,7 +180,7 @@ fn the_error_of_given_steps_is_estimated() {
         for h in [0.1, 0.4] {
             let run = problem.by(integrator).steps(Steps::Size(h * parts)).with_error_estimate();
             let end = run.run(Until::Time(40.0)).unwrap();
-            let error = ((end.q - truth.q).norm_squared() + (end.p - truth.p).norm_squared()).sqrt()
+            let error = ((&end.q - &truth.q).norm_squared() + (&end.p - &truth.p).norm_squared()).sqrt()
                 / (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
             let estimate = end.error_estimate.unwrap();
             // For order two it is three quarters of the error, and the errors of the two runs may have different

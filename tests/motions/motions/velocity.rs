@@ -3,7 +3,7 @@
 use crate::lagrangians::Two;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
-use discrete_herglotz::{AnyIntegrator, InputError, Problem, Run, SelectionFailure, Status, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, SelectionFailure, Status, Steps, Until, Vector};
 
 /// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity rotates by the angle `B t`, and `p = v + B (-y,
 /// x)/2` is much larger than it.
@@ -38,7 +38,7 @@ fn far_away() -> VelocityPoint<2> {
 }
 
 /// The distance of a velocity from that of the charge in a field, whose speed is 1.
-fn off(b: f64, t: f64, v: Option<SVector<f64, 2>>) -> f64 {
+fn off(b: f64, t: f64, v: Option<Vector>) -> f64 {
     let (sin, cos) = (b * t).sin_cos();
     // v' = B (v_y, -v_x).
     let exact = SVector::from([V[0] * cos + V[1] * sin, V[1] * cos - V[0] * sin]);
@@ -59,7 +59,10 @@ fn a_strong_magnetic_field() {
                 let low = if b <= 1e5 { [2, 3].as_slice() } else { &[] };
                 for stages in low.iter().copied().map(Some).chain([None]) {
                     let run = problem.accuracy(1e-6);
-                    let run = stages.map(|stages| AnyIntegrator::Gauss { stages }).into_iter().fold(run, Run::by);
+                    let run = stages
+                        .map(|stages| AnyIntegrator::Gauss { stages })
+                        .into_iter()
+                        .fold(run, |run, by| run.by(by));
                     let outcome = run.run(Until::Time(t)).unwrap();
                     assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "B = {b:e}");
                     let off = off(b, t, outcome.v);
@@ -149,9 +152,9 @@ fn each_coordinate_by_its_own_scale() {
         let off = |scales: Option<[f64; 2]>| {
             let run = problem.accuracy(1e-6);
             let outcome = scales.into_iter().fold(run, |run, scales| run.scales(scales)).run(Until::Time(t)).unwrap();
-            let of_q = (outcome.q - exact.q).component_div(&SVector::from([1.0, SMALL]));
+            let of_q = (outcome.q - &exact.q).component_div(&[1.0, SMALL]);
             // The small coordinate is 30 times as fast.
-            let of_v = (outcome.v.unwrap() - exact.v.unwrap()).component_div(&SVector::from([30.0, 30.0 * SMALL]));
+            let of_v = (outcome.v.unwrap() - exact.v.as_ref().unwrap()).component_div(&[30.0, 30.0 * SMALL]);
             max_or_nan(of_q.norm(), of_v.norm())
         };
         let (with, without) = (off(Some([1.0, SMALL])), off(None));

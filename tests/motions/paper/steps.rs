@@ -127,7 +127,7 @@ fn records() {
     let rows = both.0.rows;
     assert_eq!(rows.iter().map(|row| row.t).collect::<Vec<_>>(), [2.0, 3.0, 4.0]);
     let PhasePoint { q, p, z } = *problem.state();
-    assert_eq!((rows[0].q, rows[0].p, rows[0].z), (q, p, Some(z)));
+    assert_eq!((rows[0].q.fixed(), rows[0].p.fixed(), rows[0].z), (q, p, Some(z)));
     // Five more steps from the state at which the run was stopped.
     let onward = Problem::new(&pendulum, stopped.t, &stopped).unwrap();
     let mut record = Rows::every(1).unwrap();
@@ -147,8 +147,8 @@ fn records() {
     assert_eq!((stepper.advance(25), stepper.state()), (Ok(()), stopped.state()));
     assert_eq!((stepper.advance(5), stepper.time()), (Ok(()), 5.0));
     let end = stepper.state();
-    assert_eq!((end.q, end.p, Some(end.z)), (rows[30].q, rows[30].p, rows[30].z));
+    assert_eq!((&end.q, &end.p, Some(end.z)), (&rows[30].q, &rows[30].p, rows[30].z));
     // A new start has no earlier velocities to extrapolate, which changes the rounding.
-    let off = ChartVector::from(ended.state()).minus(end.into()).max_abs_or_nan();
+    let off = ChartVector::<1>::from(ended.state().fixed()).minus(end.fixed().into()).max_abs_or_nan();
     assert!(off <= 64.0 * f64::EPSILON, "{off:e}");
 }

@@ -73,7 +73,7 @@ fn short_pulses_at_named_times_are_met() {
             outcome.q[0] - pushed.exact(10.0)
         );
         assert_eq!(outcome.unresolved, None, "case {case}");
-        let end = VelocityPoint { q: outcome.q, v: outcome.v.unwrap(), z: 0.0 };
+        let end = VelocityPoint { q: outcome.q.fixed(), v: outcome.v.unwrap().fixed(), z: 0.0 };
         let back = Problem::new(&problem_of, 10.0, end).unwrap();
         let back = back.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(20));
         let back = back.run(Until::Time(0.0)).unwrap();

@@ -3,17 +3,13 @@
 use crate::numbers::registers::MAX_STAGES;
 use crate::solve::chebyshev::{MAX_DEGREE, node};
 use crate::{State, Vector};
-use smallvec::SmallVec;
 use std::sync::OnceLock;
 
 /// The number of Legendre polynomials that the integrals of the highest degree need.
 pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
 
-/// The number of coordinates up to which the curves of a step need no memory on the heap.
-pub(crate) const FEW: usize = 4;
-
 /// A curve for each coordinate.
-pub(crate) type Curves = SmallVec<[Series; FEW]>;
+pub(crate) type Curves = Vec<Series>;
 
 /// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0
 /// to h
@@ -103,7 +99,7 @@ impl DenseStep {
             }
             sums
         };
-        let [moved, pushed] = [&self.v, &self.force].map(|of| of.iter().map(along).collect::<SmallVec<[_; FEW]>>());
+        let [moved, pushed] = [&self.v, &self.force].map(|of| of.iter().map(along).collect::<Vec<_>>());
         let (rate, action) = (along(&self.rate), along(&self.l));
         to.extend((0..self.sampling_degree() - 1).map(|i| State {
             q: self.start.q.iter().zip(&moved).map(|(q, moved)| q + moved[i]).collect(),

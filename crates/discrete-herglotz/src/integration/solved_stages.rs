@@ -1,12 +1,11 @@
 //! The solved stages of a step.
 
 use crate::State;
-use crate::integration::dense_step::FEW;
 use crate::numbers::registers::Stages;
 use smallvec::SmallVec;
 
-/// The values at the stages of each coordinate.
-pub(crate) type StageVectors = SmallVec<[Stages; FEW]>;
+/// The values at the stages of each coordinate; without an allocation for up to four.
+pub(crate) type StageVectors = SmallVec<[Stages; 4]>;
 
 /// The solved stages of a step of contact Gauss collocation: all that its tangent needs. See
 /// [`Stepper::solved_stages`](crate::Stepper::solved_stages).

@@ -60,40 +60,47 @@ macro_rules! of_chart {
     ($name:ident { $x:ident, $y:ident }, $fixed:ident { $fx:ident, $fy:ident }) => {
         impl $name {
             /// The point with these coordinates.
+            #[inline]
             pub fn new($x: impl Into<Vector>, $y: impl Into<Vector>, z: f64) -> Self {
                 $name { $x: $x.into(), $y: $y.into(), z }
             }
 
             /// The same with a number of coordinates that is known at compile time; NaN for those that it does not have.
+            #[inline]
             pub fn fixed<const N: usize>(&self) -> $fixed<N> {
                 $fixed { $fx: self.$x.fixed(), $fy: self.$y.fixed(), z: self.z }
             }
 
             /// Whether every coordinate is finite.
+            #[inline]
             pub fn is_finite(&self) -> bool {
                 self.$x.iter().chain(&self.$y).all(|x| x.is_finite()) && self.z.is_finite()
             }
         }
 
         impl<const N: usize> From<$fixed<N>> for $name {
+            #[inline]
             fn from(point: $fixed<N>) -> Self {
                 Self::from(&point)
             }
         }
 
         impl<const N: usize> From<&$fixed<N>> for $name {
+            #[inline]
             fn from(point: &$fixed<N>) -> Self {
                 $name { $x: point.$fx.into(), $y: point.$fy.into(), z: point.z }
             }
         }
 
         impl<const N: usize> From<&$name> for $fixed<N> {
+            #[inline]
             fn from(point: &$name) -> Self {
                 point.fixed()
             }
         }
 
         impl<const N: usize> PartialEq<$fixed<N>> for $name {
+            #[inline]
             fn eq(&self, other: &$fixed<N>) -> bool {
                 self.$x == other.$fx && self.$y == other.$fy && self.z == other.z
             }
@@ -121,6 +128,7 @@ impl State {
 }
 
 impl<const N: usize> From<&Hessian<N>> for SecondDerivatives {
+    #[inline]
     fn from(of: &Hessian<N>) -> Self {
         let matrix = |m: &[f64]| DMatrix::from_column_slice(N, N, m);
         SecondDerivatives {

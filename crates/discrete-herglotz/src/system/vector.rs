@@ -2,15 +2,15 @@
 
 use contact_geom::nalgebra::{DVectorView, SVector};
 use contact_geom::numbers::max_abs_or_nan;
-use smallvec::SmallVec;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub, SubAssign};
 
 /// The number of coordinates up to which a vector needs no memory on the heap.
-const INLINE: usize = 8;
+const FEW: usize = 6;
 
 /// A vector with one number for each coordinate of a system; their number is known at run time. It is read as a slice,
-/// has the arithmetic of vectors, and converts from and to nalgebra's vectors of fixed length.
+/// has the arithmetic of vectors, and converts from and to nalgebra's vectors of fixed length. The sum and the difference
+/// of vectors of different lengths have the components NaN.
 ///
 /// ```
 /// use contact_geom::nalgebra::{SVector, vector};
@@ -21,45 +21,62 @@ const INLINE: usize = 8;
 /// let fixed: SVector<f64, 2> = q.fixed();
 /// # assert_eq!(fixed, vector![3.0, 4.0]);
 /// ```
-#[derive(Clone, Default, PartialEq)]
-pub struct Vector(SmallVec<[f64; INLINE]>);
+#[derive(Default)]
+pub struct Vector {
+    n: usize,
+    /// The components, if they are few; their padding has any values.
+    few: [f64; FEW],
+    /// The components otherwise.
+    many: Option<Box<[f64]>>,
+}
 
 impl Vector {
     /// The vector 0 of this length.
+    #[inline]
     pub fn zeros(n: usize) -> Self {
-        Self::repeat(n, 0.0)
+        Vector { n, few: [0.0; FEW], many: (n > FEW).then(|| vec![0.0; n].into()) }
     }
 
     /// The vector of this length whose components are all the same.
+    #[inline]
     pub fn repeat(n: usize, x: f64) -> Self {
-        Vector(SmallVec::from_elem(x, n))
+        Vector { n, few: [x; FEW], many: (n > FEW).then(|| vec![x; n].into()) }
     }
 
     /// The vector of this length whose i-th component is `f(i)`.
-    pub fn from_fn(n: usize, f: impl FnMut(usize) -> f64) -> Self {
-        (0..n).map(f).collect()
+    #[inline]
+    pub fn from_fn(n: usize, mut f: impl FnMut(usize) -> f64) -> Self {
+        let mut vector = Vector::zeros(n);
+        vector.iter_mut().enumerate().for_each(|(i, x)| *x = f(i));
+        vector
     }
 
     /// The components.
+    #[inline]
     pub fn as_slice(&self) -> &[f64] {
-        &self.0
+        self.many.as_deref().unwrap_or(&self.few[..self.n.min(FEW)])
     }
 
     /// The components of a vector of fixed length; NaN for components that this vector does not have.
+    #[inline]
     pub fn fixed<const N: usize>(&self) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| self.0.get(i).copied().unwrap_or(f64::NAN))
+        let x = self.as_slice();
+        SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(f64::NAN))
     }
 
     /// The vector with a function of each component.
+    #[inline]
     pub fn map(&self, mut f: impl FnMut(f64) -> f64) -> Self {
-        self.iter().map(|x| f(*x)).collect()
+        let mut vector = self.clone();
+        vector.iter_mut().for_each(|x| *x = f(*x));
+        vector
     }
 
-    /// The scalar product.
+    /// The scalar product; NaN for vectors of different lengths.
     pub fn dot(&self, other: &[f64]) -> f64 {
-        let n = self.len().min(other.len());
-        let (a, b) = (&self.0[..n], &other[..n]);
+        let (a, b, n) = (self.as_slice(), other, self.n);
         match (a, b) {
+            _ if b.len() != n => f64::NAN,
             // The order of the sum is nalgebra's for vectors of length four.
             ([a0, a1, a2, a3], [b0, b1, b2, b3]) => (a0 * b0 + a2 * b2) + (a1 * b1 + a3 * b3),
             _ => DVectorView::from_slice(a, n).dot(&DVectorView::from_slice(b, n)),
@@ -67,23 +84,47 @@ impl Vector {
     }
 
     /// The square of the Euclidean norm.
+    #[inline]
     pub fn norm_squared(&self) -> f64 {
         self.dot(self)
     }
 
     /// The Euclidean norm.
+    #[inline]
     pub fn norm(&self) -> f64 {
         self.norm_squared().sqrt()
     }
 
     /// The largest absolute component; NaN where a component is NaN.
+    #[inline]
     pub fn amax(&self) -> f64 {
         max_abs_or_nan(self.iter().copied())
     }
 
-    /// The quotients of the components.
+    /// The result of arithmetic with a vector of another length.
+    #[cold]
+    fn become_undefined(&mut self, other: usize) {
+        *self = Vector::repeat(self.n.max(other), f64::NAN);
+    }
+
+    /// The quotients of the components; NaN for components that the other vector does not have.
+    #[inline]
     pub fn component_div(&self, other: &[f64]) -> Self {
-        self.iter().zip(other).map(|(x, y)| x / y).collect()
+        Vector::from_fn(self.n, |i| self[i] / other.get(i).copied().unwrap_or(f64::NAN))
+    }
+}
+
+impl Clone for Vector {
+    #[inline]
+    fn clone(&self) -> Self {
+        Vector { n: self.n, few: self.few, many: self.many.clone() }
+    }
+}
+
+impl PartialEq for Vector {
+    #[inline]
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
     }
 }
 
@@ -95,74 +136,102 @@ impl Debug for Vector {
 
 impl Deref for Vector {
     type Target = [f64];
+    #[inline]
     fn deref(&self) -> &[f64] {
-        &self.0
+        self.as_slice()
     }
 }
 
 impl DerefMut for Vector {
+    #[inline]
     fn deref_mut(&mut self) -> &mut [f64] {
-        &mut self.0
+        match &mut self.many {
+            Some(many) => many,
+            None => &mut self.few[..self.n.min(FEW)],
+        }
     }
 }
 
 impl FromIterator<f64> for Vector {
+    #[inline]
     fn from_iter<I: IntoIterator<Item = f64>>(components: I) -> Self {
-        Vector(components.into_iter().collect())
+        let (mut vector, mut components) = (Vector::default(), components.into_iter());
+        for (to, x) in vector.few.iter_mut().zip(&mut components) {
+            *to = x;
+            vector.n += 1;
+        }
+        if vector.n == FEW
+            && let Some(next) = components.next()
+        {
+            let many: Vec<f64> = vector.few.into_iter().chain([next]).chain(components).collect();
+            (vector.n, vector.many) = (many.len(), Some(many.into()));
+        }
+        vector
     }
 }
 
 impl<'v> IntoIterator for &'v Vector {
     type Item = &'v f64;
     type IntoIter = std::slice::Iter<'v, f64>;
+    #[inline]
     fn into_iter(self) -> Self::IntoIter {
-        self.0.iter()
+        self.as_slice().iter()
     }
 }
 
 impl From<&[f64]> for Vector {
+    #[inline]
     fn from(components: &[f64]) -> Self {
-        Vector(SmallVec::from_slice(components))
+        let mut vector = Vector::zeros(components.len());
+        vector.copy_from_slice(components);
+        vector
     }
 }
 
 impl<const N: usize> From<[f64; N]> for Vector {
+    #[inline]
     fn from(components: [f64; N]) -> Self {
         components.as_slice().into()
     }
 }
 
 impl<const N: usize> From<SVector<f64, N>> for Vector {
+    #[inline]
     fn from(components: SVector<f64, N>) -> Self {
         components.as_slice().into()
     }
 }
 
 impl<const N: usize> From<&SVector<f64, N>> for Vector {
+    #[inline]
     fn from(components: &SVector<f64, N>) -> Self {
         components.as_slice().into()
     }
 }
 
 impl<const N: usize> From<&Vector> for SVector<f64, N> {
+    #[inline]
     fn from(vector: &Vector) -> Self {
         vector.fixed()
     }
 }
 
 impl<const N: usize> PartialEq<SVector<f64, N>> for Vector {
+    #[inline]
     fn eq(&self, other: &SVector<f64, N>) -> bool {
         self.as_slice() == other.as_slice()
     }
 }
 
 impl<const N: usize> PartialEq<Vector> for SVector<f64, N> {
+    #[inline]
     fn eq(&self, other: &Vector) -> bool {
         self.as_slice() == other.as_slice()
     }
 }
 
 impl<const N: usize> PartialEq<[f64; N]> for Vector {
+    #[inline]
     fn eq(&self, other: &[f64; N]) -> bool {
         self.as_slice() == other.as_slice()
     }
@@ -172,47 +241,65 @@ impl<const N: usize> PartialEq<[f64; N]> for Vector {
 macro_rules! sum {
     ($trait:ident $method:ident, $assign:ident $assign_method:ident: $op:tt) => {
         impl $assign<&[f64]> for Vector {
+            #[inline]
             fn $assign_method(&mut self, other: &[f64]) {
+                if self.n != other.len() {
+                    self.become_undefined(other.len());
+                }
                 self.iter_mut().zip(other).for_each(|(x, y)| *x = *x $op y);
             }
         }
         impl $assign<&Vector> for Vector {
+            #[inline]
             fn $assign_method(&mut self, other: &Vector) {
-                self.$assign_method(other.as_slice());
+                if let (None, None, true) = (&self.many, &other.many, self.n == other.n) {
+                    // All of them at once, with the padding: their number is known at compile time.
+                    self.few.iter_mut().zip(&other.few).for_each(|(x, y)| *x = *x $op y);
+                } else {
+                    self.$assign_method(other.as_slice());
+                }
             }
         }
         impl $assign for Vector {
+            #[inline]
             fn $assign_method(&mut self, other: Vector) {
                 self.$assign_method(other.as_slice());
             }
         }
         impl $trait<&Vector> for Vector {
             type Output = Vector;
+            #[inline]
             fn $method(mut self, other: &Vector) -> Vector {
-                self.$assign_method(other.as_slice());
+                self.$assign_method(other);
                 self
             }
         }
         impl $trait for Vector {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: Vector) -> Vector {
                 self.$method(&other)
             }
         }
         impl $trait<&Vector> for &Vector {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: &Vector) -> Vector {
-                self.iter().zip(other).map(|(x, y)| x $op y).collect()
+                let mut result = self.clone();
+                result.$assign_method(other);
+                result
             }
         }
         impl $trait<Vector> for &Vector {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: Vector) -> Vector {
                 self.$method(&other)
             }
         }
         impl<const N: usize> $trait<SVector<f64, N>> for Vector {
             type Output = Vector;
+            #[inline]
             fn $method(mut self, other: SVector<f64, N>) -> Vector {
                 self.$assign_method(other.as_slice());
                 self
@@ -220,18 +307,21 @@ macro_rules! sum {
         }
         impl<const N: usize> $trait<SVector<f64, N>> for &Vector {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: SVector<f64, N>) -> Vector {
                 self.clone().$method(other)
             }
         }
         impl<const N: usize> $trait<&Vector> for SVector<f64, N> {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: &Vector) -> Vector {
                 Vector::from(self).$method(other)
             }
         }
         impl<const N: usize> $trait<Vector> for SVector<f64, N> {
             type Output = Vector;
+            #[inline]
             fn $method(self, other: Vector) -> Vector {
                 Vector::from(self).$method(&other)
             }
@@ -247,15 +337,20 @@ macro_rules! scaled {
     ($trait:ident $method:ident: $op:tt) => {
         impl $trait<f64> for Vector {
             type Output = Vector;
+            #[inline]
             fn $method(mut self, factor: f64) -> Vector {
-                self.iter_mut().for_each(|x| *x = *x $op factor);
+                match &mut self.many {
+                    None => self.few.iter_mut().for_each(|x| *x = *x $op factor),
+                    Some(many) => many.iter_mut().for_each(|x| *x = *x $op factor),
+                }
                 self
             }
         }
         impl $trait<f64> for &Vector {
             type Output = Vector;
+            #[inline]
             fn $method(self, factor: f64) -> Vector {
-                self.map(|x| x $op factor)
+                self.clone().$method(factor)
             }
         }
     };
@@ -266,6 +361,7 @@ scaled!(Div div: /);
 
 impl Neg for Vector {
     type Output = Vector;
+    #[inline]
     fn neg(self) -> Vector {
         self.map(|x| -x)
     }

@@ -177,9 +177,9 @@ fn an_integrable_distribution_gives_the_motion_under_the_constraint() {
     let problem = Problem::new(&swing, SPAN[0], swung(START[0], START[1])).unwrap();
     let by = LagrangeDAlembert::<_, 1>::new(Circle, SplittingScheme::KAHAN_LI_8);
     let run = problem.by(by).steps(Steps::Count(24)).run(Until::Time(SPAN[1])).unwrap();
-    let off = run.q - SVector::from([holonomic[0], holonomic[1]]);
+    let off = run.q.fixed::<2>() - SVector::from([holonomic[0], holonomic[1]]);
     // The step of 0.05 to the power of 8, times derivatives below 1e2.
     assert!(off.norm() < 4e-9, "{off}");
-    let v: VelocityPoint<2> = VelocityPoint { q: run.q, v: run.v.unwrap(), z: run.z.unwrap() };
+    let v: VelocityPoint<2> = VelocityPoint { q: run.q.fixed(), v: run.v.unwrap().fixed(), z: run.z.unwrap() };
     assert!(v.q.dot(&v.v).abs() < 1e-14 && (v.z - holonomic[6]).abs() < 4e-9, "{v:?}");
 }

@@ -112,8 +112,9 @@ fn steps_are_differentiated_along_the_constraint() {
             problem.by(by).steps(Steps::Count(1)).run(Until::Time(0.1)).unwrap()
         };
         let problem = Problem::new(&system, 0.0, swung(1.0, 0.5)).unwrap();
-        let (from, to) = (problem.by(by).steps(Steps::Count(1)).run(Until::Time(0.0)).unwrap().state(), end(1.0, 0.5));
-        let jacobian = by.step_jacobian(&problem, 0.1, (0.0, &from, &to.state())).unwrap().unwrap();
+        let (from, to) =
+            (problem.by(by).steps(Steps::Count(1)).run(Until::Time(0.0)).unwrap().state(), end(1.0, 0.5).state());
+        let jacobian = by.step_jacobian(&problem, 0.1, (0.0, &from.fixed(), &to.fixed())).unwrap().unwrap();
         let (s, c) = f64::sin_cos(1.0);
         // Of the angle, with its rotation of the velocity, and of the speed.
         let directions = [[c, s, -0.5 * s, 0.5 * c, 0.0], [0.0, 0.0, c, s, 0.0]];

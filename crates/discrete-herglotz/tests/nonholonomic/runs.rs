@@ -11,7 +11,7 @@ use discrete_herglotz::constraints::{ConstrainedStart, ConstraintError, Lagrange
 use discrete_herglotz::rules::{Method, Rule};
 use discrete_herglotz::{
     Checkpoint, Event, Events, InputError, Integrator, MomentumDecay, Observer, Problem, ResumeState, Rows,
-    SplittingScheme, Status, StepView, Steps, Stop, Until,
+    SplittingScheme, Status, StepView, Steps, Stop, Until, Vector,
 };
 use std::ops::ControlFlow;
 
@@ -85,7 +85,7 @@ fn an_accuracy_is_met() {
         assert_eq!((found.status, found.unresolved), (Status::Completed, None));
         // The accuracy is relative to the size of the motion, at most that of its heading, 7.
         let bound = 7.0 * accuracy;
-        let off = |t: f64, q: &SVector<f64, 3>| (q - SVector::from(edge_at(t)[0])).max_abs_or_nan();
+        let off = |t: f64, q: &Vector| (q.fixed::<3>() - SVector::from(edge_at(t)[0])).max_abs_or_nan();
         assert!(off(4.0, &found.q) <= bound, "{}: {:e}", scheme.name(), off(4.0, &found.q));
         assert_eq!((crossed.crossings.len(), rows.rows.len()), (1, 2));
         for row in &rows.rows {
@@ -105,7 +105,7 @@ fn an_accuracy_is_met() {
             assert_eq!((found.status, found.unresolved), (Status::Completed, None));
             // Positions up to 4.
             let bound = 4.0 * accuracy;
-            let ends = rows.rows.iter().map(|row| (row.t, row.q)).chain([(found.t, found.q)]);
+            let ends = rows.rows.iter().map(|row| (row.t, row.q.clone())).chain([(found.t, found.q)]);
             for (t, q) in ends {
                 let off = q[2] - sleigh(gamma, t, INVARIANT, PHASE)[2];
                 assert!(off.abs() <= bound, "{} at {t}: {off:e}", scheme.name());
@@ -161,7 +161,7 @@ fn momenta_of_horizontal_symmetries_alone_are_dissipated() {
     let start = VelocityPoint::new([0.0; 4], [0.5 * spin, 0.0, spin, turn], 0.0);
     let problem = Problem::new(&disc, 0.0, start).unwrap();
     let by = LagrangeDAlembert::<_, 2>::new(&disc, SplittingScheme::SUZUKI_4);
-    let along = |i: usize| SVector::from_fn(|j, _| f64::from(u8::from(i == j)));
+    let along = |i: usize| SVector::<f64, 4>::from_fn(|j, _| f64::from(u8::from(i == j)));
     let mut heading = MomentumDecay::new(Symmetry::Translation(along(3)));
     let mut across = MomentumDecay::new(Symmetry::Translation(along(0)));
     let run = problem.by(by).steps(Steps::Count(100)).observe(&mut heading).observe(&mut across);

@@ -237,7 +237,9 @@ impl<'r> Crossings<'r> {
             Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
             _ => &[],
         };
-        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: RefCell::new(numbers.into()) });
+        // The velocity is set to zero where none is given: an expression that does not contain it ignores it.
+        let v = Vector::from_fn(lagrangian.formula().dimension(), |i| numbers.get(i).copied().unwrap_or(0.0));
+        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: RefCell::new(v) });
         let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
         let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
         let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));

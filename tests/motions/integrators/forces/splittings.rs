@@ -19,7 +19,7 @@ fn run<L: Lagrangian<N>, I: for<'a> Integrator<'a, L, N> + 'static, const N: usi
 ) -> PhasePoint<N> {
     let problem = Problem::new(lagrangian, 0.0, x).unwrap();
     let outcome = problem.by(by).steps(Steps::Count(steps)).run(Until::Time(span)).unwrap();
-    outcome.state()
+    outcome.state().fixed()
 }
 
 /// A force of positions with a drag of the velocity.

@@ -61,7 +61,7 @@ fn by_rattle(motion: Result<Rattle, InputError>) -> Result<Vec<f64>, String> {
     let (of, impulse) = (motion.constrained_motion(), motion.impulse());
     let (of, impulse) = (of.map_err(|e| e.to_string())?, impulse.map_err(|e| e.to_string())?);
     let multipliers = motion.multipliers().map_err(|e| e.to_string())?;
-    let vectors = [motion.state().p, motion.velocity_point().q, of.acceleration];
+    let vectors = [motion.state().p.fixed(), motion.velocity_point().q, of.acceleration];
     let numbers = vectors.iter().flat_map(|x| x.iter().copied());
     Ok(numbers.chain([motion.state().z, impulse[0], multipliers[0], of.multipliers[0]]).collect())
 }
@@ -71,7 +71,7 @@ fn by_lobatto(motion: Result<Lobatto, InputError>) -> Result<Vec<f64>, String> {
     motion.advance(10).map_err(|e| e.to_string())?;
     let of = motion.constrained_motion().map_err(|e| e.to_string())?;
     let multipliers = motion.multipliers().map_err(|e| e.to_string())?;
-    let vectors = [motion.state().p, motion.velocity_point().q, of.acceleration];
+    let vectors = [motion.state().p.fixed(), motion.velocity_point().q, of.acceleration];
     let numbers = vectors.iter().flat_map(|x| x.iter().copied());
     Ok(numbers.chain([motion.state().z, multipliers[0], of.multipliers[0]]).collect())
 }
@@ -82,7 +82,7 @@ fn by_run(system: RigidPendulum<2>, h: f64, start: &ConstrainedStart<2>) -> Resu
     let problem = Problem::new(&system, start.t, at).map_err(|e| e.to_string())?;
     let rattle = Constrained::new(&system, ConstrainedMethod::Rattle(SplittingScheme::STRANG));
     let run = problem.by(rattle).steps(Steps::Size(h.abs())).run(Until::After(10.0 * h)).map_err(|e| e.to_string())?;
-    let end = VelocityPoint { q: run.q, v: run.p, z: 0.0 };
+    let end = VelocityPoint { q: run.q.fixed(), v: run.p.fixed(), z: 0.0 };
     let force = rattle.constraint_force(&&system, run.t, &end).map_err(|e| e.to_string())?;
     Ok(run.q.iter().chain(&run.p).chain(&force).copied().chain(run.z).collect())
 }
@@ -164,7 +164,7 @@ fn knife_edges(report: &mut Report) {
         let problem = Problem::new(&system, t, at).map_err(|e| e.to_string())?;
         let by = LagrangeDAlembert::<_, 1>::new(&system, SplittingScheme::STRANG);
         let run = problem.by(by).steps(Steps::Size(h.abs())).run(Until::After(10.0 * h)).map_err(|e| e.to_string())?;
-        let end = VelocityPoint { q: run.q, v: run.p, z: 0.0 };
+        let end = VelocityPoint { q: run.q.fixed(), v: run.p.fixed(), z: 0.0 };
         let force = by.constraint_force(&system, run.t, &end).map_err(|e| e.to_string())?;
         Ok(run.q.iter().chain(&run.p).chain(&force).copied().chain(run.z).collect())
     };

@@ -4,10 +4,10 @@ use super::runs::{BY, seven, tame};
 use crate::common::observers::Each;
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EVERYTHING, EXTREME, Report, fine, triples};
-use contact_geom::{PhasePoint, VelocityPoint};
+use contact_geom::VelocityPoint;
 use discrete_herglotz::{
     AnyIntegrator, CsvRows, Event, Events, InputError, Observer, Outcome, OutputRequest, Problem, Progress, Quotient,
-    Rows, RunInfo, Status, StepError, StepView, Steps, Stop, Until,
+    Rows, RunInfo, State, Status, StepError, StepView, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -63,7 +63,9 @@ fn rows(report: &mut Report) {
         report.check(rows.rows.len() == expected, || format!("a row every {stride} steps: {outcome:?}"));
         report.entry_point(
             &0.5,
-            outcome.map(|_| rows.rows.iter().map(|r| (r.t, r.q, (r.p, r.v, r.z))).collect::<Vec<_>>()),
+            outcome.map(|_| {
+                rows.rows.iter().map(|r| (r.t, r.q.clone(), (r.p.clone(), r.v.clone(), r.z))).collect::<Vec<_>>()
+            }),
         );
         report.check(rows.rows.iter().all(|r| r.v.is_some() && r.z.is_none()), || format!("{:?}", rows.rows));
         // The energy depends on z, whether or not z is requested.
@@ -90,7 +92,7 @@ fn rows(report: &mut Report) {
             let outcome = seven(&problem, integrator).observe(&mut one).run(Until::Time(0.5));
             let inside = (0.0..=0.5).contains(&value);
             report.check(outcome.is_ok() == inside, || format!("a row at {value}: {outcome:?}"));
-            let recorded = one.rows.iter().map(|r| (r.t, r.q, (r.p, r.z))).collect::<Vec<_>>();
+            let recorded = one.rows.iter().map(|r| (r.t, r.q.clone(), (r.p.clone(), r.z))).collect::<Vec<_>>();
             // A time that is closer to the start than a step may not be reached.
             let complete = outcome.is_ok_and(|o| o.status == Status::Completed);
             report.check(!complete || recorded.len() == 1 && recorded[0].0 == value, || format!("{recorded:?}"));
@@ -127,7 +129,7 @@ fn progress_and_quotients(report: &mut Report) {
         let completed = outcome.is_ok_and(|o| o.status == Status::Completed);
         report.check(!completed || parts.last() == Some(&1.0), || format!("to {value}: {parts:?}"));
         // A quotient that is not defined is reported.
-        let mut quotient = Quotient::new(move |_, _: &PhasePoint<1>| value, |_, _| 1.0);
+        let mut quotient = Quotient::new(move |_, _: &State| value, |_, _| 1.0);
         let outcome = seven(&problem, None).observe(&mut quotient).run(Until::Time(0.5));
         let change = quotient.largest_change();
         let good = if value.is_finite() && value != 0.0 { change == 0.0 } else { change.is_nan() };
@@ -144,7 +146,7 @@ fn with_events(events: &mut Events<'_>, until: Until) -> Result<Outcome, InputEr
 
 fn events(report: &mut Report) {
     for value in EXTREME {
-        let mut events = Events::new([Event::new(|_, _: &PhasePoint<1>| value).terminal()]);
+        let mut events = Events::new([Event::new(|_, _: &State| value).terminal()]);
         let outcome = with_events(&mut events, Until::Steps(5)).unwrap();
         let good = match outcome.status {
             Status::Failed { step: 0, cause: StepError::Event { t: 0.0 }, .. } => !value.is_finite(),
@@ -153,15 +155,14 @@ fn events(report: &mut Report) {
         };
         report.check(good && events.crossings.is_empty(), || format!("an event {value}: {:?}", outcome.status));
         // A jump between any two values of different sign is found at its time.
-        let mut jump =
-            Events::new([Event::new(|t, _: &PhasePoint<1>| if t < 0.25 { value } else { -value })]).without_action();
+        let mut jump = Events::new([Event::new(|t, _: &State| if t < 0.25 { value } else { -value })]).without_action();
         let outcome = with_events(&mut jump, Until::Steps(5)).unwrap();
         let there = jump.crossings.len() == 1 && (jump.crossings[0].t - 0.25).abs() < 1e-15;
         let good = if value == 0.0 || !value.is_finite() { jump.crossings.is_empty() } else { there };
         report.check(good && outcome.state().check().is_ok(), || format!("from {value}: {:?}", jump.crossings));
     }
     // Where a function becomes NaN during the run, the crossings found before are kept.
-    let mut late = Events::new([Event::new(|t, _: &PhasePoint<1>| if t > 0.35 { f64::NAN } else { 0.25 - t })]);
+    let mut late = Events::new([Event::new(|t, _: &State| if t > 0.35 { f64::NAN } else { 0.25 - t })]);
     let outcome = with_events(&mut late, Until::Steps(100)).unwrap();
     let failed = matches!(outcome.status, Status::Failed { cause: StepError::Event { t }, .. } if t > 0.35);
     report.check(failed && late.crossings.len() == 1, || format!("{outcome:?}: {:?}", late.crossings));
@@ -170,12 +171,12 @@ fn events(report: &mut Report) {
     report.check(with_events(&mut none, Until::Steps(0)).is_err(), || "no step".into());
     report.check(with_events(&mut none, Until::Steps(3)).is_ok_and(|o| o.t > 0.29), || "no event".into());
     // The largest number of steps, ended by the event.
-    let mut end = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.55).rising().terminal()]);
+    let mut end = Events::new([Event::new(|t, _: &State| t - 0.55).rising().terminal()]);
     let outcome = with_events(&mut end, Until::Steps(1 << 42)).unwrap();
     let ended = matches!(outcome.status, Status::Stopped { step: 6, by: "an event", t } if t == outcome.t);
     report.check(ended && (outcome.t - 0.55).abs() < 1e-15, || format!("{outcome:?}"));
     // Directions are those of the run: backward in time a function of t falls.
-    let of_time = |at: f64| Event::new(move |t, _: &PhasePoint<1>| t - at);
+    let of_time = |at: f64| Event::new(move |t, _: &State| t - at);
     for (at, found) in [(0.25, [0, 1]), (-0.25, [0, 2])] {
         let mut all = Events::new([of_time(at), of_time(at).rising(), of_time(at).falling()]);
         let outcome = with_events(&mut all, Until::Time(2.0 * at));
@@ -189,7 +190,7 @@ struct AtTheStart(Stop);
 
 impl Observer for AtTheStart {
     fn start(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
-        ControlFlow::Break(self.0)
+        ControlFlow::Break(self.0.clone())
     }
     fn step(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
@@ -269,12 +270,14 @@ fn moments(report: &mut Report) {
                 report.entry_point(&at.t, at.velocity());
                 report.entry_point(&at.t, at.energy());
                 for value in EXTREME {
-                    report.entry_point(&value, at.velocity_at(at.t, &PhasePoint::new([value], [value], value)));
+                    report.entry_point(&value, at.velocity_at(at.t, &State::new([value], [value], value)));
                 }
                 let Some(step) = at.last_step() else { return };
-                let ((from, start), (to, end)) = step.ends();
-                let met = at_start.replace((to, end)).is_none_or(|before| before == (from, start));
-                let ends = step.at(from) == Ok(start) && step.at(to) == Ok(end) && (to, end) == (at.t, at.state);
+                let (start, end) = step.ends();
+                let (from, to) = (start.0, end.0);
+                let met = at_start.replace(end.clone()).is_none_or(|before| before == *start);
+                let at_ends = step.at(from).as_ref() == Ok(&start.1) && step.at(to).as_ref() == Ok(&end.1);
+                let ends = at_ends && *end == (at.t, at.state.clone());
                 report.check(met && ends && step.span() == (from, to), || format!("{from} to {to}"));
                 for t in EXTREME {
                     report.entry_point(&t, step.at(t));

@@ -225,7 +225,7 @@ fn steppers(report: &mut Report) {
         stepper.guess(&foreign);
         report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
         let v = stepper.last_velocity();
-        report.check(v.is_none_or(|v| v.iter().all(|v| v.is_finite())), || format!("{v:?}"));
+        report.check(v.as_ref().is_none_or(|v| v.iter().all(|v| v.is_finite())), || format!("{v:?}"));
         report.check(stepper.suspect_interval().is_none_or(|d| d.step + d.steps <= 2), || {
             "a suspect interval beyond the steps taken".into()
         });

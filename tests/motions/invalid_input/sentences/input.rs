@@ -20,7 +20,7 @@ use discrete_herglotz::splitting::Strang;
 use discrete_herglotz::theory::DiscretePath;
 use discrete_herglotz::{
     AnyIntegrator, Checkpoint, DiscreteLagrangian, InputError, Integrator, Interrupt, MethodInfo, Problem, ResumeState,
-    Rows, SelectionFailure, SplittingScheme, StepError, StepFailure, Stepper, StepperOptions, Steps, Until,
+    Rows, SelectionFailure, SplittingScheme, State, StepError, StepFailure, Stepper, StepperOptions, Steps, Until,
 };
 use std::collections::BTreeSet;
 
@@ -127,7 +127,7 @@ impl Stepper for Bare<'_> {
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.0.advance(steps)
     }
-    fn state(&self) -> PhasePoint<1> {
+    fn state(&self) -> State {
         self.0.state()
     }
     fn time(&self) -> f64 {

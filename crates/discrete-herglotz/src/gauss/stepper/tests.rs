@@ -6,7 +6,7 @@ use crate::numbers::instructions::Instructions;
 use crate::test_lagrangians::{Anharmonic, Cubic, How, InPlane, OnLine, OneSided};
 use crate::{DiscreteLagrangian, DiscreteStep, Start as ProblemStart, StepError, solve::Solver};
 use contact_examples::systems::{QuadraticInZ, SphericalPendulum, System};
-use contact_geom::Structure;
+use contact_geom::{PhasePoint, Structure};
 use pulp::Arch;
 use std::sync::atomic::AtomicUsize;
 
@@ -38,7 +38,7 @@ fn follow(spring: OneSided, stages: usize, set: Arch, route: GaussRoute) -> (usi
     run.steps.route.set_instructions(Instructions::only(set));
     let mut across = 0;
     for _ in 0..100 {
-        let (t, from) = (run.time(), run.state());
+        let (t, from) = (run.time(), run.state().fixed());
         run.advance(1).unwrap();
         let DiscreteStep { end, .. } = gauss.forward(t, &from, &from.p, &mut Solver::default()).unwrap();
         let found = run.state();

@@ -150,15 +150,14 @@ impl<'f> Events<'f> {
     }
 
     /// Finds the sign changes in a step, or in a piece of one.
-    fn piece(&mut self, at: &StepView<'_>, step: LastStep<'_>) -> ControlFlow<Stop> {
+    fn piece(&mut self, at: &StepView<'_>, step: &mut LastStep<'_>) -> ControlFlow<Stop> {
         let from = step.span().0;
-        let rates = self.rates.take().filter(|(t, _)| *t == from).map(|(_, rates)| rates);
-        let mut step = step.with_rates_at_start(rates);
+        step.set_rates_at_start(self.rates.take().filter(|(t, _)| *t == from).map(|(_, rates)| rates));
         let near = at.stepper.last_velocity();
         let motion = ScaledMotion { motion: at.motion, scales: self.scales, near: near.as_ref() };
-        let (found, cause) = self.in_step(&mut step, motion);
+        let (found, cause) = self.in_step(step, motion);
         let to = step.span().1;
-        self.rates = step.into_rates_at_end().map(|rates| (to, rates));
+        self.rates = step.take_rates_at_end().map(|rates| (to, rates));
         let mut end: Option<Crossing> = None;
         for crossing in found {
             // An event has only one crossing at the time at which it ends the run.
@@ -208,12 +207,15 @@ impl Observer for Events<'_> {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
-        let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
-        for (k, piece) in step.pieces().into_iter().enumerate() {
+        let Some(mut step) = at.last_step() else { return ControlFlow::Continue(()) };
+        if at.stepper.pieces().is_empty() {
+            return self.piece(at, &mut step);
+        }
+        for (k, mut piece) in step.pieces().enumerate() {
             if k > 0 {
                 self.start_at(at, piece.ends().0)?;
             }
-            self.piece(at, piece)?;
+            self.piece(at, &mut piece)?;
         }
         ControlFlow::Continue(())
     }

@@ -31,9 +31,12 @@ impl TaylorPolynomial {
     pub(crate) fn at(&self, ahead: f64) -> State {
         let TaylorPolynomial { state, slope, curvature } = self;
         let half = 0.5 * ahead;
+        let of = |x: &Vector, slope: &Vector, curvature: &Vector| {
+            Vector::from_fn(x.len(), |i| x[i] + (slope[i] + curvature[i] * half) * ahead)
+        };
         State {
-            q: &state.q + (&slope.q + &curvature.q * half) * ahead,
-            p: &state.p + (&slope.p + &curvature.p * half) * ahead,
+            q: of(&state.q, &slope.q, &curvature.q),
+            p: of(&state.p, &slope.p, &curvature.p),
             z: state.z + (slope.z + curvature.z * half) * ahead,
         }
     }
@@ -41,14 +44,14 @@ impl TaylorPolynomial {
 
 /// A step, with dense output between its ends.
 pub struct LastStep<'r> {
-    /// The start of the whole step, from which steps to points within it are taken.
-    origin: (f64, State),
+    /// The start of the whole step, from which steps to points within it are taken; `None` where this is the whole step.
+    origin: Option<Box<(f64, State)>>,
     from: (f64, State),
     to: (f64, State),
     motion: &'r dyn Motion,
     stepper: &'r dyn Stepper,
     /// The curve of the step, if the method has one; computed on demand.
-    curve: Option<Option<DenseStep>>,
+    curve: Option<Option<Box<DenseStep>>>,
     /// The time derivatives of the state at both ends, computed on demand.
     rates: [Option<State>; 2],
 }
@@ -56,26 +59,21 @@ pub struct LastStep<'r> {
 impl<'r> LastStep<'r> {
     /// The step between two times with their states.
     pub(crate) fn new([from, to]: [(f64, State); 2], motion: &'r dyn Motion, stepper: &'r dyn Stepper) -> Self {
-        LastStep { origin: from.clone(), from, to, motion, stepper, curve: None, rates: [None, None] }
+        LastStep { origin: None, from, to, motion, stepper, curve: None, rates: [None, None] }
     }
 
-    /// The pieces of this step between its resets, in their order; the step itself if it has none.
-    pub(crate) fn pieces(self) -> Vec<Self> {
-        let pieces = self.stepper.pieces();
-        if pieces.is_empty() {
-            return vec![self];
-        }
-        let LastStep { origin, motion, stepper, .. } = self;
+    /// The pieces of this step between its resets, in their order; none if it has no resets.
+    pub(crate) fn pieces(&self) -> impl Iterator<Item = Self> + '_ {
         let of = |Piece { from, to, dense }: &Piece| LastStep {
-            origin: origin.clone(),
+            origin: Some(Box::new(self.from.clone())),
             from: from.clone(),
             to: to.clone(),
-            motion,
-            stepper,
-            curve: Some(dense.clone()),
+            motion: self.motion,
+            stepper: self.stepper,
+            curve: Some(dense.clone().map(Box::new)),
             rates: [None, None],
         };
-        pieces.iter().map(of).collect()
+        self.stepper.pieces().iter().map(of)
     }
 
     /// The times of the step's start and end.
@@ -107,20 +105,20 @@ impl<'r> LastStep<'r> {
         if t == self.from.0 {
             return Ok((self.from.1.clone(), 1.0));
         }
-        let is_whole = self.origin.0 == self.from.0;
-        let curve = self.curve.as_ref().and_then(Option::as_ref).filter(|_| is_whole);
-        self.motion.state_within_step(&self.origin, t, self.stepper.last_velocity().as_ref(), curve)
+        let origin = self.origin.as_deref().unwrap_or(&self.from);
+        let is_whole = origin.0 == self.from.0;
+        let curve = self.curve.as_ref().and_then(Option::as_deref).filter(|_| is_whole);
+        self.motion.state_within_step(origin, t, self.stepper.last_velocity().as_ref(), curve)
     }
 
-    /// The same step with the time derivatives at its start, as computed for the preceding step.
-    pub(crate) fn with_rates_at_start(self, rates: Option<State>) -> Self {
-        LastStep { rates: [rates, None], ..self }
+    /// Sets the time derivatives at its start, as computed for the preceding step.
+    pub(crate) fn set_rates_at_start(&mut self, rates: Option<State>) {
+        self.rates = [rates, None];
     }
 
-    /// The time derivatives at the end, if they have been computed.
-    pub(crate) fn into_rates_at_end(self) -> Option<State> {
-        let [_, at_end] = self.rates;
-        at_end
+    /// Takes the time derivatives at the end, if they have been computed.
+    pub(crate) fn take_rates_at_end(&mut self) -> Option<State> {
+        self.rates[1].take()
     }
 
     /// Interpolated states at the Chebyshev-Lobatto nodes between the ends of the step, at which a search along it
@@ -170,7 +168,7 @@ impl<'r> LastStep<'r> {
     }
 
     fn curve(&mut self) -> Option<&DenseStep> {
-        self.curve.get_or_insert_with(|| self.stepper.dense()).as_ref()
+        self.curve.get_or_insert_with(|| self.stepper.dense().map(Box::new)).as_deref()
     }
 
     /// The interpolated state at a fraction of the step, without taking a step: by the collocation polynomial if there
@@ -187,7 +185,9 @@ impl<'r> LastStep<'r> {
         let weights =
             [rest * rest * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * rest), h * u * rest * rest, -h * u * u * rest];
         let of = |a: &Vector, b: &Vector, ra: &Vector, rb: &Vector| {
-            a * weights[0] + b * weights[1] + ra * weights[2] + rb * weights[3]
+            Vector::from_fn(a.len(), |i| {
+                a[i] * weights[0] + b[i] * weights[1] + ra[i] * weights[2] + rb[i] * weights[3]
+            })
         };
         Ok(State {
             q: of(&a.q, &b.q, &ra.q, &rb.q),

@@ -162,9 +162,10 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
             let problem = Problem { system, t0: 0.0, start, span: H * f64::from(steps) };
             let motion = problem.motion()?;
             let count = Steps::Count(steps as usize);
-            let whole = |run: Run<'_, '_, discrete_herglotz::Problem<'_, Formula<2>, 2>>| -> Result<Vec<u64>, InputError> {
-                Ok(bits(&run.run(problem.end())?.state()))
-            };
+            let whole =
+                |run: Run<'_, '_, discrete_herglotz::Problem<'_, Formula<2>, 2>>| -> Result<Vec<u64>, InputError> {
+                    Ok(bits(&run.run(problem.end())?.state()))
+                };
             let one = whole(motion.by(integrator).steps(count))?;
             again += u32::from(whole(motion.by(integrator).steps(count))? != one);
             let plan = motion.by(integrator).steps(count).plan(problem.end())?;

@@ -193,10 +193,7 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The outcome of a run.
-    fn run(
-        &self,
-        run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Motion<'p, N>>,
-    ) -> RunEnd<N> {
+    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Motion<'p, N>>) -> RunEnd<N> {
         match caught(|| run_of(&self.motion()?).run(self.end())) {
             None => RunEnd::Panicked,
             Some(Err(refused)) => RunEnd::Refused(refused),

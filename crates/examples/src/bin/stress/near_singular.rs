@@ -128,7 +128,8 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
 
         let motion = discrete_herglotz::Problem::new(&system, 0.0, start)?;
         let mut stepper = TransformedStepper::new(&motion, 8, 0.1)?;
-        let end = if stepper.advance_to(TAU).is_ok() { RunEnd::Completed(stepper.state().fixed()) } else { RunEnd::Panicked };
+        let end =
+            if stepper.advance_to(TAU).is_ok() { RunEnd::Completed(stepper.state().fixed()) } else { RunEnd::Panicked };
         let error = end.error(&exact, 0.0);
         table.add("orbit", "transformed_gauss_8", e, end.verdict(&exact, 0.0, ORDER_ONE), error);
         points.push((1.0 / (1.0 - e), error));

@@ -98,7 +98,6 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
             far,
             newton,
             before,
-            velocities,
             values,
             evaluations,
             ..
@@ -185,7 +184,9 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
         if outcome == IterationOutcome::Done && *wants_z {
             let mut v0 = [0.0; N];
             copy_values(&v[..N], &mut v0);
-            let solved = CondensedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: velocities };
+            // On the stack, which is faster than memory of the run.
+            let mut velocities = [Stages::ZERO; N];
+            let solved = CondensedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: &mut velocities };
             *values = StageValues::<L, N> { lagrangian, solved }.with_simd(simd);
         }
         Iterated { outcome, iteration, change }

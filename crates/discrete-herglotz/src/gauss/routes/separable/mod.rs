@@ -46,7 +46,7 @@ pub(crate) struct Separable {
     before: [Stages; 2],
     /// The changes of q and v in a step.
     changes: [Vec<Unevaluated>; 2],
-    /// The velocities at the stages, if z is advanced.
+    /// The velocities at the stages of an iterate that is accepted.
     velocities: Vec<Stages>,
     /// `L - gamma z` at the stages, if z is advanced.
     values: Stages,
