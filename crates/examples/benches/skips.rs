@@ -39,16 +39,16 @@ struct Line {
 const RUNS: usize = 41;
 
 /// The median time of a motion, in microseconds, with its outcome.
-type Timed<const N: usize> = Result<(f64, Outcome), InputError>;
+type Timed = Result<(f64, Outcome), InputError>;
 
-fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome) -> Timed<N> {
+fn median(mut times: Vec<f64>, outcome: Outcome) -> Timed {
     assert_eq!(outcome.status, Status::Completed);
     times.sort_by(f64::total_cmp);
     Ok((times[RUNS / 2], outcome))
 }
 
 /// The time of the steps of a run, without its set-up.
-fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until) -> Timed<N> {
+fn steps<P>(run: &Run<'_, '_, P>, until: Until) -> Timed {
     let plan = run.plan(until)?;
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
@@ -62,7 +62,7 @@ fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until
 }
 
 /// The time of a whole run, with its work between the steps.
-fn whole<const N: usize>(run: impl Fn() -> Result<Outcome, InputError>) -> Timed<N> {
+fn whole(run: impl Fn() -> Result<Outcome, InputError>) -> Timed {
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
         let clock = Instant::now();
@@ -73,10 +73,10 @@ fn whole<const N: usize>(run: impl Fn() -> Result<Outcome, InputError>) -> Timed
 }
 
 /// A line of the table, from a motion with the full computation and one that skips a part of it.
-fn line<const N: usize>(
+fn line(
     (what, on): (&'static str, &'static str),
-    full: Timed<N>,
-    skipping: Timed<N>,
+    full: Timed,
+    skipping: Timed,
 ) -> Result<Line, InputError> {
     let ((full, a), (skipped, b)) = (full?, skipping?);
     let size = a.q.amax().max(a.p.amax());

@@ -102,7 +102,7 @@ const BAD: [(&str, &str); 57] = [
     ("coordinates = ", "catalogue = \"pendulum\"\ncoordinates = "),
     ("coordinates = [\"theta\"]", "coordinates = [\"theta\", \"theta\"]"),
     ("coordinates = [\"theta\"]", "coordinates = [\"z\"]"),
-    ("coordinates = [\"theta\"]", "coordinates = [\"q[17]\"]"),
+    ("coordinates = [\"theta\"]", "coordinates = [\"q[257]\"]"),
     ("theta = 1.0", "theta = [1.0]"),
     ("theta = 1.0", "theta = 1,0"),
     ("time = 100.0", "time = 100.0 s"),

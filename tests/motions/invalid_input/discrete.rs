@@ -12,6 +12,7 @@ mod lagrangians;
 mod observers;
 pub mod runs;
 mod steppers;
+mod systems;
 
 use crate::invalid_input::numbers::places;
 use crate::invalid_input::{Exceptions, InputTest};
@@ -50,7 +51,14 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::exact_rate", "takes no number"),
     ("Method::check", "takes no number"),
     ("Method::applicable", "takes no number"),
-    ("System::*", "those of the Lagrangian, which are the implementor's"),
+    ("System::*", "the implementor's; faults of its value and derivatives are tested with runs"),
+    ("TypedSystem::*", "those of the Lagrangian, which are the implementor's"),
+    ("SystemProblem::with_interrupt", "takes no number"),
+    ("SystemProblem::start", "takes no number"),
+    ("SystemProblem::state", "takes no number"),
+    ("Vector::*", "arithmetic: a result that is not finite follows from input that is not"),
+    ("$name::fixed", "arithmetic: missing components are NaN, as of Vector::fixed"),
+    ("$name::new", "stores its arguments; check() and every start check them"),
     ("sorted", "orders by `total_cmp`, in which NaN has a place"),
     ("Method::rule", "takes no number"),
     ("Quadrature::rule", "takes no number"),
@@ -117,6 +125,7 @@ pub const TESTS: &[&[InputTest]] = &[
     observers::TESTS,
     runs::TESTS,
     steppers::TESTS,
+    systems::TESTS,
 ];
 
 /// Times and states to start from, some of them not finite.

@@ -10,7 +10,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Lagrangian, OfHamiltonian, PhasePoint, Structure, VelocityPoint,
 };
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// The initial state of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,13 +125,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
             Start::Velocity(x) => InitialState::Velocity(x.into()),
             Start::Momentum(x, guess) => InitialState::Momentum(x.into(), guess.into()),
         };
-        Ok(SystemProblem::checked(Arc::new(OfTyped(lagrangian)), t0, start)?.of(lagrangian))
+        Ok(SystemProblem::checked(Rc::new(OfTyped(lagrangian)), t0, start)?.of(lagrangian))
     }
 
     /// The same problem without the type of its Lagrangian.
     pub(crate) fn of_system(&self) -> SystemProblem<'a> {
         let Problem { lagrangian, t0, start, state, from_momentum, structure, interrupt } = *self;
-        let system = Arc::new(OfTyped(lagrangian));
+        let system = Rc::new(OfTyped(lagrangian));
         SystemProblem { system, t0, start: start.into(), state: state.into(), from_momentum, structure, interrupt }
     }
 

@@ -6,7 +6,7 @@ use crate::system::{AtState, Guarded};
 use crate::{InputError, Interrupt, Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Defect, GeometryError, Lagrangian, Regularity, Structure, numbers::max_abs_or_nan};
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// The initial state of a motion of a [`System`].
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +75,7 @@ impl From<State> for InitialState {
 /// ```
 #[derive(Clone)]
 pub struct SystemProblem<'a> {
-    pub(crate) system: Arc<dyn System + 'a>,
+    pub(crate) system: Rc<dyn System + 'a>,
     pub(crate) t0: f64,
     /// The initial state with its velocity, and (`state`) with its momentum.
     pub(crate) start: Point,
@@ -109,7 +109,7 @@ impl<'a> SystemProblem<'a> {
                 return Err(GeometryError::WrongSize { what, expected, found: vector.len() }.into());
             }
         }
-        Self::checked(Arc::new(system), t0, start)
+        Self::checked(Rc::new(system), t0, start)
     }
 
     /// The same with an interrupt for its trial runs and error estimates.
@@ -145,7 +145,7 @@ impl<'a> SystemProblem<'a> {
     ///
     /// # Errors
     /// Those of [`Problem::new`].
-    pub(crate) fn checked(system: Arc<dyn System + 'a>, t0: f64, start: InitialState) -> Result<Self, InputError> {
+    pub(crate) fn checked(system: Rc<dyn System + 'a>, t0: f64, start: InitialState) -> Result<Self, InputError> {
         check_time(t0)?;
         if system.dimension() == 0 {
             return Err(InputError::Dimension);
@@ -171,7 +171,7 @@ impl<'a> SystemProblem<'a> {
     }
 
     /// The problem of a Lagrangian that is given by a contact Hamiltonian.
-    fn given_by_hamiltonian(system: Arc<dyn System + 'a>, t0: f64, start: InitialState) -> Result<Self, InputError> {
+    fn given_by_hamiltonian(system: Rc<dyn System + 'a>, t0: f64, start: InitialState) -> Result<Self, InputError> {
         if system.hints().switching_functions {
             let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
             return Err(InputError::Hypothesis { hypothesis });

@@ -334,14 +334,14 @@ sum!(Sub sub, SubAssign sub_assign: -);
 
 /// Products and quotients with a number.
 macro_rules! scaled {
-    ($trait:ident $method:ident: $op:tt) => {
+    ($trait:ident $method:ident: $assign:tt) => {
         impl $trait<f64> for Vector {
             type Output = Vector;
             #[inline]
             fn $method(mut self, factor: f64) -> Vector {
                 match &mut self.many {
-                    None => self.few.iter_mut().for_each(|x| *x = *x $op factor),
-                    Some(many) => many.iter_mut().for_each(|x| *x = *x $op factor),
+                    None => self.few.iter_mut().for_each(|x| *x $assign factor),
+                    Some(many) => many.iter_mut().for_each(|x| *x $assign factor),
                 }
                 self
             }
@@ -356,8 +356,8 @@ macro_rules! scaled {
     };
 }
 
-scaled!(Mul mul: *);
-scaled!(Div div: /);
+scaled!(Mul mul: *=);
+scaled!(Div div: /=);
 
 impl Neg for Vector {
     type Output = Vector;

@@ -1,7 +1,7 @@
 //! Systems of one to sixteen coordinates.
 
 use super::{Seen, accurate, by_steps, members};
-use discrete_herglotz::{AnyIntegrator, Status, Steps};
+use discrete_herglotz::{AnyIntegrator, SplittingScheme, Status, Steps};
 use herglotz_runtime::{Column, Ensemble, Event, FormulaSymmetry, Motion, OutputTimes, Start, StepControl, System};
 
 /// The energy decays with the conformal factor, to the requested accuracy, in any number of coordinates.
@@ -22,8 +22,48 @@ fn one_to_sixteen_coordinates() {
         assert!((to + 1.0).abs() < 1e-14, "the factor is e^(gamma t): {to}");
         assert!((last / (first * to.exp()) - 1.0).abs() < 1e-9, "{n}: {first} to {last}");
     }
-    let error = System::parse("q[0]", &["q[17]"], &[]).err().unwrap();
-    assert!(error.to_string().contains("1 to 16"), "{error}");
+    let error = System::parse("q[0]", &["q[257]"], &[]).err().unwrap();
+    assert!(error.to_string().contains("1 to 256"), "{error}");
+}
+
+/// Beyond sixteen coordinates a formula runs by collocation: the energy decays with the conformal factor, events are
+/// found, a resumed run has the same bits, and what there is only for fewer coordinates is refused.
+#[test]
+fn more_than_sixteen_coordinates() {
+    let text = "sum(i, 0, n-1, v[i]^2 - q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 + gamma*z";
+    for n in [17, 60] {
+        let system = System::parse(text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
+        let q: Vec<f64> = (0..n).map(|i| (0.4 * f64::from(i)).cos()).collect();
+        let motion = Motion {
+            rows: Some(OutputTimes::Every(usize::MAX)),
+            columns: vec![Column::Energy, Column::LogFactor],
+            ..Motion::new(Start::new(0.0, q.clone(), vec![0.1; q.len()], 0.0), 5.0, accurate(1e-9))
+        };
+        let (outcome, rows) = system.record(&motion).unwrap();
+        let ([first, last], to) = ([rows[0][0], rows[1][0]], rows[1][1]);
+        assert_eq!((outcome.status, outcome.unresolved, outcome.q.len()), (Status::Completed, None, q.len()));
+        assert!((to + 1.0).abs() < 1e-13, "the factor is e^(gamma t): {to}");
+        assert!((last / (first * to.exp()) - 1.0).abs() < 1e-8, "{n}: {first} to {last}");
+    }
+    let system = System::parse(text, &["x[17]"], &[("gamma", -0.2)]).unwrap();
+    let steps = |by: AnyIntegrator| StepControl::Steps { by, steps: Steps::Count(50) };
+    let gauss = steps(AnyIntegrator::Gauss { stages: 4 });
+    let motion = |step_control| Motion::new(Start::new(0.0, vec![0.5; 17], vec![0.0; 17], 0.0), 2.0, step_control);
+    let event = Event::new(system.formula().expression("x[0]").unwrap());
+    let mut seen = Seen::default();
+    system.run(&Motion { events: vec![event], ..motion(gauss) }, &mut seen).unwrap();
+    let [found] = seen.crossings.as_slice() else { panic!("{} crossings", seen.crossings.len()) };
+    assert!(found.q[0].abs() < 1e-12 && found.q.len() == 17, "{:?}", found.q);
+    for by in [AnyIntegrator::Splitting(SplittingScheme::STRANG), AnyIntegrator::TransformedGauss { stages: 4 }] {
+        let error = system.run(&motion(steps(by)), &mut ()).err().unwrap().to_string();
+        assert!(error.contains("gauss_1"), "{error}");
+    }
+    for text in ["sum(i, 0, n-1, v[i]^2)/2 - abs(q[0])", "sum(i, 0, n-1, v[i]^2)/2 - abs(q[16])^3"] {
+        let error = System::parse(text, &["x[17]"], &[]).err().unwrap().to_string();
+        assert!(error.contains("kinks and jumps"), "{error}");
+    }
+    let error = system.check(&motion(gauss), 3).err().unwrap().to_string();
+    assert!(error.contains("16") && error.contains("checks"), "{error}");
 }
 
 /// The general case in sixteen coordinates fits into the stack of a thread: masses that depend on all positions, a rate

@@ -7,11 +7,11 @@ use crate::numbers::registers::Stages;
 use crate::system::AtState;
 use crate::{Components, Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::DMatrix;
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// Any [`System`] without an applied force, in its general form: collocation evaluates its value and its derivatives at one
 /// stage after another.
-pub(crate) struct ByPoints<'a>(pub Arc<dyn System + 'a>);
+pub(crate) struct ByPoints<'a>(pub Rc<dyn System + 'a>);
 
 fn point(x: PointRef<'_>) -> Point {
     Point { q: x.q.into(), v: x.v.into(), z: x.z }
