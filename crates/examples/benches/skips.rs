@@ -73,11 +73,7 @@ fn whole(run: impl Fn() -> Result<Outcome, InputError>) -> Timed {
 }
 
 /// A line of the table, from a motion with the full computation and one that skips a part of it.
-fn line(
-    (what, on): (&'static str, &'static str),
-    full: Timed,
-    skipping: Timed,
-) -> Result<Line, InputError> {
+fn line((what, on): (&'static str, &'static str), full: Timed, skipping: Timed) -> Result<Line, InputError> {
     let ((full, a), (skipped, b)) = (full?, skipping?);
     let size = a.q.amax().max(a.p.amax());
     Ok(Line { what, on, full, skipped, apart: (a.q - b.q).amax().max((a.p - b.p).amax()) / size })

@@ -62,6 +62,10 @@ pub enum ForceKind {
 /// A mechanical system: its Lagrangian `L(t, q, v, z)` in n coordinates, the derivatives of L at points in `f64`, and its
 /// switching functions. Vectors have length n.
 ///
+/// A system of a user's own has the functions without a default: the number of coordinates, the value and its first and
+/// second derivatives; see [`SystemProblem`](crate::SystemProblem). Of the others, [`structure`](Self::structure) may claim
+/// that W is constant.
+///
 /// The kernels of integrators are compiled for each Lagrangian. All else takes a `&dyn System`: the plan and the loop of
 /// a run, its checks, the search of the steps for an accuracy, and steps that end on kinks and jumps.
 pub trait System {

@@ -61,7 +61,10 @@ impl Vector {
     #[inline]
     pub fn fixed<const N: usize>(&self) -> SVector<f64, N> {
         let x = self.as_slice();
-        SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(f64::NAN))
+        match <[f64; N]>::try_from(x) {
+            Ok(x) => x.into(),
+            Err(_) => SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(f64::NAN)),
+        }
     }
 
     /// The vector with a function of each component.
@@ -198,14 +201,19 @@ impl<const N: usize> From<[f64; N]> for Vector {
 impl<const N: usize> From<SVector<f64, N>> for Vector {
     #[inline]
     fn from(components: SVector<f64, N>) -> Self {
-        components.as_slice().into()
+        Vector::from(&components)
     }
 }
 
 impl<const N: usize> From<&SVector<f64, N>> for Vector {
     #[inline]
     fn from(components: &SVector<f64, N>) -> Self {
-        components.as_slice().into()
+        if const { N > FEW } {
+            return components.as_slice().into();
+        }
+        let mut few = [0.0; FEW];
+        few[..N].copy_from_slice(components.as_slice());
+        Vector { n: N, few, many: None }
     }
 }
 
