@@ -57,8 +57,6 @@ pub const EXCEPTIONS: Exceptions = &[
     ("SystemProblem::start", "takes no number"),
     ("SystemProblem::state", "takes no number"),
     ("Vector::*", "arithmetic: a result that is not finite follows from input that is not"),
-    ("$name::fixed", "arithmetic: missing components are NaN, as of Vector::fixed"),
-    ("$name::new", "stores its arguments; check() and every start check them"),
     ("sorted", "orders by `total_cmp`, in which NaN has a place"),
     ("Method::rule", "takes no number"),
     ("Quadrature::rule", "takes no number"),

@@ -5,8 +5,9 @@ use contact_geom::numbers::max_abs_or_nan;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub, SubAssign};
 
-/// The number of coordinates up to which a vector needs no memory on the heap.
-const FEW: usize = 6;
+/// The number of coordinates up to which a vector needs no memory on the heap: a state then has 120 bytes, which are
+/// copied without a call.
+const FEW: usize = 4;
 
 /// A vector with one number for each coordinate of a system; their number is known at run time. It is read as a slice,
 /// has the arithmetic of vectors, and converts from and to nalgebra's vectors of fixed length. The sum and the difference
