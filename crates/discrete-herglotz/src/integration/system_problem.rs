@@ -99,12 +99,12 @@ impl<'a> SystemProblem<'a> {
     /// false claim of structure.
     pub fn new(system: &'a (dyn System + 'a), t0: f64, start: impl Into<InitialState>) -> Result<Self, InputError> {
         let (system, start) = (Guarded::new(system), start.into());
-        let (q, y) = match &start {
-            InitialState::Velocity(x) => (&x.q, ("v", &x.v)),
-            InitialState::Momentum(x, _) => (&x.q, ("p", &x.p)),
+        let given = match &start {
+            InitialState::Velocity(x) => vec![("q", &x.q), ("v", &x.v)],
+            InitialState::Momentum(x, guess) => vec![("q", &x.q), ("p", &x.p), ("the guess of v", guess)],
         };
         let expected = system.dimension();
-        for (what, vector) in [("q", q), y] {
+        for (what, vector) in given {
             if vector.len() != expected {
                 return Err(GeometryError::WrongSize { what, expected, found: vector.len() }.into());
             }
