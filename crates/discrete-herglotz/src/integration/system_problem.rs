@@ -91,7 +91,8 @@ pub struct SystemProblem<'a> {
 impl<'a> SystemProblem<'a> {
     /// The problem of a system from a point `(q, v, z)` or `(q, p, z)` at the time `t0`. Where the code of the system
     /// panics, or returns vectors of a wrong length or numbers that are not finite, the run ends with a status. Of the
-    /// system's claims only that of a constant mass matrix is used.
+    /// system's claims that of a constant mass matrix is used, and all others where its structure is
+    /// [proved](contact_geom::Hints::proved).
     ///
     /// # Errors
     /// [`InputError`]: vectors whose length is not the number of coordinates, a time or a state that is not finite, an

@@ -28,13 +28,18 @@ impl System for Guarded<'_> {
     fn dimension(&self) -> usize {
         self.n
     }
-    /// Only what is read from the value and its derivatives is used, and the claim that `W` is constant, which is verified.
     fn hints(&self) -> Hints {
-        Hints::NONE
+        let proved = self.checked(|| self.system.hints().proved, |_| true, || false);
+        Hints { proved, ..Hints::NONE }
     }
+    /// A proved structure, as far as collocation point by point uses it. Otherwise the claim that W is constant, which is
+    /// verified.
     fn structure(&self) -> Structure {
         let claimed = self.checked(|| self.system.structure(), |_| true, Structure::default);
-        Structure { constant_mass: claimed.constant_mass, ..Structure::default() }
+        match self.hints().proved {
+            true => Structure { separable: false, quadratic: false, ..claimed },
+            false => Structure { constant_mass: claimed.constant_mass, ..Structure::default() },
+        }
     }
     fn value(&self, t: f64, x: &Point) -> f64 {
         self.checked(|| self.system.value(t, x), |_| true, || f64::NAN)

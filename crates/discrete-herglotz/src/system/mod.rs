@@ -64,7 +64,7 @@ pub enum ForceKind {
 ///
 /// A system of a user's own has the functions without a default: the number of coordinates, the value and its first and
 /// second derivatives; see [`SystemProblem`](crate::SystemProblem). Of the others, [`structure`](Self::structure) may claim
-/// that W is constant.
+/// that W is constant, and [`hints`](Self::hints) may state that the whole structure is proved.
 ///
 /// The kernels of integrators are compiled for each Lagrangian. All else takes a `&dyn System`: the plan and the loop of
 /// a run, its checks, the search of the steps for an accuracy, and steps that end on kinks and jumps.

@@ -8,8 +8,8 @@ use super::sized::{checked, initial_state};
 use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl,
 };
-use contact_geom::Structure;
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::{Hints, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{
     AnyIntegrator, Components, GaussCollocation, InputError, Point, ResumeState, Run, SecondDerivatives, State, System,
@@ -43,6 +43,9 @@ pub(super) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
 impl System for ManyCoordinates {
     fn dimension(&self) -> usize {
         self.0.formula().dimension()
+    }
+    fn hints(&self) -> Hints {
+        Hints { proved: true, ..Hints::NONE }
     }
     fn structure(&self) -> Structure {
         *self.0.proved()
