@@ -3,8 +3,8 @@
 use super::drag_rattle::substeps;
 use super::variation::{Along, Varied};
 use super::{ConstrainedStart, ContactLobatto, DragRattle, OffConstraint};
+use crate::integration::OfTyped;
 use crate::integration::{StepFormula, check_kicks};
-use crate::system::OfTyped;
 use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{DMatrix, SVector};

@@ -1,7 +1,7 @@
 //! The mass matrix at the start of a run.
 
 use crate::gauss::system::{PointRef, SystemAtPoints};
-use crate::solve::mass_matrix::inverse;
+use crate::system::mass_matrix::inverse;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::max_abs_or_nan;

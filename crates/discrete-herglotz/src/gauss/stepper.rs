@@ -9,11 +9,11 @@ use crate::gauss::steps::{GaussSteps, Setup};
 use crate::gauss::system::{ByPoints, CollocationSystem, Typed};
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};
+use crate::integration::OfTyped;
 use crate::integration::{SolvedStages, StageVectors, SuspectInterval, SystemProblem, depends_on_action, is_separable};
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{restored_from, words_of};
-use crate::system::OfTyped;
 use crate::{
     DenseStep, InputError, PlanEntry, Problem, State, StepFailure, Stepper, StepperOptions, UnresolvedStep, Vector,
 };

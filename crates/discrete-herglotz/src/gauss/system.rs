@@ -13,7 +13,7 @@ use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::curvature::curvature;
 use crate::integration::{AtState, at_state};
 use crate::numbers::registers::Stages;
-use crate::solve::mass_matrix::{BLOCK, mass_matrix};
+use crate::system::mass_matrix::{BLOCK, mass_matrix};
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{

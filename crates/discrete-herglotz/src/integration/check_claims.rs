@@ -1,6 +1,7 @@
 //! Numerical checks of the claimed structure of a Lagrangian.
 
-use crate::system::{ForceKind, OfTyped};
+use crate::integration::OfTyped;
+use crate::system::ForceKind;
 use crate::{InputError, Point, State, System, TypedSystem};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, ForceStructure, GeometryError, Structure, VelocityPoint, numbers::max_abs_or_nan};

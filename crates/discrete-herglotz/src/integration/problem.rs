@@ -1,7 +1,7 @@
 //! Initial value problems: a Lagrangian with an initial state.
 
+use crate::integration::OfTyped;
 use crate::integration::system_problem::{InitialState, SystemProblem, check_time};
-use crate::system::OfTyped;
 use crate::{
     DiscreteLagrangian, InputError, Interrupt, State, StepError,
     theory::{discrete_regularity, legendre_minus},

@@ -1,8 +1,8 @@
 //! The step equations of a quadrature rule, with derivatives of L only along the directions that a Newton step needs.
 
 use crate::integration::Node;
-pub(crate) use crate::solve::mass_matrix::BLOCK;
 use crate::solve::unknowns::Unknowns;
+pub(crate) use crate::system::mass_matrix::BLOCK;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint, numbers::AugmentedVector};
 

@@ -5,9 +5,7 @@ pub(crate) mod chebyshev;
 mod dense_lu_tests;
 #[cfg(feature = "faer")]
 mod faer_lu;
-pub(crate) mod hermite;
 pub(crate) mod inverse;
-pub(crate) mod mass_matrix;
 #[cfg(any(test, not(feature = "faer")))] // In tests next to faer, to compare them.
 mod nalgebra_lu;
 pub(crate) mod newton;

@@ -1,9 +1,9 @@
 //! Separable Lagrangians `v.Mv/2 - V(t, q) + f(z)` for splittings.
 
+use crate::integration::OfTyped;
 use crate::integration::check_claims::MAX_CLAIM_DEFECT;
 use crate::integration::check_kicks;
-use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
-use crate::system::OfTyped;
+use crate::system::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};

@@ -3,8 +3,8 @@
 use super::corner::{Corner, corner};
 use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
 use crate::gauss::StepStart;
+use crate::integration::OfTyped;
 use crate::integration::state_at;
-use crate::system::OfTyped;
 use crate::{Point, System, TypedSystem};
 use contact_geom::{VelocityPoint, numbers::max_abs_or_nan};
 

@@ -1,8 +1,8 @@
 //! The switching functions of a Lagrangian along a step.
 
 use crate::gauss::StepStart;
+use crate::integration::hermite;
 use crate::solve::chebyshev::{Samples, node};
-use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
 use crate::{DenseStep, InputError, Point, State, System, Vector};

@@ -3,13 +3,12 @@
 
 mod defaults;
 mod guarded;
-mod of_typed;
+pub(crate) mod mass_matrix;
 mod points;
 mod typed;
 mod vector;
 
 pub(crate) use guarded::Guarded;
-pub(crate) use of_typed::OfTyped;
 pub use points::{Components, Point, SecondDerivatives, State};
 pub use typed::TypedSystem;
 pub use vector::Vector;

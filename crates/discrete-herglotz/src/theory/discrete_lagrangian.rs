@@ -1,7 +1,7 @@
 //! Discrete Lagrangians on Q x Q x R.
 
-use crate::solve::mass_matrix::BLOCK;
 use crate::solve::newton::{Linearised, NewtonStart, newton};
+use crate::system::mass_matrix::BLOCK;
 use crate::theory::discrete_forces::discrete_forces;
 use crate::{InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};

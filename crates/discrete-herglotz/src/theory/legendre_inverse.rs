@@ -1,6 +1,6 @@
 //! The inverse of the Legendre transformation.
 
-use crate::solve::mass_matrix::mass_matrix;
+use crate::system::mass_matrix::mass_matrix;
 use crate::{
     StepError, TypedSystem,
     solve::{ITERATION_LIMIT, last_correction},

@@ -1,6 +1,6 @@
 //! The second derivatives of a separable Lagrangian in the positions.
 
-use crate::solve::mass_matrix::BLOCK;
+use crate::system::mass_matrix::BLOCK;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, support::KernelDual};
 

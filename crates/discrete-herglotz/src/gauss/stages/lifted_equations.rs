@@ -1,7 +1,7 @@
 //! The stage equations of contact Gauss collocation over numbers with derivatives, for the discrete Lagrangian.
 
 use crate::gauss::stages::equations::Products;
-use crate::solve::mass_matrix::BLOCK;
+use crate::system::mass_matrix::BLOCK;
 use crate::{StepError, solve::ITERATION_LIMIT};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{

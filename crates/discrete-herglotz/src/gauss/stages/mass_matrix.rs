@@ -8,7 +8,7 @@ use crate::gauss::system::{PointRef, SystemAtPoints};
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
-use crate::solve::mass_matrix::MAX_BY_COLUMNS;
+use crate::system::mass_matrix::MAX_BY_COLUMNS;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Structure, support::linear, vector};
 use pulp::Simd;

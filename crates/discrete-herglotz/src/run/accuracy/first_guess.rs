@@ -4,7 +4,7 @@ use crate::integration::SystemProblem;
 use crate::run::accuracy::limits::MAX_FIRST_GUESS;
 use crate::run::accuracy::matrices::{frobenius_norm, product};
 use crate::run::request::Request;
-use crate::solve::mass_matrix::inverse;
+use crate::system::mass_matrix::inverse;
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::max_or_nan;
 use std::f64::consts::PI;

@@ -6,7 +6,7 @@ use crate::integration::motion::NearbyVelocity;
 use crate::run::accuracy::equilibrium_round_off::accumulated_roundings;
 use crate::run::accuracy::track::norm_in_units;
 use crate::run::request::Request;
-use crate::solve::mass_matrix::inverse;
+use crate::system::mass_matrix::inverse;
 use crate::{InputError, SelectionFailure, State, Vector};
 use contact_geom::numbers::max_or_nan;
 

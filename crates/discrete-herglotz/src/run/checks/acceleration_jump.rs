@@ -1,10 +1,10 @@
 //! Suspect intervals: whether the acceleration varies faster than the steps resolve.
 
+use crate::integration::hermite;
 use crate::integration::{SuspectInterval, SystemProblem};
 use crate::resolution::monitor::{rounding, size};
 use crate::resolution::thresholds::{MAX_ACCELERATION_JUMP, POSITION_ROUND_OFF};
 use crate::run::discretization::Discretization;
-use crate::solve::hermite::hermite;
 use crate::{UnresolvedStep, Vector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 

@@ -1,10 +1,10 @@
 //! Claims of structure along a run: quantities that are claimed to be constant are compared with their values at the
 //! start.
 
+use crate::integration::hermite;
 use crate::resolution::monitor::size;
 use crate::resolution::thresholds::{CLAIM_ROUNDINGS, MAX_CONSTANT_DIFFERENCE, MIN_CLAIM_DISPLACEMENT};
 use crate::run::discretization::Discretization;
-use crate::solve::hermite::hermite;
 use crate::{Point, State, Stepper, System, Vector};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};

@@ -1,9 +1,10 @@
 //! A system whose number of coordinates is known at compile time, seen without it.
 
-use super::{AtState, AtSwitch, Components, ForceKind, Point, SecondDerivatives, State, System, TypedSystem, Vector};
-use crate::StepError;
 use crate::integration::{at_state, force_defect};
 use crate::theory::legendre_inverse;
+use crate::{
+    AtState, AtSwitch, Components, ForceKind, Point, SecondDerivatives, State, StepError, System, TypedSystem, Vector,
+};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::switching::Control;
 use contact_geom::{Defect, Defects, ForceStructure, GeometryError, Hints, Structure};
