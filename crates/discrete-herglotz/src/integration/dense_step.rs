@@ -3,13 +3,14 @@
 use crate::numbers::registers::MAX_STAGES;
 use crate::solve::chebyshev::{MAX_DEGREE, node};
 use crate::{State, Vector};
+use smallvec::SmallVec;
 use std::sync::OnceLock;
 
 /// The number of Legendre polynomials that the integrals of the highest degree need.
 pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
 
-/// A curve for each coordinate.
-pub(crate) type Curves = Vec<Series>;
+/// A curve for each coordinate; without an allocation for up to four.
+pub(crate) type Curves = SmallVec<[Series; 4]>;
 
 /// Dense output of a step: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper). For `tau` from 0
 /// to h

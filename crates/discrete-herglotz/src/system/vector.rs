@@ -14,13 +14,13 @@ const FEW: usize = 4;
 /// of vectors of different lengths have the components NaN.
 ///
 /// ```
-/// use contact_geom::nalgebra::{SVector, vector};
+/// use contact_geom::nalgebra::SVector;
 /// use discrete_herglotz::Vector;
 /// let q = Vector::from([3.0, 4.0]);
 /// assert_eq!((q[0], q.norm()), (3.0, 5.0));
-/// assert_eq!(&q - vector![1.0, 1.0], Vector::from([2.0, 3.0]));
+/// assert_eq!(&q - SVector::from([1.0, 1.0]), Vector::from([2.0, 3.0]));
 /// let fixed: SVector<f64, 2> = q.fixed();
-/// # assert_eq!(fixed, vector![3.0, 4.0]);
+/// # assert_eq!(fixed, SVector::from([3.0, 4.0]));
 /// ```
 #[derive(Default)]
 pub struct Vector {

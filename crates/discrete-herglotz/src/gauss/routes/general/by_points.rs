@@ -99,7 +99,7 @@ impl MovingStages for StagesByPoints<'_> {
         seen.largest()
     }
 
-    /// The values at the last stage are repeated in the padding.
+    /// The values at the last stage are repeated in the padding, where the weights are 0.
     fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
         let StagesByPoints { table, vectors, .. } = self;
         let Vectors { v, l_v, force, x, .. } = vectors;
@@ -109,14 +109,15 @@ impl MovingStages for StagesByPoints<'_> {
             let at = Point { q: of(x), v: of(v), z: self.z_stages.0[i] };
             let time = t + table.times.0[i];
             let (l, g) = (self.system.value(time, &at), self.system.gradient(time, &at));
-            let (weight, rho) = (table.weights.0[i], 1.0 - self.one_minus_rho_stages.0[i]);
-            let set =
-                |stages: &mut Stages, value: f64| stages.0[i..if i == last { MAX_STAGES } else { i + 1 }].fill(value);
-            set(self.l, weight * l);
-            set(self.rate, weight * (rho * g.z));
-            for d in 0..x.len() {
-                set(&mut force[d], weight * (rho * g.x[d]));
-                set(&mut l_v[d], g.y[d]);
+            let (rho, lanes) = (1.0 - self.one_minus_rho_stages.0[i], i..if i == last { MAX_STAGES } else { i + 1 });
+            for k in lanes {
+                let weight = table.weights.0[k];
+                self.l.0[k] = weight * l;
+                self.rate.0[k] = weight * (rho * g.z);
+                for d in 0..x.len() {
+                    force[d].0[k] = weight * (rho * g.x[d]);
+                    l_v[d].0[k] = g.y[d];
+                }
             }
         }
         0.0
