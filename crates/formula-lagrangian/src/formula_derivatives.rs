@@ -23,23 +23,6 @@ pub struct FormulaDerivatives {
     derived: Derived,
 }
 
-/// The second partial derivatives of a formula.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SecondPartials {
-    /// Those in q.
-    pub qq: DMatrix<f64>,
-    /// Those in q (rows) and v (columns).
-    pub qv: DMatrix<f64>,
-    /// Those in v.
-    pub vv: DMatrix<f64>,
-    /// Those in q and z.
-    pub qz: Vec<f64>,
-    /// Those in v and z.
-    pub vz: Vec<f64>,
-    /// That in z.
-    pub zz: f64,
-}
-
 impl Formula {
     /// The formula with its derivatives, for any number of coordinates.
     ///
@@ -95,16 +78,10 @@ impl FormulaDerivatives {
         value
     }
 
-    /// The second partial derivatives.
-    pub fn second_partials(&self, t: f64, q: &[f64], v: &[f64], z: f64) -> SecondPartials {
-        let n = self.derived.formula.dimension();
-        let (square, line) = (|| DMatrix::zeros(n, n), || vec![0.0; n]);
-        let mut to = SecondPartials { qq: square(), qv: square(), vv: square(), qz: line(), vz: line(), zz: 0.0 };
-        let SecondPartials { qq, qv, vv, qz, vz, zz } = &mut to;
-        let [qq, qv, vv] = [qq, qv, vv].map(|m| m.as_mut_slice());
-        let results = &mut [qq, qv, vv, qz, vz, std::slice::from_mut(zz)];
-        self.derived.second.evaluate::<f64, 0>(At { t, q, v, z }, results);
-        to
+    /// Writes the second partial derivatives `L_qq`, `L_qv`, `L_vv`, `L_qz`, `L_vz`, `L_zz`, in this order: matrices of
+    /// n × n entries by columns (in `L_qv` the rows belong to q), vectors of n entries, and one number.
+    pub fn second_partials(&self, t: f64, q: &[f64], v: &[f64], z: f64, mut to: [&mut [f64]; 6]) {
+        self.derived.second.evaluate::<f64, 0>(At { t, q, v, z }, &mut to);
     }
 
     /// `W = L_vv`.

@@ -177,7 +177,7 @@ pub use error::{FormulaError, MOST_COORDINATES, ParseError};
 pub use expression::Expression;
 pub use expression_gradient::ExpressionGradient;
 pub use formula::Formula;
-pub use formula_derivatives::{FormulaDerivatives, SecondPartials};
+pub use formula_derivatives::FormulaDerivatives;
 pub use graph::Graph;
 pub use hamiltonian::FormulaHamiltonian;
 pub use lagrangian::FormulaLagrangian;

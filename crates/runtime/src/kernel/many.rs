@@ -62,9 +62,13 @@ impl System for ManyCoordinates {
         Components { x: q.into(), y: v.into(), z: z.first().copied().unwrap_or(f64::NAN) }
     }
     fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives {
-        let second = self.0.second_partials(t, &x.q, &x.v, x.z);
-        let (qz, vz) = (second.qz.as_slice().into(), second.vz.as_slice().into());
-        SecondDerivatives { qq: second.qq, qv: second.qv, vv: second.vv, qz, vz, zz: second.zz }
+        let n = x.q.len();
+        let (square, line) = (|| DMatrix::zeros(n, n), || Vector::from_fn(n, |_| 0.0));
+        let mut to = SecondDerivatives { qq: square(), qv: square(), vv: square(), qz: line(), vz: line(), zz: 0.0 };
+        let SecondDerivatives { qq, qv, vv, qz, vz, zz } = &mut to;
+        let [qq, qv, vv] = [qq, qv, vv].map(|m| m.as_mut_slice());
+        self.0.second_partials(t, &x.q, &x.v, x.z, [qq, qv, vv, qz, vz, std::slice::from_mut(zz)]);
+        to
     }
     fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {
         self.0.mass_matrix(t, &x.q, &x.v, x.z)
