@@ -83,9 +83,9 @@ pub use dynamics::{
     AsFunction, AtEnergy, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced,
     HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, InTransformedTime, Lagrangian,
     LagrangianForm, Legendre, Lifted, LiftedAction, NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup,
-    Parametric, ParametricForce, ParametricHamiltonian, Quotient, Structure, Symmetry, TimesRate, UnknownParameter,
-    VectorField, VelocityDrag, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
-    legendre_jacobian, momentum, regularity,
+    Parametric, ParametricForce, ParametricHamiltonian, Quotient, ScalarSystem, SlicesVisitor, Slopes, Structure,
+    Symmetry, TimesRate, UnknownParameter, VectorField, VelocityDrag, WithoutClosedDerivatives,
+    check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, momentum, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{

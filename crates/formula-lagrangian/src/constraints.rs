@@ -111,11 +111,11 @@ impl<const N: usize> Constraint<N, N> for FormulaLagrangian<N> {
     fn value<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
         let mut c: SVector<T, N> = vector!(|_| T::zero());
         let at = At::new(T::zero(), q, q, T::zero());
-        self.derived.constraints.evaluate::<T, N>(at, &mut [c.as_mut_slice()]);
+        self.derived().constraints.evaluate::<T, N>(at, &mut [c.as_mut_slice()]);
         whole_vector(&c)
     }
 
     fn count(&self) -> usize {
-        self.derived.formula.constraints.len()
+        self.derived().formula.constraints.len()
     }
 }

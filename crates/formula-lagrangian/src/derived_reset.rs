@@ -24,19 +24,25 @@ impl Assignment {
 
     /// A state with the new values.
     fn after<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> VelocityPoint<N> {
-        let (mut after, mut values) = (*x, vec![0.0; self.variables.len()]);
-        self.values.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [&mut values]);
+        let mut after = *x;
+        self.replace(t, (after.q.as_mut_slice(), after.v.as_mut_slice(), &mut after.z));
+        after
+    }
+
+    /// Replaces a state `(q, v, z)` by that with the new values.
+    fn replace(&self, t: f64, (q, v, z): (&mut [f64], &mut [f64], &mut f64)) {
+        let mut values = vec![0.0; self.variables.len()];
+        self.values.evaluate::<f64, 0>(At { t, q, v, z: *z }, &mut [&mut values]);
         for (variable, value) in self.variables.iter().zip(values) {
             let place = match variable {
-                Variable::Position(i) => after.q.get_mut(*i as usize),
-                Variable::Velocity(i) => after.v.get_mut(*i as usize),
-                Variable::Action => Some(&mut after.z),
+                Variable::Position(i) => q.get_mut(*i as usize),
+                Variable::Velocity(i) => v.get_mut(*i as usize),
+                Variable::Action => Some(&mut *z),
             };
             if let Some(place) = place {
                 *place = value;
             }
         }
-        after
     }
 }
 
@@ -97,5 +103,26 @@ impl DerivedReset {
     /// What happens where resets accumulate.
     pub fn at_accumulation<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> Control<N> {
         self.rest.as_ref().map_or(Control::Continue, |rest| Control::Replace(rest.after(t, x)))
+    }
+
+    /// Whether it is an impact.
+    pub fn is_impact(&self) -> bool {
+        matches!(self.change, DerivedChange::Impact(_))
+    }
+
+    /// Replaces a state `(q, v, z)` by that after the reset; `false` in the other direction. The velocity after an impact,
+    /// whose law is not evaluated over slices, is NaN.
+    pub fn replace(&self, t: f64, rising: bool, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
+        match &self.change {
+            _ if !self.direction.includes(rising) => return false,
+            DerivedChange::Assignment(then) => then.replace(t, x),
+            DerivedChange::Impact(_) => x.1.fill(f64::NAN),
+        }
+        true
+    }
+
+    /// Replaces a state where resets accumulate; `false` if nothing is stated.
+    pub fn replace_by_rest(&self, t: f64, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
+        self.rest.as_ref().map(|rest| rest.replace(t, x)).is_some()
     }
 }

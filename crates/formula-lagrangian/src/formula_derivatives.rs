@@ -1,26 +1,31 @@
 //! Formulas with their derivatives, for any number of coordinates.
 
 use crate::derived::Derived;
+use crate::drag::ProvedForce;
 use crate::evaluation::At;
 use crate::{Formula, FormulaError};
-use contact_geom::Structure;
-use contact_geom::nalgebra::DMatrix;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Dual, Scalar, ScalarSystem, Slopes, Structure};
 
 /// A Lagrangian formula with its derivatives in closed form and its proved structure, evaluated at points that are given
-/// by slices. [`FormulaLagrangian`](crate::FormulaLagrangian) is the same with a number of coordinates that is known at
+/// by slices, as a [`ScalarSystem`].
+/// [`FormulaLagrangian`](crate::FormulaLagrangian) is the same with a number of coordinates that is known at
 /// compile time.
 ///
 /// ```
+/// use contact_geom::{ScalarSystem, Slopes};
 /// use formula_lagrangian::Formula;
 /// let chain = Formula::parse("sum(i, 0, n-1, v[i]^2 - q[i]^2)/2 - z/10", &["x[20]"], &[])?;
-/// let (chain, mut gradient) = (chain.derivatives()?, vec![0.0; 41]);
-/// let value = chain.with_gradient(0.0, &[1.0; 20], &[3.0; 20], 0.5, &mut gradient);
-/// assert_eq!((value, gradient[0], gradient[20], gradient[40]), (79.95, -1.0, 3.0, -0.1));
+/// let (chain, mut q, mut v, mut z) = (chain.derivatives()?, [0.0; 20], [0.0; 20], 0.0);
+/// let to = Slopes { q: &mut q, v: &mut v, z: &mut z };
+/// let value = chain.with_gradient::<f64, 0>(0.0, &[1.0; 20], &[3.0; 20], 0.5, to);
+/// assert_eq!((value, q[0], v[0], z), (79.95, -1.0, 3.0, -0.1));
 /// # Ok::<(), formula_lagrangian::FormulaError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct FormulaDerivatives {
-    derived: Derived,
+    pub(crate) derived: Derived,
+    n: usize,
 }
 
 impl Formula {
@@ -30,11 +35,16 @@ impl Formula {
     /// [`FormulaError::TooLarge`], [`FormulaError::IsHamiltonian`].
     pub fn derivatives(&self) -> Result<FormulaDerivatives, FormulaError> {
         self.check_is_lagrangian("Lagrangian of its own", "use `Formula::hamiltonian`")?;
-        Ok(FormulaDerivatives { derived: Derived::new(self, self.dimension())? })
+        FormulaDerivatives::within(self, self.dimension())
     }
 }
 
 impl FormulaDerivatives {
+    /// Over n coordinates, at least as many as the formula has: those beyond its own are those of free particles.
+    pub(crate) fn within(formula: &Formula, n: usize) -> Result<Self, FormulaError> {
+        Ok(FormulaDerivatives { derived: Derived::new(formula, n)?, n })
+    }
+
     /// The formula, with the present values of its parameters.
     pub fn formula(&self) -> &Formula {
         &self.derived.formula
@@ -63,19 +73,74 @@ impl FormulaDerivatives {
         self.derived.constant_rate()
     }
 
-    /// The value of L.
-    pub fn value(&self, t: f64, q: &[f64], v: &[f64], z: f64) -> f64 {
-        let mut value = 0.0;
-        self.derived.value.evaluate::<f64, 0>(At { t, q, v, z }, &mut [std::slice::from_mut(&mut value)]);
-        value
+    /// The number of resets and impacts.
+    pub fn resets(&self) -> usize {
+        self.derived.resets.len()
     }
 
-    /// The value of L, and its gradient `(L_q, L_v, L_z)`, which has 2n + 1 entries.
-    pub fn with_gradient(&self, t: f64, q: &[f64], v: &[f64], z: f64, gradient: &mut [f64]) -> f64 {
-        let mut value = 0.0;
-        let results = &mut [gradient, std::slice::from_mut(&mut value)];
-        self.derived.with_gradient.evaluate::<f64, 0>(At { t, q, v, z }, results);
-        value
+    /// The number of impacts.
+    pub fn impacts(&self) -> usize {
+        self.derived.resets.iter().filter(|reset| reset.is_impact()).count()
+    }
+
+    /// See [`FormulaLagrangian::reset_of`](crate::FormulaLagrangian::reset_of).
+    pub fn reset_of(&self, index: usize) -> Option<usize> {
+        index.checked_sub(self.derived.kinks.functions.len()).filter(|reset| *reset < self.resets())
+    }
+
+    /// Whether the forces are functions of time and positions.
+    pub fn force_is_of_positions(&self) -> bool {
+        match &self.derived.proved_force {
+            ProvedForce::None => true,
+            ProvedForce::General => false,
+            ProvedForce::Drag { linear, quadratic } => {
+                quadratic.value == 0.0 && linear.iter().all(|coefficient| coefficient.value == 0.0)
+            }
+        }
+    }
+
+    /// Whether the forces are functions of time and positions with a [drag](contact_geom::ForceStructure::Drag).
+    pub fn force_is_drag(&self) -> bool {
+        matches!(self.derived.proved_force, ProvedForce::Drag { .. })
+    }
+
+    /// The derivative of the applied force along a direction `(dq, dv, dz)`, which is written, with that of each component.
+    pub fn force_along(&self, t: f64, x: (&[f64], &[f64], f64), along: (&[f64], &[f64], f64), to: &mut [f64]) {
+        type Along = Dual<f64, SVector<f64, 1>>;
+        let moving = |re: f64, d: f64| Along { re, d: SVector::<f64, 1>::from_element(d) };
+        let all = |x: &[f64], d: &[f64]| -> Vec<Along> { x.iter().zip(d).map(|(x, d)| moving(*x, *d)).collect() };
+        let (q, v) = (all(x.0, along.0), all(x.1, along.1));
+        let mut force = vec![Along::from(0.0); to.len()];
+        self.applied_force::<Along, 0>(Along::from(t), &q, &v, moving(x.2, along.2), &mut force);
+        to.iter_mut().zip(force).for_each(|(to, f)| *to = f.d[0]);
+    }
+
+    /// See [`FormulaLagrangian`](crate::FormulaLagrangian): the functions of kinks, then those of resets.
+    pub fn switching_functions(&self, t: f64, q: &[f64], v: &[f64], z: f64, values: &mut Vec<f64>) {
+        let (tape, first) = (&self.derived.switching, values.len());
+        if !tape.results.is_empty() {
+            values.resize(first + tape.results.len(), 0.0);
+            let results = values.get_mut(first..).unwrap_or(&mut []);
+            tape.evaluate::<f64, 0>(At { t, q, v, z }, &mut [results]);
+        }
+    }
+
+    /// Replaces a state `(q, v, z)` by that after the reset to which a switching function belongs; `false` if there is none
+    /// in this direction. A new value may be NaN, as all of an impact are.
+    pub fn reset(&self, index: usize, rising: bool, t: f64, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
+        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        reset.is_some_and(|reset| reset.replace(t, rising, x))
+    }
+
+    /// The same where resets accumulate.
+    pub fn rest(&self, index: usize, t: f64, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
+        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        reset.is_some_and(|reset| reset.replace_by_rest(t, x))
+    }
+
+    /// The times of kinks and jumps.
+    pub fn breaks(&self) -> &[f64] {
+        &self.derived.breaks
     }
 
     /// Writes the second partial derivatives `L_qq`, `L_qv`, `L_vv`, `L_qz`, `L_vz`, `L_zz`, in this order: matrices of
@@ -83,12 +148,48 @@ impl FormulaDerivatives {
     pub fn second_partials(&self, t: f64, q: &[f64], v: &[f64], z: f64, mut to: [&mut [f64]; 6]) {
         self.derived.second.evaluate::<f64, 0>(At { t, q, v, z }, &mut to);
     }
+}
 
-    /// `W = L_vv`.
-    pub fn mass_matrix(&self, t: f64, q: &[f64], v: &[f64], z: f64) -> DMatrix<f64> {
-        let n = self.derived.formula.dimension();
-        let mut w = DMatrix::zeros(n, n);
-        self.derived.mass.evaluate::<f64, 0>(At { t, q, v, z }, &mut [w.as_mut_slice()]);
-        w
+impl ScalarSystem for FormulaDerivatives {
+    #[inline(always)]
+    fn dimension(&self) -> usize {
+        self.n
+    }
+
+    #[inline(always)]
+    fn value<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T) -> T {
+        let mut value = T::zero();
+        self.derived.value.evaluate::<T, N>(At { t, q, v, z }, &mut [std::slice::from_mut(&mut value)]);
+        value
+    }
+
+    #[inline(always)]
+    fn with_gradient<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: Slopes<'_, T>) -> T {
+        let mut value = T::zero();
+        let results = &mut [to.q, to.v, std::slice::from_mut(to.z), std::slice::from_mut(&mut value)];
+        self.derived.with_gradient.evaluate::<T, N>(At { t, q, v, z }, results);
+        value
+    }
+
+    #[inline(always)]
+    fn force<T: Scalar, const N: usize>(&self, t: T, q: &[T], to: &mut [T]) {
+        self.derived.force.evaluate::<T, N>(At { t, q, v: &[], z: T::zero() }, &mut [to]);
+    }
+
+    #[inline(always)]
+    fn mass_matrix<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]) {
+        self.derived.mass.evaluate::<T, N>(At { t, q, v, z }, &mut [to]);
+    }
+
+    #[inline(always)]
+    fn has_force(&self) -> bool {
+        self.derived.applied.is_some()
+    }
+
+    #[inline(always)]
+    fn applied_force<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]) {
+        if let Some(tape) = &self.derived.applied {
+            tape.evaluate::<T, N>(At { t, q, v, z }, &mut [to]);
+        }
     }
 }

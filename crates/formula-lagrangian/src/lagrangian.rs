@@ -4,12 +4,14 @@ use crate::derived::Derived;
 use crate::drag::ProvedForce;
 use crate::evaluation::{At, whole, whole_vector};
 use crate::forces::Work;
-use crate::{Formula, FormulaError};
+use crate::{Formula, FormulaDerivatives, FormulaError};
 use contact_geom::nalgebra::{ArrayStorage, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
-    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, vector,
+    ChartVector, ForceStructure, Hessian, Hints, Lagrangian, Scalar, SlicesVisitor, Structure, Symmetry, VelocityPoint,
+    vector,
 };
+use std::sync::Arc;
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with gradient and second derivatives in closed form and with
 /// a proved structure. All formulas of one dimension have the same type, so that integrators are compiled for it once.
@@ -31,7 +33,8 @@ use contact_geom::{
 /// ```
 #[derive(Clone, Debug)]
 pub struct FormulaLagrangian<const N: usize> {
-    pub(crate) derived: Derived,
+    /// Its derivatives over N coordinates.
+    pub(crate) derivatives: Arc<FormulaDerivatives>,
 }
 
 impl Formula {
@@ -81,12 +84,21 @@ impl<const N: usize> FormulaLagrangian<N> {
         if formula.dimension() > N {
             return Err(FormulaError::OtherDimension { found: formula.dimension(), asked: N });
         }
-        Ok(FormulaLagrangian { derived: Derived::new(formula, N)? })
+        Ok(FormulaLagrangian { derivatives: Arc::new(FormulaDerivatives::within(formula, N)?) })
+    }
+
+    #[inline(always)]
+    pub(crate) fn derived(&self) -> &Derived {
+        &self.derivatives.derived
+    }
+
+    pub(crate) fn derived_mut(&mut self) -> &mut Derived {
+        &mut Arc::make_mut(&mut self.derivatives).derived
     }
 
     /// The formula, with the present values of its parameters.
     pub fn formula(&self) -> &Formula {
-        &self.derived.formula
+        &self.derived().formula
     }
 
     /// Sets the value of a parameter, without parsing or differentiating again.
@@ -94,34 +106,34 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// # Errors
     /// [`FormulaError::UnknownParameter`], [`FormulaError::ParameterValue`].
     pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
-        self.derived.set(parameter, value)
+        self.derived_mut().set(parameter, value)
     }
 
     /// The proved structure of L with its forces; the same as [`structure`](Lagrangian::structure).
     pub fn proved(&self) -> &Structure {
-        &self.derived.structure
+        &self.derived().structure
     }
 
     /// Whether L and the forces have neither kinks nor jumps: they contain none of `abs`, `sign`, `min`, `max`, `if`,
     /// `atan2`, `hypot`, and no tables. Integrators reach their order where the motion does not meet a kink or a jump.
     pub fn is_smooth(&self) -> bool {
-        self.derived.smooth
+        self.derived().smooth
     }
 
     /// The number of resets and impacts.
     pub fn resets(&self) -> usize {
-        self.derived.resets.len()
+        self.derived().resets.len()
     }
 
     /// The number of the reset to which a [switching function](Lagrangian::switching_functions) belongs; `None` for the
     /// functions of kinks and jumps, which come first.
     pub fn reset_of(&self, index: usize) -> Option<usize> {
-        index.checked_sub(self.derived.kinks.functions.len()).filter(|reset| *reset < self.resets())
+        index.checked_sub(self.derived().kinks.functions.len()).filter(|reset| *reset < self.resets())
     }
 
     /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
     pub fn constant_rate(&self) -> Option<f64> {
-        self.derived.constant_rate()
+        self.derived().constant_rate()
     }
 
     /// The detected symmetries, whose momenta are multiplied by the conformal factor: translations along a coordinate
@@ -137,14 +149,14 @@ impl<const N: usize> FormulaLagrangian<N> {
         if self.resets() > 0 {
             return Vec::new();
         }
-        let n = self.derived.formula.dimension();
-        let Formula { graph, root, constraints, .. } = &self.derived.formula;
+        let n = self.derived().formula.dimension();
+        let Formula { graph, root, constraints, .. } = &self.derived().formula;
         let moves = |set: &[usize]| constraints.iter().all(|c| graph.moves_into_itself(*c, set));
         let turned = |planes: &[(usize, usize)]| constraints.iter().all(|c| graph.turns_into_itself(*c, planes));
-        let mut work = Work::new(graph, &self.derived.applied_nodes);
+        let mut work = Work::new(graph, &self.derived().applied_nodes);
         let bodies = graph.sets_of_differences(*root, n);
         let mut seen = Vec::new();
-        let cyclic = (0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true));
+        let cyclic = (0..n).filter(|i| self.derived().cyclic.get(*i) == Some(&true));
         seen.extend(cyclic.filter(|i| moves(&[*i]) && work.vanishes_along(&[*i])).map(|i| along(&[i])));
         let moving = bodies.iter().filter(|set| graph.moves_into_itself(*root, set));
         seen.extend(moving.filter(|set| moves(set) && work.vanishes_along(set)).map(|set| along(set)));
@@ -177,13 +189,19 @@ pub(crate) fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> 
 }
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
-    const HINTS: Hints =
-        Hints { switching_functions: true, proved: true, interpreted: true, forced: true, ..Hints::NONE };
+    const HINTS: Hints = Hints {
+        switching_functions: true,
+        proved: true,
+        interpreted: true,
+        forced: true,
+        over_slices: true,
+        ..Hints::NONE
+    };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let mut value = T::zero();
-        self.derived.value.evaluate::<T, N>(At::new(t, q, v, z), &mut [std::slice::from_mut(&mut value)]);
+        self.derived().value.evaluate::<T, N>(At::new(t, q, v, z), &mut [std::slice::from_mut(&mut value)]);
         whole(value)
     }
 
@@ -191,7 +209,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         let mut g = blank::<T, N>();
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), std::slice::from_mut(&mut g.z)];
-        self.derived.gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived().gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some(whole_triple(&g))
     }
 
@@ -200,14 +218,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         let (mut g, mut value) = (blank::<T, N>(), T::zero());
         let (z, value_slice) = (std::slice::from_mut(&mut g.z), std::slice::from_mut(&mut value));
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), z, value_slice];
-        self.derived.with_gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived().with_gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((whole(value), whole_triple(&g)))
     }
 
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
         let mut force: SVector<T, N> = vector!(|_| T::zero());
-        self.derived.force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
+        self.derived().force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
         Some(whole_vector(&force))
     }
 
@@ -215,37 +233,41 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
         let (mut value, mut force): (T, SVector<T, N>) = (T::zero(), vector!(|_| T::zero()));
         let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
-        self.derived.with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived().with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((whole(value), whole_vector(&force)))
     }
 
     #[inline(always)]
     fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         let mut rate = T::zero();
-        self.derived.rate.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [std::slice::from_mut(&mut rate)]);
+        self.derived().rate.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [std::slice::from_mut(&mut rate)]);
         Some(whole(rate))
     }
 
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
         let mut w: SMatrix<T, N, N> = SMatrix::from_array_storage(ArrayStorage([[T::zero(); N]; N]));
-        self.derived.mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
+        self.derived().mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
         Some(w)
     }
 
     #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
-        Some(self.derived.hessian(At::new(t, &x.q, &x.v, x.z)))
+        Some(self.derived().hessian(At::new(t, &x.q, &x.v, x.z)))
+    }
+
+    fn over_slices<V: SlicesVisitor>(&self, visitor: V) -> Option<V::Output> {
+        Some(visitor.visit(self.derivatives.clone()))
     }
 
     fn structure(&self) -> Structure {
-        self.derived.structure
+        self.derived().structure
     }
 
     #[inline(always)]
     fn applied_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         let mut force: SVector<T, N> = vector!(|_| T::zero());
-        match &self.derived.applied {
+        match &self.derived().applied {
             None => force,
             Some(tape) => {
                 tape.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
@@ -258,7 +280,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     /// one coordinate, or as `-k*x'*sqrt(x'^2 + y'^2)` or with `hypot(x', y')` for each of several, with the same k; or
     /// if it follows from a Rayleigh function such as `k/3*(x'^2 + y'^2)^1.5`.
     fn force_structure(&self) -> ForceStructure<N> {
-        match &self.derived.proved_force {
+        match &self.derived().proved_force {
             ProvedForce::None => ForceStructure::None,
             ProvedForce::General => ForceStructure::General,
             ProvedForce::Drag { linear, quadratic } => ForceStructure::Drag {
@@ -270,14 +292,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn has_force(&self) -> bool {
-        self.derived.applied.is_some()
+        self.derived().applied.is_some()
     }
 
     /// The arguments of `abs` and `sign`, and the differences whose sign decides `min`, `max` and `if`, in L and in the
     /// forces; those that are affine functions of time are [breaks](Lagrangian::breaks) instead. Then those of the
     /// resets.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        let (tape, first) = (&self.derived.switching, values.len());
+        let (tape, first) = (&self.derived().switching, values.len());
         if !tape.results.is_empty() {
             values.resize(first + tape.results.len(), 0.0);
             let results = values.get_mut(first..).unwrap_or(&mut []);
@@ -288,13 +310,13 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     /// The state after the reset or the impact to which the function belongs, if it has this direction. A new value may
     /// be NaN.
     fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
-        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        let reset = self.reset_of(index).and_then(|i| self.derived().resets.get(i));
         reset.map_or(Control::Continue, |reset| reset.at_switch(self, t, x, rising))
     }
 
     /// The state at which the motion continues where resets accumulate, if the reset states one.
     fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
-        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
+        let reset = self.reset_of(index).and_then(|i| self.derived().resets.get(i));
         reset.map_or(Control::Continue, |reset| reset.at_accumulation(t, x))
     }
 
@@ -302,6 +324,6 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     /// `t - 5` in `if(t > 5, 1, 0)`; the samples of tables at such arguments; and the times of
     /// [`Formula::with_breaks`].
     fn breaks(&self) -> &[f64] {
-        &self.derived.breaks
+        &self.derived().breaks
     }
 }

@@ -18,16 +18,16 @@ use contact_geom::{Parametric, ParametricHamiltonian, Scalar, VelocityPoint, vec
 /// ```
 impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
     fn parameter_names(&self) -> Vec<String> {
-        self.derived.formula.names.parameters.clone()
+        self.derived().formula.names.parameters.clone()
     }
 
     fn parameters(&self) -> Vec<f64> {
-        self.derived.formula.values.clone()
+        self.derived().formula.values.clone()
     }
 
     #[inline(always)]
     fn parameter_count(&self) -> usize {
-        self.derived.formula.values.len()
+        self.derived().formula.values.len()
     }
 
     /// `None` also where a value is not finite.
@@ -36,7 +36,7 @@ impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
             return None;
         }
         let mut other = self.clone();
-        other.derived.set_all(theta);
+        other.derived_mut().set_all(theta);
         Some(other)
     }
 
@@ -46,16 +46,16 @@ impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
     fn value_at<T: Scalar>(&self, theta: &[T], t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let mut value = T::zero();
         let at = At { q: q.as_slice(), v: v.as_slice(), z, t };
-        self.derived.parametric_value.evaluate(theta, at, std::slice::from_mut(&mut value));
+        self.derived().parametric_value.evaluate(theta, at, std::slice::from_mut(&mut value));
         value
     }
 
     #[inline(always)]
     fn force_at<T: Scalar>(&self, theta: &[T], t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         let mut force: SVector<T, N> = vector!(|_| T::zero());
-        if self.derived.parametric_force.len() > 0 {
+        if self.derived().parametric_force.len() > 0 {
             let at = At { q: x.q.as_slice(), v: x.v.as_slice(), z: x.z, t };
-            self.derived.parametric_force.evaluate(theta, at, force.as_mut_slice());
+            self.derived().parametric_force.evaluate(theta, at, force.as_mut_slice());
         }
         force
     }

@@ -37,7 +37,7 @@ impl<L> Breaks<L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Breaks<L> {
-    const HINTS: Hints = Hints { switching_functions: true, ..L::HINTS };
+    const HINTS: Hints = Hints { switching_functions: true, over_slices: false, ..L::HINTS };
 
     forward_lagrangian!(of_value, self => self.lagrangian);
     forward_lagrangian!(of_force, self => self.lagrangian);

@@ -146,7 +146,7 @@ impl<L, F> Forced<L, F> {
 }
 
 impl<const N: usize, L: Lagrangian<N>, F: Force<N>> Lagrangian<N> for Forced<L, F> {
-    const HINTS: Hints = Hints { forced: true, ..L::HINTS };
+    const HINTS: Hints = Hints { forced: true, over_slices: false, ..L::HINTS };
 
     forward_lagrangian!(of_value, self => self.lagrangian);
     forward_lagrangian!(of_switches, self => self.lagrangian);

@@ -1,7 +1,9 @@
 //! Lagrangians L(t, q, v, z).
 
 use crate::switching::Control;
-use crate::{ChartVector, Defect, ForceStructure, Hessian, PhasePoint, Scalar, Structure, VelocityPoint, vector};
+use crate::{
+    ChartVector, Defect, ForceStructure, Hessian, PhasePoint, Scalar, SlicesVisitor, Structure, VelocityPoint, vector,
+};
 use nalgebra::{SMatrix, SVector};
 
 /// What integrators may rely on at compile time about a Lagrangian: code for what is `false` here is not compiled.
@@ -27,6 +29,8 @@ pub struct Hints {
     /// Whether it is given by a contact Hamiltonian, as [`OfHamiltonian`](crate::OfHamiltonian): its motions are computed
     /// from the Hamiltonian and the momenta, and `W = L_vv` need not exist.
     pub hamiltonian: bool,
+    /// Whether it is written over slices: [`Lagrangian::over_slices`] is overridden.
+    pub over_slices: bool,
 }
 
 impl Hints {
@@ -38,6 +42,7 @@ impl Hints {
         interpreted: false,
         forced: false,
         hamiltonian: false,
+        over_slices: false,
     };
 
     /// What may be relied on for a Lagrangian that is one of several, as in [`lagrangian_enum`](crate::lagrangian_enum).
@@ -55,7 +60,7 @@ impl Hints {
         let mut any = Hints { proved: !several.is_empty(), ..Hints::NONE };
         let mut i = 0;
         while i < several.len() {
-            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian } =
+            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian, .. } =
                 several[i];
             assert!(!hamiltonian, "a Lagrangian that is given by a contact Hamiltonian needs a type of its own");
             any.time_transformation |= time_transformation;
@@ -233,6 +238,12 @@ pub trait Lagrangian<const N: usize> {
     fn hamiltonian_defect(&self, _t: f64, _x: &PhasePoint<N>) -> Option<Defect> {
         None
     }
+
+    /// Visits the same Lagrangian as a [`ScalarSystem`], for which integrators are compiled once, whatever its number of
+    /// coordinates; see [`Hints::over_slices`]. `None`, the default, for a Lagrangian that is not one.
+    fn over_slices<V: SlicesVisitor>(&self, _visitor: V) -> Option<V::Output> {
+        None
+    }
 }
 
 /// A Lagrangian without its closed derivatives: all derivatives are found by automatic differentiation, to compare the
@@ -241,7 +252,8 @@ pub trait Lagrangian<const N: usize> {
 pub struct WithoutClosedDerivatives<L>(pub L);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivatives<L> {
-    const HINTS: Hints = Hints { proved: false, interpreted: false, hamiltonian: false, ..L::HINTS };
+    const HINTS: Hints =
+        Hints { proved: false, interpreted: false, hamiltonian: false, over_slices: false, ..L::HINTS };
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
@@ -371,4 +383,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     const HINTS: Hints = L::HINTS;
 
     forward_lagrangian!(all, self => (**self));
+    fn over_slices<V: SlicesVisitor>(&self, visitor: V) -> Option<V::Output> {
+        (**self).over_slices(visitor)
+    }
 }

@@ -27,7 +27,7 @@ pub(crate) struct Start<'r> {
     /// Whether L is given by a contact Hamiltonian.
     pub is_hamiltonian: bool,
     pub is_separable: bool,
-    /// Whether the system is evaluated at one point at a time.
+    /// Whether the mass matrix is inverted at one stage after another, whatever the number of coordinates.
     pub by_points: bool,
     /// Whether the motion depends on the action.
     pub depends_on_action: bool,

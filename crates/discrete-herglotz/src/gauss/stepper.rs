@@ -6,7 +6,7 @@ use crate::gauss::dense::{Solved, StepStart, curve_through};
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::routes::RouteState;
 use crate::gauss::steps::{GaussSteps, Setup};
-use crate::gauss::system::{ByPoints, CollocationSystem, Typed};
+use crate::gauss::system::{ByPoints, CollocationSystem, KernelsOf, Typed};
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::work_summary::{GaussRoute, work_summary};
 use crate::integration::OfTyped;
@@ -18,6 +18,7 @@ use crate::{
     DenseStep, InputError, PlanEntry, Problem, State, StepFailure, Stepper, StepperOptions, UnresolvedStep, Vector,
 };
 use contact_geom::Lagrangian;
+use std::rc::Rc;
 
 /// A stepper of contact Gauss collocation.
 ///
@@ -59,7 +60,13 @@ impl<'a> GaussStepper<'a> {
             is_separable: is_separable(&OfTyped(lagrangian), &structure),
             depends_on_action: depends_on_action(&OfTyped(lagrangian), &structure),
         };
-        Self::of(Box::new(Typed(lagrangian)), &start, stages, h, options)
+        let system: Box<dyn CollocationSystem + 'a> = if const { L::HINTS.over_slices } {
+            let (system, kernels) = (Rc::new(OfTyped(lagrangian)), lagrangian.over_slices(KernelsOf));
+            Box::new(ByPoints { system, kernels })
+        } else {
+            Box::new(Typed(lagrangian))
+        };
+        Self::of(system, &start, stages, h, options)
     }
 
     /// A stepper at the start of a problem whose system is evaluated at one point at a time.
@@ -74,6 +81,8 @@ impl<'a> GaussStepper<'a> {
     ) -> Result<Self, InputError> {
         check_step(stages, h)?;
         let SystemProblem { system, t0, start, state, structure, .. } = problem;
+        let points = ByPoints::new(system.clone());
+        let in_registers = points.kernels.is_some();
         let start = Start {
             t: *t0,
             q: &start.q,
@@ -82,11 +91,11 @@ impl<'a> GaussStepper<'a> {
             z: start.z,
             structure: *structure,
             is_hamiltonian: false,
-            by_points: true,
-            is_separable: false,
+            by_points: !in_registers,
+            is_separable: in_registers && is_separable(&**system, structure),
             depends_on_action: depends_on_action(&**system, structure),
         };
-        Self::of(Box::new(ByPoints(system.clone())), &start, stages, h, options)
+        Self::of(Box::new(points), &start, stages, h, options)
     }
 
     /// A stepper of a system from its start, with a valid number of stages and a valid step.

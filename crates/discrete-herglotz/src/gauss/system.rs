@@ -1,18 +1,22 @@
 //! A mechanical system as collocation sees it: its number of coordinates is known at run time, and vectors are slices.
 
 mod by_points;
+mod kernels;
+mod over_slices;
 
 pub(crate) use by_points::ByPoints;
+pub(crate) use kernels::{Coordinates, InRegisters, KernelsOf, SharedKernels, add_force, few_coordinates, zeros};
+pub(crate) use over_slices::OverSlices;
 
 use crate::StepError;
 use crate::gauss::curve::SampleKernel;
 use crate::gauss::routes::general::GeneralKernel;
 use crate::gauss::routes::hamiltonian::HamiltonianKernel;
 use crate::gauss::routes::separable::SeparableKernel;
-use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::stages::curvature::curvature;
 use crate::integration::{AtState, at_state};
 use crate::numbers::registers::Stages;
+use crate::system::applied_force::AppliedForce;
 use crate::system::mass_matrix::{BLOCK, mass_matrix};
 use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::{DMatrix, SVector};

@@ -3,7 +3,8 @@
 use crate::integration::{at_state, force_defect};
 use crate::theory::legendre_inverse;
 use crate::{
-    AtState, AtSwitch, Components, ForceKind, Point, SecondDerivatives, State, StepError, System, TypedSystem, Vector,
+    AtState, AtSwitch, Components, ForceDerivatives, ForceKind, Point, SecondDerivatives, State, StepError, System,
+    TypedSystem, Vector,
 };
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::switching::Control;
@@ -48,6 +49,12 @@ impl<const N: usize> System for OfTyped<'_, N> {
     }
     fn gradient(&self, t: f64, x: &Point) -> Components {
         self.0.gradient(t, &x.fixed()).into()
+    }
+    fn applied_force(&self, t: f64, x: &Point) -> Vector {
+        self.0.applied_force(t, &x.fixed()).into()
+    }
+    fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
+        self.0.force_derivatives(t, &x.fixed())
     }
     fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives {
         (&self.0.hessian(t, &x.fixed())).into()

@@ -166,14 +166,14 @@ impl<T: Scalar> Scalar for Pair<T> {
     }
 }
 
-/// Calls a method over as many registers at once as a formula is decoded for: one if L is compiled.
+/// Calls a method over as many registers at once as a formula is decoded for: one if L is compiled, not interpreted.
 macro_rules! over_registers {
-    ($this:ident.$method:ident($($argument:expr),*); $l:ident, $s:ident, $left:expr) => {{
+    ($this:ident.$method:ident($($argument:expr),*); $interpreted:expr, $s:ident, $left:expr) => {{
         use $crate::numbers::{lanes::Lanes, pair};
         let left = $left;
-        if const { $l::HINTS.interpreted && pair::by_four::<$s>() } && left >= 4 {
+        if const { $interpreted && pair::by_four::<$s>() } && left >= 4 {
             $this.$method::<$s, pair::Four<$s>>($($argument),*)
-        } else if const { $l::HINTS.interpreted && pair::by_two::<$s>() } && left >= 2 {
+        } else if const { $interpreted && pair::by_two::<$s>() } && left >= 2 {
             $this.$method::<$s, pair::Two<$s>>($($argument),*)
         } else {
             $this.$method::<$s, Lanes<$s>>($($argument),*)

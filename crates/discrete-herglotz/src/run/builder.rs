@@ -235,9 +235,14 @@ impl<'p> Run<'p, '_> {
 }
 
 impl<'a> SystemProblem<'a> {
+    fn run<'p, 'o>(&'p self) -> Run<'p, 'o> {
+        let switches = self.system.hints().switching_functions;
+        Run::of(self, self.clone(), switches.then(|| Arc::new(CollocationByPoints) as Collocation<'p>))
+    }
+
     /// A run of the problem with contact Gauss collocation.
     pub fn by<'p, 'o>(&'p self, integrator: GaussCollocation) -> Run<'p, 'o> {
-        Run::of(self, self.clone(), None).by(integrator)
+        self.run().by(integrator)
     }
 
     /// A run with given steps of contact Gauss collocation with eight stages.
@@ -247,7 +252,7 @@ impl<'a> SystemProblem<'a> {
 
     /// A run to a requested relative error of (q, p) and v.
     pub fn accuracy<'p, 'o>(&'p self, wanted: f64) -> Run<'p, 'o> {
-        Run::of(self, self.clone(), None).accuracy(wanted)
+        self.run().accuracy(wanted)
     }
 }
 

@@ -4,7 +4,6 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
-use crate::gauss::stages::applied_force::AppliedForce;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::integration::OfTyped;
 use crate::integration::depends_on_action;
@@ -12,6 +11,7 @@ use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use crate::sensitivity::fixed_stages::FixedStages;
 use crate::sensitivity::step_maps::StepMaps;
+use crate::system::applied_force::AppliedForce;
 use crate::{Problem, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::support::{KernelDual, linear};

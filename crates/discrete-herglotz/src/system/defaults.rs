@@ -10,10 +10,13 @@ use contact_geom::{Defect, Defects, GeometryError, nalgebra::DVector};
 /// The distance of two times, relative to their size, of the difference quotient for `L_vt`.
 const TIME_DIFFERENCE: f64 = 1e-5;
 
-/// The Herglotz vector field `(v, a, L)` with the rate `L_z`: `W a = L_q + L_z L_v - L_vt - L_vq v - L_vz L`, where `L_vt`
+/// The Herglotz vector field `(v, a, L)` with the rate `L_z`: `W a = L_q + f + L_z L_v - L_vt - L_vq v - L_vz L`, where `L_vt`
 /// is a difference quotient.
 pub(super) fn rates(system: &(impl System + ?Sized), t: f64, x: &Point) -> Result<(Components, f64), GeometryError> {
-    let (l, g, h) = (system.value(t, x), system.gradient(t, x), system.hessian(t, x));
+    let (l, mut g, h) = (system.value(t, x), system.gradient(t, x), system.hessian(t, x));
+    if system.hints().forced {
+        g.x += system.applied_force(t, x);
+    }
     let dt = TIME_DIFFERENCE * (1.0 + t.abs());
     let [after, before] = [t + dt, t - dt].map(|t| system.gradient(t, x).y);
     let mut a = DVector::from_fn(x.q.len(), |i, _| {
@@ -82,7 +85,10 @@ pub(super) fn at_state(
     guess: &[f64],
 ) -> Result<AtState, StepError> {
     let x = system.legendre_inverse(t, state, guess)?;
-    let (l, g) = (system.value(t, &x), system.gradient(t, &x));
+    let (l, mut g) = (system.value(t, &x), system.gradient(t, &x));
+    if system.hints().forced {
+        g.x += system.applied_force(t, &x);
+    }
     Ok(AtState { x, l, force: g.x, rate: g.z })
 }
 

@@ -1,6 +1,8 @@
 //! The border to the systems of a user.
 
-use super::{Components, Point, SecondDerivatives, State, System, Vector};
+use super::{
+    AtSwitch, Components, ForceDerivatives, ForceKind, Kernels, Point, SecondDerivatives, State, System, Vector,
+};
 use crate::StepError;
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Hints, Structure};
@@ -24,22 +26,82 @@ impl<'a> Guarded<'a> {
     }
 }
 
+impl Guarded<'_> {
+    /// What happens at a switch: a state of another length, or a panic, is a state that is not finite.
+    fn replacement(&self, of: impl FnOnce() -> AtSwitch) -> AtSwitch {
+        let n = self.n;
+        let fits = |at: &AtSwitch| match at {
+            AtSwitch::Replace { to, .. } => to.q.len() == n && to.v.len() == n,
+            AtSwitch::Continue => true,
+        };
+        let none = || Vector::repeat(n, f64::NAN);
+        self.checked(of, fits, || AtSwitch::Replace { to: Point { q: none(), v: none(), z: f64::NAN }, factor: None })
+    }
+}
+
 impl System for Guarded<'_> {
     fn dimension(&self) -> usize {
         self.n
     }
     fn hints(&self) -> Hints {
-        let proved = self.checked(|| self.system.hints().proved, |_| true, || false);
-        Hints { proved, ..Hints::NONE }
+        let of = self.checked(|| self.system.hints(), |_| true, || Hints::NONE);
+        let forced = self.has_force();
+        Hints { proved: of.proved, switching_functions: of.switching_functions, forced, ..Hints::NONE }
     }
-    /// A proved structure, as far as collocation point by point uses it. Otherwise the claim that W is constant, which is
-    /// verified.
+    /// A proved structure, as far as its routes use it. Otherwise the claim that W is constant, which is verified.
     fn structure(&self) -> Structure {
         let claimed = self.checked(|| self.system.structure(), |_| true, Structure::default);
         match self.hints().proved {
+            true if self.kernels().is_some() => claimed,
             true => Structure { separable: false, quadratic: false, ..claimed },
             false => Structure { constant_mass: claimed.constant_mass, ..Structure::default() },
         }
+    }
+    fn force_kind(&self) -> ForceKind {
+        self.checked(|| self.system.force_kind(), |_| true, || ForceKind::General)
+    }
+    fn has_force(&self) -> bool {
+        self.checked(|| self.system.has_force(), |_| true, || false)
+    }
+    fn applied_force(&self, t: f64, x: &Point) -> Vector {
+        let n = self.n;
+        self.checked(|| self.system.applied_force(t, x), |f| f.len() == n, || Vector::repeat(n, f64::NAN))
+    }
+    fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
+        let n = self.n;
+        let fits = |of: &Option<ForceDerivatives>| {
+            of.as_ref().is_some_and(|of| {
+                [&of.q, &of.v].iter().all(|m| m.shape() == (n, n)) && of.value.len() == n && of.z.len() == n
+            })
+        };
+        let none = || {
+            let (matrix, line) = (|| DMatrix::repeat(n, n, f64::NAN), || Vector::repeat(n, f64::NAN));
+            Some(ForceDerivatives { value: line(), q: matrix(), v: matrix(), z: line() })
+        };
+        if !self.has_force() {
+            return None;
+        }
+        self.checked(|| self.system.force_derivatives(t, x), fits, none)
+    }
+    fn kernels(&self) -> Option<Kernels> {
+        self.checked(|| self.system.kernels(), |_| true, || None)
+    }
+    fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
+        let first = values.len();
+        let filled = catch_unwind(AssertUnwindSafe(|| self.system.switching_functions(t, x, values))).is_ok();
+        if !filled || values.len() < first {
+            values.resize(values.len().max(first), f64::NAN);
+            values[first..].fill(f64::NAN);
+        }
+    }
+    fn at_switch(&self, index: usize, t: f64, x: &Point, rising: bool) -> AtSwitch {
+        self.replacement(|| self.system.at_switch(index, t, x, rising))
+    }
+    fn at_accumulation(&self, index: usize, t: f64, x: &Point) -> AtSwitch {
+        self.replacement(|| self.system.at_accumulation(index, t, x))
+    }
+    fn breaks(&self) -> &[f64] {
+        self.checked(|| self.system.breaks(), |_| true, || &[])
     }
     fn value(&self, t: f64, x: &Point) -> f64 {
         self.checked(|| self.system.value(t, x), |_| true, || f64::NAN)

@@ -1,15 +1,20 @@
 //! Mechanical systems as runs, checks and searches see them: values and derivatives in `f64`, behind one interface
 //! without the Lagrangian and without the number of coordinates. All that stands above it is compiled once.
 
+pub(crate) mod applied_force;
 mod defaults;
 mod guarded;
+mod kernels;
 pub(crate) mod mass_matrix;
 mod points;
+pub(crate) mod products;
 mod typed;
 mod vector;
 
 pub(crate) use guarded::Guarded;
+pub use kernels::Kernels;
 pub use points::{Components, Point, SecondDerivatives, State};
+
 pub use typed::TypedSystem;
 pub use vector::Vector;
 
@@ -58,12 +63,27 @@ pub enum ForceKind {
     General,
 }
 
+/// An applied force at a point, with its derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForceDerivatives {
+    /// The force.
+    pub value: Vector,
+    /// Its derivatives in q: the rows belong to the components of the force.
+    pub q: DMatrix<f64>,
+    /// Its derivatives in v.
+    pub v: DMatrix<f64>,
+    /// Its derivatives in z.
+    pub z: Vector,
+}
+
 /// A mechanical system: its Lagrangian `L(t, q, v, z)` in n coordinates, the derivatives of L at points in `f64`, and its
 /// switching functions. Vectors have length n.
 ///
 /// A system of a user's own has the functions without a default: the number of coordinates, the value and its first and
 /// second derivatives; see [`SystemProblem`](crate::SystemProblem). Of the others, [`structure`](Self::structure) may claim
-/// that W is constant, and [`hints`](Self::hints) may state that the whole structure is proved.
+/// that W is constant, and [`hints`](Self::hints) may state that the whole structure is proved. An applied force is
+/// [`has_force`](Self::has_force) with [`applied_force`](Self::applied_force) and
+/// [`force_derivatives`](Self::force_derivatives).
 ///
 /// The kernels of integrators are compiled for each Lagrangian. All else takes a `&dyn System`: the plan and the loop of
 /// a run, its checks, the search of the steps for an accuracy, and steps that end on kinks and jumps.
@@ -83,7 +103,7 @@ pub trait System {
 
     /// What may be relied on about the applied force.
     fn force_kind(&self) -> ForceKind {
-        ForceKind::None
+        if self.has_force() { ForceKind::General } else { ForceKind::None }
     }
 
     /// Whether there is an applied force.
@@ -99,6 +119,25 @@ pub trait System {
 
     /// The second partial derivatives in `(q, v, z)`.
     fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives;
+
+    /// The applied force `f(t, q, v, z)`; 0 by default.
+    fn applied_force(&self, t: f64, x: &Point) -> Vector {
+        let _ = t;
+        Vector::zeros(x.q.len())
+    }
+
+    /// The applied force with its derivatives; `None`, the default, for a system without a force.
+    fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
+        let _ = (t, x);
+        None
+    }
+
+    /// Kernels of collocation, which evaluate the system at several stages at once in SIMD registers;
+    /// [`Kernels::of`](crate::Kernels::of) makes them for a system that is written over scalars. `None`, the default:
+    /// the system is evaluated at one stage after another.
+    fn kernels(&self) -> Option<Kernels> {
+        None
+    }
 
     /// `W = L_vv` alone.
     fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {

@@ -2,6 +2,7 @@
 
 use crate::Vector;
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::{ChartVector, GeometryError, Hessian, PhasePoint, VelocityPoint};
 
 /// A state `(q, p, z)` of a motion: a point of T\*Q x R. It is a [`PhasePoint`] whose number of coordinates is known at
@@ -111,6 +112,56 @@ macro_rules! of_chart {
 of_chart!(State { q, p }, PhasePoint { q, p });
 of_chart!(Point { q, v }, VelocityPoint { q, v });
 of_chart!(Components { x, y }, ChartVector { x, y });
+
+impl Components {
+    /// The components 0, for n coordinates.
+    #[inline]
+    pub fn zeros(n: usize) -> Self {
+        Components { x: Vector::zeros(n), y: Vector::zeros(n), z: 0.0 }
+    }
+
+    /// The same component everywhere, for n coordinates.
+    #[inline]
+    pub(crate) fn repeat(n: usize, x: f64) -> Self {
+        Components { x: Vector::repeat(n, x), y: Vector::repeat(n, x), z: x }
+    }
+
+    /// The sum.
+    #[inline]
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        self.x += &other.x;
+        self.y += &other.y;
+        self.z += other.z;
+        self
+    }
+
+    /// The difference.
+    #[inline]
+    pub(crate) fn minus(mut self, other: &Self) -> Self {
+        self.x -= &other.x;
+        self.y -= &other.y;
+        self.z -= other.z;
+        self
+    }
+
+    /// The product with a number.
+    #[inline]
+    pub(crate) fn scale(&self, factor: f64) -> Self {
+        Components { x: &self.x * factor, y: &self.y * factor, z: self.z * factor }
+    }
+
+    /// The sum of the products of the components.
+    #[inline]
+    pub fn dot(&self, other: &Self) -> f64 {
+        self.x.dot(&other.x) + self.y.dot(&other.y) + self.z * other.z
+    }
+
+    /// The largest absolute component; NaN where a component is NaN.
+    #[inline]
+    pub(crate) fn max_abs_or_nan(&self) -> f64 {
+        max_abs_or_nan(self.x.iter().chain(&self.y).copied().chain([self.z]))
+    }
+}
 
 impl State {
     /// Checks that every coordinate is finite.

@@ -1,6 +1,8 @@
 //! Mechanical systems with a number of coordinates that is known at compile time.
 
-use contact_geom::nalgebra::{SMatrix, SVector};
+use super::ForceDerivatives;
+use super::applied_force::AppliedForce;
+use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
     ChartVector, Defect, Defects, Derivatives, ForceStructure, GeometryError, Hessian, Hints, Lagrangian, PhasePoint,
@@ -45,6 +47,9 @@ pub trait TypedSystem<const N: usize> {
 
     /// The applied force `f(t, q, v, z)`.
     fn applied_force(&self, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N>;
+
+    /// The applied force with its derivatives; `None` if there is none.
+    fn force_derivatives(&self, t: f64, x: &VelocityPoint<N>) -> Option<ForceDerivatives>;
 
     /// The second partial derivatives in `(q, v, z)`.
     fn hessian(&self, t: f64, x: &VelocityPoint<N>) -> Hessian<N>;
@@ -120,6 +125,12 @@ impl<L: Lagrangian<N>, const N: usize> TypedSystem<N> for L {
     }
     fn applied_force(&self, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N> {
         Lagrangian::applied_force(self, t, x)
+    }
+    fn force_derivatives(&self, t: f64, x: &VelocityPoint<N>) -> Option<ForceDerivatives> {
+        let applied = AppliedForce::of(self, t, x)?;
+        let matrix = |m: &SMatrix<f64, N, N>| DMatrix::from_column_slice(N, N, m.as_slice());
+        let (q, v) = (matrix(&applied.q), matrix(&applied.v));
+        Some(ForceDerivatives { value: applied.value.into(), q, v, z: applied.z.into() })
     }
     fn hessian(&self, t: f64, x: &VelocityPoint<N>) -> Hessian<N> {
         Derivatives::hessian(self, t, x)

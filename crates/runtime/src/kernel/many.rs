@@ -9,18 +9,17 @@ use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl,
 };
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{Hints, Structure};
+use contact_geom::{Hints, ScalarSystem, Slopes, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{
-    AnyIntegrator, Components, GaussCollocation, InputError, Point, ResumeState, Run, SecondDerivatives, State, System,
-    SystemProblem, Vector, ensemble::Tally,
+    AnyIntegrator, AtSwitch, Components, ForceDerivatives, ForceKind, GaussCollocation, InputError, Kernels, Point,
+    ResumeState, Run, SecondDerivatives, State, System, SystemProblem, Vector, ensemble::Tally,
 };
 use formula_lagrangian::{Formula, FormulaDerivatives, FormulaError};
 use std::sync::Arc;
 
-/// A smooth formula without forces, constraints and resets, in any number of coordinates: it runs by contact Gauss
-/// collocation, which evaluates it at one point at a time.
-pub(super) struct ManyCoordinates(FormulaDerivatives);
+/// A formula without constraints and impacts, in any number of coordinates: it runs by contact Gauss collocation.
+pub(super) struct ManyCoordinates(Arc<FormulaDerivatives>);
 
 /// What a formula with many coordinates has no kernel for.
 fn few(what: &'static str) -> RuntimeError {
@@ -30,14 +29,11 @@ fn few(what: &'static str) -> RuntimeError {
 /// The kernel of a formula.
 pub(super) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
     let derivatives = formula.derivatives()?;
-    let what = match () {
-        () if formula.constraints() > 0 => "constraints",
-        () if formula.has_forces() => "forces",
-        () if formula.resets() > 0 => "resets and impacts",
-        () if !derivatives.is_smooth() => "kinks and jumps",
-        () => return Ok(Arc::new(ManyCoordinates(derivatives))),
-    };
-    Err(few(what))
+    match () {
+        () if formula.constraints() > 0 => Err(few("constraints")),
+        () if derivatives.impacts() > 0 => Err(few("impacts")),
+        () => Ok(Arc::new(ManyCoordinates(Arc::new(derivatives)))),
+    }
 }
 
 impl System for ManyCoordinates {
@@ -45,21 +41,75 @@ impl System for ManyCoordinates {
         self.0.formula().dimension()
     }
     fn hints(&self) -> Hints {
-        Hints { proved: true, ..Hints::NONE }
+        let switching_functions = !self.0.is_smooth() || self.0.resets() > 0;
+        Hints { proved: true, switching_functions, forced: self.0.has_force(), ..Hints::NONE }
     }
     fn structure(&self) -> Structure {
         *self.0.proved()
     }
+    fn force_kind(&self) -> ForceKind {
+        match () {
+            () if !self.0.has_force() => ForceKind::None,
+            () if self.0.force_is_of_positions() => ForceKind::OfPositions,
+            () if self.0.force_is_drag() => ForceKind::Drag,
+            () => ForceKind::General,
+        }
+    }
+    fn has_force(&self) -> bool {
+        self.0.has_force()
+    }
+    fn applied_force(&self, t: f64, x: &Point) -> Vector {
+        let mut force = Vector::zeros(x.q.len());
+        self.0.applied_force::<f64, 0>(t, &x.q, &x.v, x.z, &mut force);
+        force
+    }
+    fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
+        if !self.0.has_force() {
+            return None;
+        }
+        let n = x.q.len();
+        let (square, zero) = (|| DMatrix::zeros(n, n), Vector::zeros(n));
+        let mut to = ForceDerivatives { value: self.applied_force(t, x), q: square(), v: square(), z: zero.clone() };
+        let at = (&x.q[..], &x.v[..], x.z);
+        for j in 0..n {
+            let unit = Vector::from_fn(n, |i| f64::from(u8::from(i == j)));
+            self.0.force_along(t, at, (&unit, &zero, 0.0), to.q.column_mut(j).as_mut_slice());
+            self.0.force_along(t, at, (&zero, &unit, 0.0), to.v.column_mut(j).as_mut_slice());
+        }
+        self.0.force_along(t, at, (&zero, &zero, 1.0), &mut to.z);
+        Some(to)
+    }
+    fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
+        self.0.switching_functions(t, &x.q, &x.v, x.z, values);
+    }
+    fn at_switch(&self, index: usize, t: f64, x: &Point, rising: bool) -> AtSwitch {
+        let mut to = x.clone();
+        match self.0.reset(index, rising, t, (&mut to.q, &mut to.v, &mut to.z)) {
+            true => AtSwitch::Replace { to, factor: None },
+            false => AtSwitch::Continue,
+        }
+    }
+    fn at_accumulation(&self, index: usize, t: f64, x: &Point) -> AtSwitch {
+        let mut to = x.clone();
+        match self.0.rest(index, t, (&mut to.q, &mut to.v, &mut to.z)) {
+            true => AtSwitch::Replace { to, factor: None },
+            false => AtSwitch::Continue,
+        }
+    }
+    fn breaks(&self) -> &[f64] {
+        self.0.breaks()
+    }
+    fn kernels(&self) -> Option<Kernels> {
+        Some(Kernels::of(self.0.clone()))
+    }
     fn value(&self, t: f64, x: &Point) -> f64 {
-        self.0.value(t, &x.q, &x.v, x.z)
+        self.0.value::<f64, 0>(t, &x.q, &x.v, x.z)
     }
     fn gradient(&self, t: f64, x: &Point) -> Components {
-        let n = x.q.len();
-        let mut all = vec![0.0; 2 * n + 1];
-        self.0.with_gradient(t, &x.q, &x.v, x.z, &mut all);
-        let (q, rest) = all.split_at(n);
-        let (v, z) = rest.split_at(n);
-        Components { x: q.into(), y: v.into(), z: z.first().copied().unwrap_or(f64::NAN) }
+        let mut to = Components::zeros(x.q.len());
+        let slopes = Slopes { q: &mut to.x, v: &mut to.y, z: &mut to.z };
+        self.0.with_gradient::<f64, 0>(t, &x.q, &x.v, x.z, slopes);
+        to
     }
     fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives {
         let n = x.q.len();
@@ -71,7 +121,10 @@ impl System for ManyCoordinates {
         to
     }
     fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {
-        self.0.mass_matrix(t, &x.q, &x.v, x.z)
+        let n = x.q.len();
+        let mut w = DMatrix::zeros(n, n);
+        self.0.mass_matrix::<f64, 0>(t, &x.q, &x.v, x.z, w.as_mut_slice());
+        w
     }
 }
 
@@ -83,10 +136,10 @@ impl Observed for ManyCoordinates {
         self.0.constant_rate()
     }
     fn resets(&self) -> usize {
-        0
+        self.0.resets()
     }
-    fn reset_of(&self, _index: usize) -> Option<usize> {
-        None
+    fn reset_of(&self, index: usize) -> Option<usize> {
+        self.0.reset_of(index)
     }
     fn velocity_or_momentum(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector> {
         let guess = Vector::from_fn(state.q.len(), |i| guess.get(i).copied().unwrap_or(0.0));
@@ -97,7 +150,13 @@ impl Observed for ManyCoordinates {
 impl ManyCoordinates {
     fn problem(&self, motion: &Motion) -> Result<SystemProblem<'_>, RuntimeError> {
         let start = initial_state(self.0.formula(), &motion.start)?;
-        Ok(SystemProblem::new(self, motion.start.t, start)?)
+        let problem = SystemProblem::new(self, motion.start.t, start)?;
+        let force = self.applied_force(motion.start.t, problem.start());
+        let names = self.0.formula().coordinates();
+        match names.into_iter().zip(force.iter().copied()).find(|(_, value)| !value.is_finite()) {
+            Some((coordinate, value)) => Err(RuntimeError::ForceUndefined { coordinate, value }),
+            None => Ok(problem),
+        }
     }
 
     fn with_problem<'p, 'o>(
@@ -143,11 +202,11 @@ impl Kernel for ManyCoordinates {
     }
 
     fn is_smooth(&self) -> bool {
-        true
+        self.0.is_smooth()
     }
 
     fn has_force(&self) -> bool {
-        false
+        self.0.has_force()
     }
 
     fn symmetries(&self) -> Vec<FormulaSymmetry> {
@@ -155,9 +214,9 @@ impl Kernel for ManyCoordinates {
     }
 
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
-        let mut derivatives = self.0.clone();
+        let mut derivatives = (*self.0).clone();
         values.iter().try_for_each(|(name, value)| derivatives.set(name, *value))?;
-        Ok(Arc::new(ManyCoordinates(derivatives)))
+        Ok(Arc::new(ManyCoordinates(Arc::new(derivatives))))
     }
 
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
@@ -169,7 +228,7 @@ impl Kernel for ManyCoordinates {
         let mut no_monitor = ();
         let mut recorder = Recorder::new(self, motion, &mut no_monitor)?;
         let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        plan_of(&run, motion, self.0.formula(), false)
+        plan_of(&run, motion, self.0.formula(), self.0.has_force())
     }
 
     fn run(

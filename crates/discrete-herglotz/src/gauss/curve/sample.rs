@@ -7,7 +7,7 @@ use crate::gauss::curve::Curve;
 use crate::gauss::curve::between::Between;
 use crate::gauss::curve::comparison::Compare;
 use crate::gauss::resolution::defect_sample::DefectSample;
-use crate::gauss::system::{ByPoints, Typed};
+use crate::gauss::system::{ByPoints, Coordinates, InRegisters, Typed, add_force, few_coordinates, zeros};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
@@ -15,6 +15,7 @@ use crate::numbers::registers::{MAX_STAGES, Stages, blocks};
 use crate::{Point, System};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, vector};
+use contact_geom::{ScalarSystem, Slopes};
 use pulp::{Simd, WithSimd};
 
 /// The part of a defect sample that evaluates L.
@@ -33,9 +34,75 @@ impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
 
 impl SampleKernel for ByPoints<'_> {
     fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
+        if let Some(kernels) = &self.kernels {
+            return kernels.sample_defect(arch, curve, transformed, set);
+        }
         let mut sample = Sample::of(arch, curve, set);
-        sample.evaluate(&*self.0, curve);
+        sample.evaluate(&*self.system, curve);
         arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, set })
+    }
+}
+
+impl<F: ScalarSystem> SampleKernel for InRegisters<F> {
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
+        few_coordinates!(self, curve.q.len(), few => few.sample_defect(arch, curve, transformed, set), {
+            let mut sample = Sample::of(arch, curve, set);
+            arch.dispatch(EvaluateInRegisters { system: &*self.0, curve, sample: &mut sample });
+            arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, set })
+        })
+    }
+}
+
+/// The evaluation of a system over scalars at the sample points.
+struct EvaluateInRegisters<'b, F> {
+    system: &'b F,
+    curve: &'b Curve,
+    sample: &'b mut Sample,
+}
+
+impl<F: ScalarSystem> WithSimd for EvaluateInRegisters<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _simd: S) {
+        let (mut r, m) = (0, blocks::<S>(self.curve.s));
+        while r < m {
+            r = if const { by_two::<S>() } && r + 1 < m {
+                self.take::<S, Two<S>>(r)
+            } else {
+                self.take::<S, Lanes<S>>(r)
+            };
+        }
+    }
+}
+
+impl<F: ScalarSystem> EvaluateInRegisters<'_, F> {
+    /// Evaluates L at the points in the registers that T holds, from the r-th on; returns the index of the next register.
+    #[inline(always)]
+    fn take<S: Simd, T: Registers<S>>(&mut self, r: usize) -> usize {
+        let Sample { between, v, q, z, value, force, momentum, slope, .. } = &mut *self.sample;
+        let n = q.len();
+        let (mut at_q, mut at_v) = (Coordinates::<T>::new(), Coordinates::<T>::new());
+        for d in 0..n {
+            at_q.push(T::of(&q[d], r));
+            at_v.push(T::of(&v[d], r));
+        }
+        let (mut push, mut p, mut rate) = (zeros::<T>(n), zeros::<T>(n), T::zero());
+        let t = T::of(&between.points, r) * self.curve.h + self.curve.t;
+        let to = Slopes { q: &mut push, v: &mut p, z: &mut rate };
+        let l = self.system.with_gradient::<T, 0>(t, &at_q, &at_v, T::of(z, r), to);
+        if self.system.has_force() {
+            add_force(self.system, t, (&at_q, &at_v, T::of(z, r)), &mut push);
+        }
+        for i in 0..T::COUNT {
+            value.set(r + i, l.register(i));
+            for d in 0..n {
+                force[d].set(r + i, push[d].register(i));
+                momentum[d].set(r + i, p[d].register(i));
+            }
+            slope.set(r + i, rate.register(i));
+        }
+        r + T::COUNT
     }
 }
 
@@ -88,10 +155,14 @@ impl Sample {
     /// Evaluates L and its gradient at one point after another; the values at the last one are repeated in the padding.
     fn evaluate(&mut self, system: &dyn System, curve: &Curve) {
         let Sample { between, v, q, z, value, force, momentum, slope, .. } = self;
+        let forced = system.hints().forced;
         for i in 0..curve.s {
             let of = |stages: &[Stages]| stages.iter().map(|x| x.0[i]).collect();
             let (t, x) = (between.points.0[i] * curve.h + curve.t, Point { q: of(q), v: of(v), z: z.0[i] });
-            let (l, g) = (system.value(t, &x), system.gradient(t, &x));
+            let (l, mut g) = (system.value(t, &x), system.gradient(t, &x));
+            if forced {
+                g.x += system.applied_force(t, &x);
+            }
             let set = |to: &mut Stages, x: f64| to.0[i..if i + 1 == curve.s { MAX_STAGES } else { i + 1 }].fill(x);
             set(value, l);
             set(slope, g.z);

@@ -9,7 +9,7 @@ use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
 use crate::system::mass_matrix::MAX_BY_COLUMNS;
-use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
+use contact_geom::nalgebra::{DMatrix, DMatrixViewMut, DVectorViewMut, SMatrix, SVector};
 use contact_geom::{Structure, support::linear, vector};
 use pulp::Simd;
 
@@ -63,6 +63,28 @@ impl Mass {
             }
             for i in 0..N {
                 rows[i * N + j].set(r, column[i]);
+            }
+        }
+        true
+    }
+
+    /// The same for n coordinates, where n is known at run time, with W by columns.
+    #[inline(always)]
+    pub fn invert_slice<S: Simd>(&mut self, r: usize, n: usize, w: &[Lanes<S>]) -> bool {
+        let Mass::Stages(stored) = self else { return true };
+        let rows = &mut stored.rows[..n * n];
+        for j in 0..n {
+            let mut copy = [Lanes::<S>::splat(0.0); MAX_DIMENSION_IN_LANES * MAX_DIMENSION_IN_LANES];
+            copy[..n * n].copy_from_slice(w);
+            let mut column = [Lanes::<S>::splat(0.0); MAX_DIMENSION_IN_LANES];
+            column[j] = Lanes::splat(1.0);
+            let mut matrix = DMatrixViewMut::from_slice(&mut copy[..n * n], n, n);
+            let solved = linear::solve_in_kernel(&mut matrix, &mut DVectorViewMut::from_slice(&mut column[..n], n));
+            if solved.is_err() {
+                return false;
+            }
+            for i in 0..n {
+                rows[i * n + j].set(r, column[i]);
             }
         }
         true

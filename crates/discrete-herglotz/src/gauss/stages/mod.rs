@@ -1,6 +1,5 @@
 //! The stages of a collocation step: their equations, and the iterations that solve them.
 
-pub(crate) mod applied_force;
 pub(crate) mod changes;
 pub(crate) mod curvature;
 pub(crate) mod damped_newton;

@@ -39,7 +39,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for StageValues<'_, L, N> {
         let stages = At::<L, N> { lagrangian, t, times: &table.times, x: &x[..N], v };
         let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(s));
         while r < m {
-            r = over_registers!(stages.take(r, &mut values); L, S, m - r);
+            r = over_registers!(stages.take(r, &mut values); L::HINTS.interpreted, S, m - r);
         }
         values
     }

@@ -31,7 +31,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
         }
         let mut r = 0;
         while r < m {
-            r = over_registers!(self.take_gradients(lagrangian, t, r); L, S, m - r);
+            r = over_registers!(self.take_gradients(lagrangian, t, r); L::HINTS.interpreted, S, m - r);
         }
         0.0
     }

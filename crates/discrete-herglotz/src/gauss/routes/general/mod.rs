@@ -24,8 +24,7 @@ use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use acceptance::FinishStep;
-use kernel::GivenStages;
-pub(crate) use kernel::{GeneralKernel, InTransformedTime};
+pub(crate) use kernel::{GeneralKernel, GivenStages, InTransformedTime};
 use start::StartStep;
 use vectors::{StageVectors, Vectors};
 

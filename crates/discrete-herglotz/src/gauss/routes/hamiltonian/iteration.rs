@@ -117,7 +117,7 @@ impl<L: Lagrangian<N>, const N: usize> Iteration<'_, L, N> {
         let m = blocks::<S>(self.table.s);
         let mut r = 0;
         while r < m {
-            r = over_registers!(self.take_gradients(t, r); L, S, m - r);
+            r = over_registers!(self.take_gradients(t, r); L::HINTS.interpreted, S, m - r);
         }
     }
 

@@ -7,30 +7,24 @@ use crate::gauss::routes::separable::vectors::Parts;
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::stage_values::{CondensedStages, StageValues};
 use crate::gauss::system::Typed;
-use crate::gauss::tables::condensed::Preconditioned;
+use crate::gauss::tables::condensed::{Condensed, Preconditioned};
 use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
-use crate::numbers::lanes::Lanes;
+use crate::numbers::lanes::{Lanes, token};
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{Stages, blocks};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, vector};
 use pulp::{Simd, WithSimd};
 
-/// What is compiled for each Lagrangian. The defaults are for systems that take other routes.
+/// The part of a condensed step that evaluates L.
 pub(crate) trait SeparableKernel {
     /// Solves the stage equations of a step by fixed-point iteration, or by simplified Newton iteration, and evaluates
     /// `L - gamma z` at the solution if z is advanced.
-    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated {
-        let _ = (arch, run, start);
-        Iterated { outcome: IterationOutcome::NonFinite, iteration: FixedPointIteration::default(), change: f64::NAN }
-    }
+    fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated;
 
     /// `L(t, q, v, 0)` at the stages of a solved step, and the velocities there.
-    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages {
-        let _ = (arch, solved);
-        Stages::ZERO
-    }
+    fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages;
 }
 
 /// The start of an iteration; its initial guess is `rest`, or is extrapolated from it.
@@ -56,14 +50,21 @@ pub(crate) struct Iterated {
     pub change: f64,
 }
 
+impl Iterated {
+    /// The result for a system that takes other routes.
+    pub fn failed() -> Self {
+        let (outcome, iteration) = (IterationOutcome::NonFinite, FixedPointIteration::default());
+        Iterated { outcome, iteration, change: f64::NAN }
+    }
+}
+
 /// A Lagrangian that is given by a contact Hamiltonian has a route of its own, so that nothing is compiled for it here.
 impl<L: Lagrangian<N>, const N: usize> SeparableKernel for Typed<'_, L, N> {
     fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated {
         if const { L::HINTS.hamiltonian } {
-            let (outcome, iteration) = (IterationOutcome::NonFinite, FixedPointIteration::default());
-            return Iterated { outcome, iteration, change: f64::NAN };
+            return Iterated::failed();
         }
-        arch.dispatch(Iterate::<L, N> { lagrangian: self.0, run, start })
+        arch.dispatch(Iterate { system: self, run, start })
     }
 
     fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages {
@@ -74,19 +75,40 @@ impl<L: Lagrangian<N>, const N: usize> SeparableKernel for Typed<'_, L, N> {
     }
 }
 
-/// The kernel of [`SeparableKernel::iterate`].
-struct Iterate<'a, L, const N: usize> {
-    lagrangian: &'a L,
-    run: &'a mut Separable,
-    start: IterationStart,
+/// A system whose forces are evaluated at the stages of a condensed step.
+pub(crate) trait ForceSystem {
+    /// The number of coordinates.
+    fn coordinates(&self) -> usize;
+
+    /// Evaluates the forces at all stages, and stores the accelerations and `rest`. Returns the largest change of `rest` and
+    /// the largest of its terms.
+    fn take_all_forces<S: Simd>(&self, stages: &mut StageForces<'_>, m: usize) -> [Lanes<S>; 2];
+
+    /// `L(t, q, v, 0)` at the stages of a solved step from the velocities `v`.
+    fn solved_values<S: Simd>(&self, solved: Solution<'_>, v: &[CompensatedSum]) -> Stages;
 }
 
-impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
+/// A solved condensed step from the time t: its accelerations and positions.
+pub(crate) struct Solution<'a> {
+    pub table: &'a Condensed,
+    pub t: f64,
+    pub a: &'a [Stages],
+    pub x: &'a [Stages],
+}
+
+/// The kernel of [`SeparableKernel::iterate`].
+pub(super) struct Iterate<'a, F> {
+    pub system: &'a F,
+    pub run: &'a mut Separable,
+    pub start: IterationStart,
+}
+
+impl<F: ForceSystem> WithSimd for Iterate<'_, F> {
     type Output = Iterated;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Iterated {
-        let Iterate { lagrangian, run, start: IterationStart { t, solved, predicts, weight } } = self;
+    fn with_simd<S: Simd>(self, _simd: S) -> Iterated {
+        let Iterate { system, run, start: IterationStart { t, solved, predicts, weight } } = self;
         let Separable {
             arch,
             table,
@@ -102,10 +124,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
             evaluations,
             ..
         } = run;
-        let (s, m, state) = (table.s, blocks::<S>(table.s), [&q[..N], &v[..N]]);
-        let Parts { left, rest, x, a, base } = vectors.parts(N);
+        let n = system.coordinates();
+        let (s, m, state) = (table.s, blocks::<S>(table.s), [&q[..n], &v[..n]]);
+        let Parts { left, rest, x, a, base } = vectors.parts(n);
         let (times, inverse_mass, kappa) = (&table.times, inverse_mass.as_ref(), left.kappa);
-        let mut stages = StageForces::<L, N> { lagrangian, times, t, kappa, inverse_mass, x, rest, a };
+        let mut stages = StageForces { times, t, kappa, inverse_mass, x, rest, a };
         let mut newton = newton.as_deref_mut();
         if predicts {
             for rest in stages.rest.iter_mut() {
@@ -126,8 +149,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
         let (mut small, mut again) = (at_once.then_some(weight), true);
         *far &= !tails;
         // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
-        let mut iteration =
-            FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
+        let mut iteration = FixedPointIteration::until(1.0 / 16.0, if n == 1 { 1.0 / 256.0 } else { 1.0 / 64.0 });
         let (outcome, change) = loop {
             if again {
                 begin::<S>(left, s, state, stages.rest, base, small);
@@ -139,12 +161,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
                 aside = false;
                 begin::<S>(left, s, state, stages.rest, base, small);
             }
-            let mut most = [Lanes::<S>::splat(0.0); 2];
-            let mut r = 0;
-            while r < m {
-                r = over_registers!(stages.take_forces(r, &mut most); L, S, m - r);
-            }
-            let [change, size] = most;
+            let [change, size] = system.take_all_forces::<S>(&mut stages, m);
             *evaluations += s as u64;
             let (mut change, size) = (change.reduce_max(), size.reduce_max());
             if solved {
@@ -158,7 +175,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
                     (due, *far) = (true, true)
                 }
                 IterationOutcome::Continue => (again, due) = (again || due, false),
-                outcome if const { N == 1 } && iteration.ends_with_secant() => {
+                outcome if n == 1 && iteration.ends_with_secant() => {
                     let iterate = [&mut stages.x[0], &mut stages.rest[0]];
                     store_values::<S>(left, s, &base[0], iterate, before, true);
                     let kappa = Lanes::<S>::splat(left.kappa);
@@ -169,7 +186,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
                 }
                 outcome => break (outcome, change),
             }
-            if const { N == 1 } && newton.is_none() {
+            if n == 1 && newton.is_none() {
                 let extrapolation = iteration.secant_step(change / size);
                 let iterate = [&mut stages.x[0], &mut stages.rest[0]];
                 store_values::<S>(left, s, &base[0], iterate, before, extrapolation);
@@ -182,61 +199,79 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Iterate<'_, L, N> {
             }
         }
         if outcome == IterationOutcome::Done && *wants_z {
-            let mut v0 = [0.0; N];
-            copy_values(&v[..N], &mut v0);
-            // On the stack, which is faster than memory of the run.
-            let mut velocities = [Stages::ZERO; N];
-            let solved = CondensedStages { table, t, v0: &v0, a: stages.a, x: stages.x, v: &mut velocities };
-            *values = StageValues::<L, N> { lagrangian, solved }.with_simd(simd);
+            *values = system.solved_values::<S>(Solution { table, t, a: stages.a, x: stages.x }, &v[..n]);
         }
         Iterated { outcome, iteration, change }
     }
 }
 
-/// The forces at the stages of a step from the time t, at the positions `x`.
-struct StageForces<'a, L, const N: usize> {
-    lagrangian: &'a L,
-    times: &'a Stages,
-    t: f64,
+/// The stages of a step from the time t, at the positions `x`.
+pub(crate) struct StageForces<'a> {
+    pub times: &'a Stages,
+    pub t: f64,
     kappa: f64,
     inverse_mass: Option<&'a DMatrix<f64>>,
-    x: &'a mut [Stages],
+    pub x: &'a mut [Stages],
     rest: &'a mut [Stages],
     a: &'a mut [Stages],
 }
 
-impl<L: Lagrangian<N>, const N: usize> StageForces<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> ForceSystem for Typed<'_, L, N> {
+    #[inline(always)]
+    fn coordinates(&self) -> usize {
+        N
+    }
+
+    #[inline(always)]
+    fn take_all_forces<S: Simd>(&self, stages: &mut StageForces<'_>, m: usize) -> [Lanes<S>; 2] {
+        let mut most = [Lanes::<S>::splat(0.0); 2];
+        let (mut forces, mut r) = (Forces { lagrangian: self.0, stages }, 0);
+        while r < m {
+            r = over_registers!(forces.take(r, &mut most); L::HINTS.interpreted, S, m - r);
+        }
+        most
+    }
+
+    #[inline(always)]
+    fn solved_values<S: Simd>(&self, solved: Solution<'_>, v: &[CompensatedSum]) -> Stages {
+        let mut v0 = [0.0; N];
+        copy_values(v, &mut v0);
+        // On the stack, which is faster than memory of the run.
+        let mut velocities = [Stages::ZERO; N];
+        let Solution { table, t, a, x } = solved;
+        let solved = CondensedStages { table, t, v0: &v0, a, x, v: &mut velocities };
+        StageValues::<L, N> { lagrangian: self.0, solved }.with_simd(token::<S>())
+    }
+}
+
+/// The forces of a Lagrangian at the stages of a step.
+struct Forces<'f, 'a, L, const N: usize> {
+    lagrangian: &'f L,
+    stages: &'f mut StageForces<'a>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> Forces<'_, '_, L, N> {
     /// Evaluates the forces at the blocks of stages that T holds, from the r-th on; returns the index of the next
     /// block.
     #[inline(always)]
-    fn take_forces<S: Simd, T: Registers<S>>(&mut self, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
-        let x = VelocityPoint { q: vector!(|d| T::of(&self.x[d], r)), v: vector!(|_| T::zero()), z: T::zero() };
-        let force = self.lagrangian.force(T::of(self.times, r) + self.t, &x);
+    fn take<S: Simd, T: Registers<S>>(&mut self, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
+        let StageForces { x, times, t, .. } = &*self.stages;
+        let x = VelocityPoint { q: vector!(|d| T::of(&x[d], r)), v: vector!(|_| T::zero()), z: T::zero() };
+        let force = self.lagrangian.force(T::of(times, r) + *t, &x);
         for i in 0..T::COUNT {
-            self.take(r + i, vector!(|d| force[d].register(i)), most);
+            let a = self.accelerations(vector!(|d| force[d].register(i)));
+            for d in 0..N {
+                self.stages.store(r + i, d, a[d], most);
+            }
         }
         r + T::COUNT
-    }
-
-    /// Stores the forces of one block of stages, and updates the largest change of `rest` and the largest of its terms.
-    #[inline(always)]
-    fn take<S: Simd>(&mut self, r: usize, force: SVector<Lanes<S>, N>, [change, size]: &mut [Lanes<S>; 2]) {
-        let (a, kappa) = (self.accelerations(force), Lanes::<S>::splat(self.kappa));
-        for d in 0..N {
-            let linear = kappa * self.x[d].block(r);
-            let rest = a[d] + linear;
-            *change = change.max((rest - self.rest[d].block(r)).abs());
-            *size = size.max(a[d].abs()).max(linear.abs());
-            self.rest[d].set(r, rest);
-            self.a[d].set(r, a[d]);
-        }
     }
 
     /// The accelerations `M^-1` times the forces.
     #[inline(always)]
     fn accelerations<S: Simd>(&self, force: SVector<Lanes<S>, N>) -> SVector<Lanes<S>, N> {
         let zero = Lanes::<S>::splat(0.0);
-        match self.inverse_mass {
+        match self.stages.inverse_mass {
             None => force,
             Some(inverse) => {
                 let (inverse, mut accelerations) = (&inverse.as_slice()[..N * N], vector!(|_| zero));
@@ -248,6 +283,24 @@ impl<L: Lagrangian<N>, const N: usize> StageForces<'_, L, N> {
                 accelerations
             }
         }
+    }
+}
+
+impl StageForces<'_> {
+    /// Stores an acceleration at one block of stages.
+    #[inline(always)]
+    pub fn store<S: Simd>(&mut self, r: usize, d: usize, a: Lanes<S>, [change, size]: &mut [Lanes<S>; 2]) {
+        let linear = Lanes::<S>::splat(self.kappa) * self.x[d].block(r);
+        let rest = a + linear;
+        *change = change.max((rest - self.rest[d].block(r)).abs());
+        *size = size.max(a.abs()).max(linear.abs());
+        self.rest[d].set(r, rest);
+        self.a[d].set(r, a);
+    }
+
+    /// The inverse mass matrix, by columns; `None` where it is the identity.
+    pub fn inverse_mass(&self) -> Option<&[f64]> {
+        self.inverse_mass.map(|inverse| inverse.as_slice())
     }
 }
 

@@ -1,17 +1,17 @@
 //! Steps of contact Gauss collocation for `L = v.Mv/2 - V(t, q) + gamma z`.
 
 mod finish;
+mod in_registers;
 mod kernel;
 mod route;
 mod slope;
 mod vectors;
 
-pub(crate) use kernel::SeparableKernel;
+pub(crate) use kernel::{Iterated, IterationStart, SeparableKernel};
 
 use crate::gauss::limits::{MIN_JACOBIAN_AGE, SLOW_NEWTON, TAIL_PERIOD};
 use crate::gauss::resolution::tail::Tail;
 use crate::gauss::routes::separable::finish::Finish;
-use crate::gauss::routes::separable::kernel::{Iterated, IterationStart};
 use crate::gauss::routes::separable::vectors::{Parts, Vectors};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::stages::position_newton::PositionNewton;

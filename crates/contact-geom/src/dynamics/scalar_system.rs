@@ -1,0 +1,56 @@
+//! Lagrangians that are written over scalars and slices, with any number of coordinates.
+
+use crate::Scalar;
+use std::sync::Arc;
+
+/// A Lagrangian with its derivatives, written over a [`Scalar`] and over slices with one number for each coordinate, as an
+/// interpreted formula is. It is evaluated at all stages of a step at once, in SIMD registers.
+///
+/// In each function N is the number of coordinates where the caller knows it at compile time, and 0 otherwise.
+pub trait ScalarSystem {
+    /// The number n of coordinates.
+    fn dimension(&self) -> usize;
+
+    /// The value `L(t, q, v, z)`.
+    fn value<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T) -> T;
+
+    /// The value, and `L_q`, `L_v` and `L_z`, which are written.
+    fn with_gradient<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: Slopes<'_, T>) -> T;
+
+    /// `L_q`, of a Lagrangian for which it is a function of time and positions.
+    fn force<T: Scalar, const N: usize>(&self, t: T, q: &[T], to: &mut [T]);
+
+    /// `W = L_vv`, by columns.
+    fn mass_matrix<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]);
+
+    /// Whether there is an applied force.
+    fn has_force(&self) -> bool {
+        false
+    }
+
+    /// The applied force, if there is one.
+    fn applied_force<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]) {
+        let _ = (t, q, v, z);
+        to.fill(T::zero());
+    }
+}
+
+/// Where the gradient of a Lagrangian is written.
+#[derive(Debug)]
+pub struct Slopes<'s, T> {
+    /// `L_q`.
+    pub q: &'s mut [T],
+    /// `L_v`.
+    pub v: &'s mut [T],
+    /// `L_z`.
+    pub z: &'s mut T,
+}
+
+/// A function of a [`ScalarSystem`]; see [`Lagrangian::over_slices`](crate::Lagrangian::over_slices).
+pub trait SlicesVisitor {
+    /// Its result.
+    type Output;
+
+    /// Calls it.
+    fn visit<F: ScalarSystem + 'static>(self, system: Arc<F>) -> Self::Output;
+}
