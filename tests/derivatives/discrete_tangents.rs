@@ -10,7 +10,7 @@ use discrete_herglotz::sensitivity::{EndCovector, SensitivityError, StateDerivat
 use discrete_herglotz::{CustomMethod, DiscreteLagrangian, Problem, StepError, Steps, Until};
 
 /// The components q, v, p, z.
-fn numbers<const N: usize>(x: &StateDerivative<N>) -> Vec<f64> {
+fn numbers(x: &StateDerivative) -> Vec<f64> {
     x.q.iter().chain(&x.v).chain(&x.p).chain([&x.z]).copied().collect()
 }
 
@@ -41,7 +41,7 @@ fn the_midpoint_rule() {
         let variables = start(&problem);
         let [a, b] = [mine(), built_in()].map(|run| run.tangent_at(&variables, &times, until).unwrap());
         assert_eq!(a.rows.len(), times.len());
-        let all = |columns: &[StateDerivative<N>]| columns.iter().flat_map(numbers).collect::<Vec<_>>();
+        let all = |columns: &[StateDerivative]| columns.iter().flat_map(numbers).collect::<Vec<_>>();
         let bound = 100.0 * f64::EPSILON / h;
         let found = apart(&all(&a.columns), &all(&b.columns));
         assert!(found <= bound, "{found:e}");
@@ -49,10 +49,10 @@ fn the_midpoint_rule() {
             let found = apart(&all(&a.columns), &all(&b.columns));
             assert!(found <= bound, "row at {}: {found:e}", a.state.t);
         }
-        let mut covector = EndCovector::zero();
+        let mut covector = EndCovector::zero(N);
         (covector.q[0], covector.v[0], covector.z) = (0.7, -0.3, 0.4);
         let [a, b] = [mine(), built_in()].map(|run| run.record(until).unwrap().pullback(&covector).unwrap());
-        let all = |g: &discrete_herglotz::sensitivity::Gradient<N>| {
+        let all = |g: &discrete_herglotz::sensitivity::Gradient| {
             g.q.iter().chain(&g.rate).chain([&g.z]).copied().collect::<Vec<_>>()
         };
         let found = apart(&all(&a), &all(&b));
@@ -105,7 +105,7 @@ fn a_discrete_lagrangian_of_a_user() {
         let tangent = mine().tangent(&start(&problem), until).unwrap();
         let recorded = mine().record(until).unwrap();
         let unit = |i: usize| {
-            let mut unit = EndCovector::zero();
+            let mut unit = EndCovector::zero(1);
             [&mut unit.q[0], &mut unit.v[0], &mut unit.p[0], &mut unit.z].into_iter().nth(i).map(|x| *x = 1.0).unwrap();
             recorded.pullback(&unit).unwrap()
         };

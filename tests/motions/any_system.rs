@@ -4,7 +4,9 @@
 use crate::common::{on_some, relative_distance, slope, step_from};
 use contact_examples::systems::{SystemVisitor, visit_catalogue};
 use contact_geom::nalgebra::{DMatrix, DVector, SymmetricEigen};
-use contact_geom::{Lagrangian, Structure, VelocityPoint};
+use contact_geom::numbers::max_or_nan;
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::sensitivity::{EndState, Loss, SensitivityError, StateDerivative, Variable};
 use discrete_herglotz::{
     Components, GaussCollocation, Point, Problem, SecondDerivatives, Status, Steps, System, SystemProblem, TypedSystem,
     Until, Vector,
@@ -65,6 +67,80 @@ fn steps_are_those_of_the_typed_lagrangian() {
         if same { Ok(()) } else { Err(format!("h = {h}: {} and {}, off by {off:e}", found.status, typed.status)) }
     }
     visit_catalogue(&mut Visitor);
+}
+
+/// The derivatives of a run of each system, in its start and in its times, are those of the typed Lagrangian: to 1e-8, the
+/// accuracy of the differences by which a system without closed ones is differentiated in time, times their growth.
+#[test]
+fn derivatives_are_those_of_the_typed_lagrangian() {
+    struct Visitor;
+    impl SystemVisitor for Visitor {
+        fn visit<const N: usize, S: contact_examples::systems::System<N>>(&mut self, system: &S) {
+            on_some(4, system.name(), 2 * N + 3, |u| {
+                let (t, x) = system.sample(&u[1..]);
+                let from = |error: SensitivityError| error.to_string();
+                let (by, steps, until) =
+                    (GaussCollocation { stages: 4 }, Steps::Size(step_from(u[0])), Until::Steps(5));
+                let typed = Problem::new(system, t, x).map_err(|error| error.to_string())?;
+                let mut variables: Vec<Variable> = (0..N).map(Variable::Position).collect();
+                variables.extend((0..N).map(Variable::Velocity));
+                variables.extend([Variable::Action, Variable::StartTime, Variable::EndTime]);
+                let one = typed.by(by).steps(steps).tangent(&variables, until).map_err(from)?;
+                let seen = Seen(system);
+                let problem = SystemProblem::new(&seen, t, Point::from(x)).map_err(|error| error.to_string())?;
+                let other = problem.by(by).steps(steps).tangent(&variables, until).map_err(from)?;
+                let numbers = |of: &StateDerivative| -> Vec<f64> {
+                    of.q.iter().chain(&of.v).chain(&of.p).chain([&of.z]).copied().collect()
+                };
+                for ((a, b), variable) in one.columns.iter().zip(&other.columns).zip(&variables) {
+                    let (a, b) = (numbers(a), numbers(b));
+                    let size = a.iter().fold(1.0, |m, x| max_or_nan(m, x.abs())) * one.growth;
+                    let off = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, max_or_nan);
+                    if !(a.len() == 3 * N + 1 && b.len() == a.len() && off <= 1e-8 * size) {
+                        return Err(format!("in {variable}: {a:?} and {b:?}, off by {off:e}"));
+                    }
+                }
+                Ok(())
+            });
+        }
+    }
+    visit_catalogue(&mut Visitor);
+}
+
+/// The gradient of a run of many coordinates is the transpose of its tangent, to round-off, and a loss of another number of
+/// coordinates is refused.
+#[test]
+fn gradients_with_many_coordinates() {
+    struct Energy;
+    impl Loss<24> for Energy {
+        fn value<T: Scalar>(&self, end: &EndState<24, T>) -> T {
+            end.q.dot(&end.q) + end.v.dot(&end.p) + end.z * end.q[3]
+        }
+    }
+    let system = Dense::new(24, false);
+    let problem = SystemProblem::new(&system, 0.0, system.start()).unwrap();
+    let run = || problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.2));
+    let found = run().gradient(&Energy, Until::Time(2.0)).unwrap();
+    let (_, gradient) = found.loss.unwrap();
+    let variables = Variable::all(&problem);
+    let tangent = run().tangent(&variables, Until::Time(2.0)).unwrap();
+    let end = run().record(Until::Time(2.0)).unwrap().end().unwrap();
+    let (_, covector) = end.differentiate(&Energy);
+    let times = [gradient.t0, gradient.t_end];
+    let all = gradient.q.iter().chain(&gradient.rate).chain([&gradient.z]).chain(&times);
+    assert_eq!((variables.len(), tangent.columns.len()), (51, 51));
+    for ((a, column), variable) in all.zip(&tangent.columns).zip(&variables) {
+        let b = column.dot(&covector);
+        assert!((a - b).abs() <= 1e-11 * (1.0 + b.abs()), "in {variable}: {a} and {b}");
+    }
+    struct One;
+    impl Loss<1> for One {
+        fn value<T: Scalar>(&self, end: &EndState<1, T>) -> T {
+            end.q[0]
+        }
+    }
+    let error = run().gradient(&One, Until::Time(2.0)).unwrap_err().to_string();
+    assert!(error.contains("24") && error.contains("the argument of the loss"), "{error}");
 }
 
 /// Coupled oscillators with drag, `L = v^2/2 - q.Kq/2 + gamma z`, with a dense matrix K; the claim that the mass is

@@ -86,8 +86,8 @@ pub use run::{
 pub use status::{Status, UnresolvedStep};
 pub use switching::DividedGauss;
 pub use system::{
-    AtState, AtSwitch, Components, ForceDerivatives, ForceKind, Kernels, Point, SecondDerivatives, State, System,
-    TypedSystem, Vector,
+    AtState, AtSwitch, Components, ExplicitDerivatives, ForceDerivatives, ForceKind, Kernels, Point, Quantity,
+    SecondDerivatives, State, System, TypedSystem, Vector,
 };
 pub use theory::discrete_lagrangian::{DiscreteLagrangian, DiscreteStep};
 

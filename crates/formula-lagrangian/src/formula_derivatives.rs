@@ -138,6 +138,73 @@ impl FormulaDerivatives {
         reset.is_some_and(|reset| reset.replace_by_rest(t, x))
     }
 
+    /// The names and the values of the parameters.
+    pub fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.derived.formula.parameters()
+    }
+
+    /// The same formula with these values of all parameters; `None` where their number is wrong or one is not finite.
+    pub fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
+        if theta.len() != self.derived.formula.values.len() || !theta.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let mut other = self.clone();
+        other.derived.set_all(theta);
+        Some(other)
+    }
+
+    /// The derivative of L with respect to a parameter, or to the time if none is given, which is returned, with those of
+    /// its gradient `L_q`, `L_v`, `L_z` and that of the force, which are written.
+    pub fn explicit(
+        &self,
+        parameter: Option<usize>,
+        t: f64,
+        (q, v, z): (&[f64], &[f64], f64),
+        [of_q, of_v, of_z, of_force]: [&mut [f64]; 4],
+    ) -> f64 {
+        type Along = Dual<f64, SVector<f64, 1>>;
+        type AlongTwo = Dual<Along, SVector<Along, 1>>;
+        let one = |is: bool| SVector::<f64, 1>::from_element(f64::from(u8::from(is)));
+        let explicit = |re: f64, is: bool| {
+            let d = SVector::<Along, 1>::from_element(Along::from(f64::from(u8::from(is))));
+            AlongTwo { re: Along::from(re), d }
+        };
+        let theta: Vec<AlongTwo> =
+            self.parameters().enumerate().map(|(k, (_, x))| explicit(x, parameter == Some(k))).collect();
+        let time = explicit(t, parameter.is_none());
+        let mut value = AlongTwo::from(0.0);
+        let mut of_l = 0.0;
+        let mut along = |kind: usize, i: usize| {
+            let at = |x: &[f64], is: bool| -> Vec<AlongTwo> {
+                x.iter().enumerate().map(|(j, x)| AlongTwo::constant(Dual { re: *x, d: one(is && i == j) })).collect()
+            };
+            let (q, v) = (at(q, kind == 0), at(v, kind == 1));
+            let z = AlongTwo::constant(Dual { re: z, d: one(kind == 2) });
+            let at = At { q: &q, v: &v, z, t: time };
+            self.derived.parametric_value.evaluate(&theta, at, std::slice::from_mut(&mut value));
+            let Dual { re, d } = value.d[0];
+            of_l = re;
+            d[0]
+        };
+        of_q.iter_mut().enumerate().for_each(|(i, to)| *to = along(0, i));
+        of_v.iter_mut().enumerate().for_each(|(i, to)| *to = along(1, i));
+        of_z.iter_mut().for_each(|to| *to = along(2, 0));
+        of_force.fill(0.0);
+        let forces = self.derived.parametric_force.len();
+        if forces > 0 {
+            let simple = |re: f64, is: bool| Along { re, d: one(is) };
+            let theta: Vec<Along> =
+                self.parameters().enumerate().map(|(k, (_, x))| simple(x, parameter == Some(k))).collect();
+            let still = |x: &[f64]| -> Vec<Along> { x.iter().map(|x| Along::from(*x)).collect() };
+            let (q, v) = (still(q), still(v));
+            let at = At { q: &q, v: &v, z: Along::from(z), t: simple(t, parameter.is_none()) };
+            let mut force = vec![Along::from(0.0); forces];
+            self.derived.parametric_force.evaluate(&theta, at, &mut force);
+            of_force.iter_mut().zip(force).for_each(|(to, f)| *to = f.d[0]);
+        }
+        of_l
+    }
+
     /// The times of kinks and jumps.
     pub fn breaks(&self) -> &[f64] {
         &self.derived.breaks

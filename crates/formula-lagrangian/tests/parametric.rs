@@ -106,11 +106,11 @@ fn values_are_those_of_set_parameters() {
 }
 
 /// The gradient of the position at the end of a motion.
-fn gradient(l: &impl Parametric<1>) -> Gradient<1> {
+fn gradient(l: &impl Parametric<1>) -> Gradient {
     let problem = Problem::new(l, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.25));
-    let position = EndCovector { q: [1.0].into(), ..EndCovector::zero() };
-    let LossGradient { loss, .. } = run.gradient_of(|end| (end.q[0], position), Until::Time(20.0)).unwrap();
+    let position = EndCovector { q: [1.0].into(), ..EndCovector::zero(1) };
+    let LossGradient { loss, .. } = run.gradient_of(|end| (end.q[0], position.clone()), Until::Time(20.0)).unwrap();
     loss.unwrap().1
 }
 

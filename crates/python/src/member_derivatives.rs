@@ -6,7 +6,7 @@ use crate::motion::{self, GivenStepControl};
 use crate::sensitivity::loss_of;
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz_runtime::{Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StateCovector, Status};
+use herglotz_runtime::{EndCovector, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::sync::atomic::Ordering;
@@ -67,8 +67,8 @@ fn gradients(py: Python<'_>, system: &System, found: Vec<Result<LossGradient, Ru
         match member {
             Ok(LossGradient { loss: Some((value, gradient)), .. }) => {
                 values.push(value);
-                q.extend(gradient.q);
-                velocity.extend(gradient.velocity);
+                q.extend(&gradient.q);
+                velocity.extend(&gradient.rate);
                 z.push(gradient.z);
                 parameters.extend(gradient.parameters);
                 for (all, x) in times.iter_mut().zip([gradient.t0, gradient.t_end, gradient.growth]) {
@@ -111,7 +111,13 @@ pub fn ensemble_pullback(
         let covector = |row: usize| {
             let i = index * k + row;
             let of = |x: &[f64]| x.get(i * n..(i + 1) * n).map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
-            StateCovector { t: 0.0, q: of(&q), v: of(&v), p: of(&p), z: z.get(i).copied().unwrap_or(0.0) }
+            EndCovector {
+                t: 0.0,
+                q: of(&q).into(),
+                v: of(&v).into(),
+                p: of(&p).into(),
+                z: z.get(i).copied().unwrap_or(0.0),
+            }
         };
         (0.0, (0..states.len()).map(covector).collect())
     };

@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, named, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use herglotz_runtime::{Expression, LossGradient, MotionState, RunMonitor, RuntimeError, StateCovector, Status};
+use herglotz_runtime::{EndCovector, Expression, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -48,7 +48,7 @@ pub fn sensitivity(py: Python<'_>, motion: &Motion, variables: Vec<String>, time
         return Err(not_completed(&found.status));
     }
     let width = motion.system.dimension() * names.len();
-    let all = |of: fn(&MotionState) -> &[f64]| {
+    let all = |of: fn(&StateDerivative) -> &[f64]| {
         let numbers = found.rows.iter().flatten().flat_map(|state| of(state).iter().copied()).collect();
         matrix(py, numbers, width)
     };
@@ -63,7 +63,7 @@ type Slopes = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, f64, Vec<f64>, f64, f64, f6
 /// The value and the gradient of a completed motion.
 fn slopes(py: Python<'_>, found: LossGradient) -> PyResult<(f64, Slopes)> {
     let Some((value, gradient)) = found.loss else { return Err(not_completed(&found.status)) };
-    let (q, velocity) = (vector(py, gradient.q), vector(py, gradient.velocity));
+    let (q, velocity) = (vector(py, gradient.q.to_vec()), vector(py, gradient.rate.to_vec()));
     Ok((value, (q, velocity, gradient.z, gradient.parameters, gradient.t0, gradient.t_end, gradient.growth)))
 }
 
@@ -80,9 +80,9 @@ pub fn pullback(
     let n = motion.system.dimension();
     let covector = |(i, z): (usize, &f64)| {
         let row = |x: &[f64]| x.get(i * n..(i + 1) * n).map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
-        StateCovector { t: 0.0, q: row(&q), v: row(&v), p: row(&p), z: *z }
+        EndCovector { t: 0.0, q: row(&q).into(), v: row(&v).into(), p: row(&p).into(), z: *z }
     };
-    let covectors: Vec<StateCovector> = z.iter().enumerate().map(covector).collect();
+    let covectors: Vec<EndCovector> = z.iter().enumerate().map(covector).collect();
     let found = detached(py, motion, |monitor| {
         motion.system.gradient(&motion.motion, &times, &mut |_| (0.0, covectors.clone()), monitor)
     })?;

@@ -57,8 +57,7 @@ pub enum RuntimeError {
     },
     /// A formula with many coordinates was used where kernels are compiled for few.
     #[error(
-        "a formula with more than {most} coordinates has no {what}: it runs by contact Gauss collocation as a smooth \
-         Lagrangian; use a lattice or bodies for sums of local terms"
+        "a formula with more than {most} coordinates has no {what}: it runs by contact Gauss collocation; use a lattice or bodies for sums of local terms"
     )]
     OfFewCoordinates {
         /// What there is none for it.

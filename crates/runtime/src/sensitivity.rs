@@ -1,44 +1,7 @@
 //! Derivatives of motions.
 
-use discrete_herglotz::sensitivity::SensitivityError;
+use discrete_herglotz::sensitivity::{EndCovector, Gradient, MotionState, SensitivityError, StateDerivative};
 use discrete_herglotz::{Status, UnresolvedStep};
-
-/// A state of a motion, or the derivative of one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotionState {
-    /// The time; for a derivative 0.
-    pub t: f64,
-    /// The position.
-    pub q: Vec<f64>,
-    /// The velocity; NaN where no velocity corresponds to the momentum.
-    pub v: Vec<f64>,
-    /// The momentum.
-    pub p: Vec<f64>,
-    /// The action.
-    pub z: f64,
-}
-
-/// The partial derivatives of a number in a state of a motion; those in the velocity and in the momentum are added.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StateCovector {
-    /// In the time. It counts at the end of a motion only: other times are fixed.
-    pub t: f64,
-    /// In the position.
-    pub q: Vec<f64>,
-    /// In the velocity.
-    pub v: Vec<f64>,
-    /// In the momentum.
-    pub p: Vec<f64>,
-    /// In the action.
-    pub z: f64,
-}
-
-impl StateCovector {
-    /// No dependence on a state of n coordinates.
-    pub fn zero(n: usize) -> Self {
-        StateCovector { t: 0.0, q: vec![0.0; n], v: vec![0.0; n], p: vec![0.0; n], z: 0.0 }
-    }
-}
 
 /// The derivatives of a motion with respect to variables; see [`System::sensitivity`](crate::System::sensitivity).
 #[derive(Clone, Debug, PartialEq)]
@@ -51,30 +14,9 @@ pub struct Sensitivity {
     /// The state at each time that was reached.
     pub states: Vec<MotionState>,
     /// The derivatives of each of these states, in the order of the variables.
-    pub rows: Vec<Vec<MotionState>>,
+    pub rows: Vec<Vec<StateDerivative>>,
     /// The largest derivative along the motion divided by the largest one at its end, at least one: round-off of the
     /// derivatives is amplified by it.
-    pub growth: f64,
-}
-
-/// The gradient of a number with respect to the variables of a motion; see [`System::gradient`](crate::System::gradient).
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Gradient {
-    /// In the initial position.
-    pub q: Vec<f64>,
-    /// In the initial velocity, or in the initial momentum where that was given.
-    pub velocity: Vec<f64>,
-    /// In the initial action.
-    pub z: f64,
-    /// In the parameters, in their order.
-    pub parameters: Vec<f64>,
-    /// In the initial time, for a fixed final time and a fixed number of steps.
-    pub t0: f64,
-    /// In the final time, for a fixed number of steps.
-    pub t_end: f64,
-    /// The largest derivative along the motion divided by the one at its start, at least one: round-off of the gradient
-    /// is amplified by it.
     pub growth: f64,
 }
 
@@ -89,7 +31,7 @@ pub struct LossGradient {
 }
 
 /// A function of states of a motion: its value, and its partial derivatives in each of them.
-pub type Loss<'l> = dyn FnMut(&[MotionState]) -> (f64, Vec<StateCovector>) + 'l;
+pub type Loss<'l> = dyn FnMut(&[MotionState]) -> (f64, Vec<EndCovector>) + 'l;
 
 /// The message on a motion without derivatives, without Rust names.
 pub(crate) fn in_words(error: &SensitivityError) -> String {

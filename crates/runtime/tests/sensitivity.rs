@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
 use herglotz_runtime::{
-    AnyIntegrator, Column, Ensemble, Event, Gradient, InputError, Interrupt, Motion, OutputTimes, RuntimeError, Start,
-    StateCovector, Status, StepControl, Steps, System, Varied,
+    AnyIntegrator, Column, EndCovector, Ensemble, Event, Gradient, InputError, Interrupt, Motion, OutputTimes,
+    RuntimeError, Start, Status, StepControl, Steps, System, Varied,
 };
 
 /// The final state of the pendulum at t = 100 from (1, 1, 0), and its derivatives in q0, v0 and gamma, by a Taylor method
@@ -31,7 +31,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64) -> bool {
     found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance * size)
 }
 
-fn pulled(motion: &Motion, of: &StateCovector) -> Gradient {
+fn pulled(motion: &Motion, of: &EndCovector) -> Gradient {
     let mut loss = |_: &[_]| (0.0, vec![of.clone()]);
     pendulum().gradient(motion, &[motion.end], &mut loss, &mut ()).unwrap().loss.unwrap().1
 }
@@ -45,15 +45,15 @@ fn the_pendulum_has_its_derivatives_forward_and_backward() {
     for (column, expected) in found.rows[1].iter().zip(&SLOPES) {
         assert!(close(&[column.q[0], column.v[0], column.z], expected, 1e-11), "{column:?}");
     }
-    let zero = StateCovector::zero(1);
+    let zero = EndCovector::zero(1);
     let unit = [
-        StateCovector { q: vec![1.0], ..zero.clone() },
-        StateCovector { v: vec![1.0], ..zero.clone() },
-        StateCovector { z: 1.0, ..zero },
+        EndCovector { q: [1.0].into(), ..zero.clone() },
+        EndCovector { v: [1.0].into(), ..zero.clone() },
+        EndCovector { z: 1.0, ..zero },
     ];
     for (i, of) in unit.iter().enumerate() {
-        let Gradient { q, velocity, parameters, .. } = pulled(&motion(100.0), of);
-        assert!(close(&[q[0], velocity[0], parameters[0]], &SLOPES.map(|slopes| slopes[i]), 1e-11));
+        let Gradient { q, rate, parameters, .. } = pulled(&motion(100.0), of);
+        assert!(close(&[q[0], rate[0], parameters[0]], &SLOPES.map(|slopes| slopes[i]), 1e-11));
     }
 }
 

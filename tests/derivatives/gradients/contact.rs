@@ -49,8 +49,8 @@ fn the_tangent_is_conformally_contact() {
                         continue;
                     }
                     let action = &tangent.columns[2 * N];
-                    let (dq, dz) = (column.q + action.q * dz, column.z + action.z * dz);
-                    let defect = dz - tangent.outcome.p.fixed::<N>().dot(&dq);
+                    let (dq, dz) = (&column.q + &action.q * dz, column.z + action.z * dz);
+                    let defect = dz - tangent.outcome.p.dot(&dq);
                     assert!(defect.abs() <= 1e-12 * size * (1.0 + p.norm()), "{name}: defect {defect:e} of column {j}");
                 }
             }

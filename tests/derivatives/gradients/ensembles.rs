@@ -3,7 +3,9 @@
 use contact_examples::systems::{Duffing, Kepler, OneCoordinate, Pendulum, System};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::ensemble::EnsembleError;
-use discrete_herglotz::sensitivity::{BatchGradient, EndCovector, EndState, Loss, SensitivityError, Variable};
+use discrete_herglotz::sensitivity::{
+    BatchGradient, EndCovector, EndState, Loss, MotionState, SensitivityError, Variable,
+};
 use discrete_herglotz::{
     AnyIntegrator, Ensemble, GaussCollocation, InputError, Problem, SplittingScheme, Status, Steps, TransformedGauss,
     Until,
@@ -29,7 +31,7 @@ fn members_are_single_runs_for_any_number_of_threads() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let methods = ["gauss_4", "strang", "blanes_moan_6", "midpoint", "trapezoidal"];
     for method in methods.map(|name| name.parse::<AnyIntegrator>().unwrap()) {
-        let of = |threads: usize| -> BatchGradient<1> {
+        let of = |threads: usize| -> BatchGradient {
             let ensemble = Ensemble::new(&pendulum, 0.0, 37, start).by(method).steps(Steps::Size(0.1)).threads(threads);
             ensemble.gradient(&Mixed, UNTIL).unwrap()
         };
@@ -89,9 +91,9 @@ fn rows_and_tangents() {
     let times = [t0, t0 + 0.33, t0 + 1.0, t0 + 2.0];
     let ensemble = Ensemble::new(&system, t0, 12, start).by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.1));
     let weight = |i: usize, k: usize| 1.0 + 0.1 * i as f64 - 0.2 * k as f64;
-    let loss = |i: usize, states: &[EndState<1>]| {
+    let loss = |i: usize, states: &[MotionState]| {
         let value = states.iter().enumerate().map(|(k, state)| weight(i, k) * (state.q[0] + state.z)).sum();
-        let covector = |k| EndCovector { q: [weight(i, k)].into(), z: weight(i, k), ..EndCovector::zero() };
+        let covector = |k| EndCovector { q: [weight(i, k)].into(), z: weight(i, k), ..EndCovector::zero(1) };
         (value, (0..states.len()).map(covector).collect())
     };
     let until = Until::Time(t0 + 2.0);
@@ -101,7 +103,7 @@ fn rows_and_tangents() {
     for (i, (member, tangent)) in batch.members.iter().zip(&tangents).enumerate() {
         let (gradient, tangent) = (&member.as_ref().unwrap().loss.as_ref().unwrap().1, tangent.as_ref().unwrap());
         for (j, found) in [gradient.q[0], gradient.rate[0], gradient.z].into_iter().enumerate() {
-            let of = |(k, row): (usize, &discrete_herglotz::sensitivity::TangentRow<1>)| {
+            let of = |(k, row): (usize, &discrete_herglotz::sensitivity::TangentRow)| {
                 weight(i, k) * (row.columns[j].q[0] + row.columns[j].z)
             };
             let expected: f64 = tangent.rows.iter().enumerate().map(of).sum();
@@ -141,16 +143,16 @@ fn invalid_input() {
     let ready = |count| of(count).by(gauss).steps(Steps::Size(0.1));
     assert!(matches!(ready(0).gradient(&Mixed, UNTIL), Err(EnsembleError::Empty)));
     assert!(matches!(ready(2).threads(0).gradient(&Mixed, UNTIL), Err(EnsembleError::Threads)));
-    let refused = |found: Result<BatchGradient<1>, EnsembleError>| match found {
+    let refused = |found: Result<BatchGradient, EnsembleError>| match found {
         Err(EnsembleError::Member { index: 0, cause }) => cause,
         found => panic!("{found:?}"),
     };
     assert_eq!(refused(of(2).steps(Steps::Size(0.1)).gradient(&Mixed, UNTIL)), InputError::NoIntegrator);
     assert_eq!(refused(of(2).by(gauss).gradient(&Mixed, UNTIL)), InputError::NoSteps);
     // What concerns a run is reported by each member.
-    let undefined = ready(2).gradient_of(|_, _| (f64::NAN, EndCovector::zero()), UNTIL).unwrap();
+    let undefined = ready(2).gradient_of(|_, _| (f64::NAN, EndCovector::zero(1)), UNTIL).unwrap();
     assert!(undefined.members.iter().all(|member| matches!(member, Err(SensitivityError::Loss { .. }))));
-    let outside = ready(2).gradient_at(&[5.0], |_, _| (0.0, vec![EndCovector::zero()]), UNTIL).unwrap();
+    let outside = ready(2).gradient_at(&[5.0], |_, _| (0.0, vec![EndCovector::zero(1)]), UNTIL).unwrap();
     assert!(outside.members.iter().all(|member| matches!(member, Err(SensitivityError::Input(_)))), "{outside:?}");
     let unknown = ready(2).tangent_at(&[Variable::Parameter("gama".into())], &[], UNTIL).unwrap();
     assert!(unknown.iter().all(|member| matches!(member, Err(SensitivityError::Parameter(_)))));

@@ -9,7 +9,7 @@ use contact_examples::systems::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Force, ForceStructure, Forced, Parametric, ParametricForce, Scalar, VelocityDrag, VelocityPoint};
-use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, SensitivityError, Variable};
+use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, MotionState, SensitivityError, Variable};
 use discrete_herglotz::{Integrator, Problem, SplittingScheme, Steps, Until, rules};
 
 /// A run over 0.1, or back over 0.075, from a sampled state; the draw selects the direction, the number of steps, and whether
@@ -235,11 +235,11 @@ fn rows() {
         let tangent = run().tangent_at(&variables, &times, Until::Time(0.9)).unwrap();
         assert_eq!(tangent.rows.len(), times.len());
         let weight = |i: usize| 1.0 + 0.3 * i as f64;
-        let loss = |states: &[EndState<3>]| {
+        let loss = |states: &[MotionState]| {
             let value: f64 =
                 states.iter().enumerate().map(|(i, state)| weight(i) * (state.q[1] * state.v[0] + state.z)).sum();
-            let of = |(i, state): (usize, &EndState<3>)| {
-                let mut covector = EndCovector::<3>::zero();
+            let of = |(i, state): (usize, &MotionState)| {
+                let mut covector = EndCovector::zero(3);
                 covector.q[1] = weight(i) * state.v[0];
                 covector.v[0] = weight(i) * state.q[1];
                 covector.z = weight(i);
@@ -256,7 +256,7 @@ fn rows() {
             .chain(&gradient.parameters)
             .chain([&gradient.t0, &gradient.t_end]);
         for (k, found) in all.enumerate() {
-            let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow<3>)| {
+            let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow)| {
                 let (state, column) = (&row.state, &row.columns[k]);
                 weight(i) * (column.q[1] * state.v[0] + state.q[1] * column.v[0] + column.z)
             };

@@ -7,7 +7,9 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::{Scalar, VelocityPoint};
-use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, SensitivityError, TangentRow, Variable};
+use discrete_herglotz::sensitivity::{
+    EndCovector, EndState, Loss, MotionState, SensitivityError, TangentRow, Variable,
+};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 
 /// The half line `q >= 0`.
@@ -63,7 +65,7 @@ fn both(system: &SwitchingOne, steps: Steps, t: f64, variables: &[Variable]) -> 
     let tangent = run().tangent(variables, Until::Time(t)).unwrap();
     assert_eq!(tangent.outcome.status, Status::Completed);
     let recorded = run().record(Until::Time(t)).unwrap();
-    let mut units = [EndCovector::<1>::zero(); 2];
+    let mut units = [0, 1].map(|_| EndCovector::zero(1));
     (units[0].q[0], units[1].v[0]) = (1.0, 1.0);
     let gradients = recorded.pullbacks(&units).unwrap();
     let all = Variable::all(&problem);
@@ -178,19 +180,19 @@ fn losses_of_rows_across_impacts() {
     let variables = Variable::all(&problem);
     let tangent = run().tangent_at(&variables, &times, Until::Time(5.0)).unwrap();
     assert_eq!(tangent.rows.iter().map(|row| row.state.t).collect::<Vec<_>>(), times);
-    let of_row = |i: usize, state: &EndState<1>| {
-        let q = SVector::from([2.0 * state.q[0] * (1.0 + i as f64)]);
-        EndCovector { q, v: state.q, z: 1.0, ..EndCovector::zero() }
+    let of_row = |i: usize, state: &MotionState| {
+        let q = [2.0 * state.q[0] * (1.0 + i as f64)].into();
+        EndCovector { q, v: state.q.clone(), z: 1.0, ..EndCovector::zero(1) }
     };
-    let loss = |states: &[EndState<1>]| {
-        let value = |(i, x): (usize, &EndState<1>)| x.q[0].powi(2) * (1.0 + i as f64) + x.z;
+    let loss = |states: &[MotionState]| {
+        let value = |(i, x): (usize, &MotionState)| x.q[0].powi(2) * (1.0 + i as f64) + x.z;
         let covectors = states.iter().enumerate().map(|(i, x)| of_row(i, x)).collect();
         (states.iter().enumerate().map(value).sum(), covectors)
     };
     let gradient = run().gradient_at(&times, loss, Until::Time(5.0)).unwrap().loss.unwrap().1;
     let of_gradient = gradient.q.iter().chain(&gradient.rate).chain([&gradient.z]).chain(&gradient.parameters);
     for (k, found) in of_gradient.chain([&gradient.t0, &gradient.t_end]).enumerate() {
-        let of = |(i, row): (usize, &TangentRow<1>)| row.columns[k].dot(&of_row(i, &row.state));
+        let of = |(i, row): (usize, &TangentRow)| row.columns[k].dot(&of_row(i, &row.state));
         let expected: f64 = tangent.rows.iter().enumerate().map(of).sum();
         assert!((found - expected).abs() <= 1e-11 * (1.0 + expected.abs()), "{:?}: {found}, {expected}", variables[k]);
     }

@@ -2,7 +2,7 @@
 
 use contact_examples::systems::{CoupledPlane, DoublePendulum, OneCoordinate, Pendulum, System, TwoCoordinates};
 use contact_geom::{Parametric, Scalar, VelocityPoint};
-use discrete_herglotz::sensitivity::{EndCovector, EndState, Gradient, Loss, Variable};
+use discrete_herglotz::sensitivity::{EndCovector, EndState, Gradient, Loss, MotionState, Variable};
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 
 /// A function of the whole end state.
@@ -14,7 +14,7 @@ impl Loss<2> for Mixed {
     }
 }
 
-fn all<const N: usize>(gradient: &Gradient<N>) -> Vec<f64> {
+fn all(gradient: &Gradient) -> Vec<f64> {
     let Gradient { q, rate, z, parameters, t0, t_end, .. } = gradient;
     q.iter().chain(rate).chain([z]).chain(parameters).chain([t0, t_end]).copied().collect()
 }
@@ -28,13 +28,7 @@ fn a_loss_of_the_end() {
     let found = run().gradient(&Mixed, Until::Time(2.0)).unwrap();
     let (value, gradient) = found.loss.unwrap();
     let outcome = found.outcome;
-    let end = EndState {
-        t: outcome.t,
-        q: outcome.q.fixed(),
-        v: outcome.v.unwrap().fixed(),
-        p: outcome.p.fixed(),
-        z: outcome.z.unwrap(),
-    };
+    let end = MotionState { t: outcome.t, q: outcome.q, v: outcome.v.unwrap(), p: outcome.p, z: outcome.z.unwrap() };
     let (expected, EndCovector { t, q, v, p, z }) = end.differentiate(&Mixed);
     assert_eq!(value, expected);
     let tangent = run().tangent(&Variable::all(&problem), Until::Time(2.0)).unwrap();
@@ -58,10 +52,10 @@ fn losses_of_rows() {
     let tangent = run().tangent_at(&variables, &times, Until::Time(5.0)).unwrap();
     assert_eq!(tangent.rows.iter().map(|row| row.state.t).collect::<Vec<_>>(), times);
     let weight = |i: usize| 1.0 + 0.3 * i as f64;
-    let loss = |states: &[EndState<2>]| {
-        let of = |(i, state): (usize, &EndState<2>)| weight(i) * (state.q[0] * state.v[1] + state.z * state.p[0]);
-        let covector = |(i, state): (usize, &EndState<2>)| {
-            let mut covector = EndCovector::zero();
+    let loss = |states: &[MotionState]| {
+        let of = |(i, state): (usize, &MotionState)| weight(i) * (state.q[0] * state.v[1] + state.z * state.p[0]);
+        let covector = |(i, state): (usize, &MotionState)| {
+            let mut covector = EndCovector::zero(2);
             covector.q[0] = weight(i) * state.v[1];
             covector.v[1] = weight(i) * state.q[0];
             covector.z = weight(i) * state.p[0];
@@ -73,7 +67,7 @@ fn losses_of_rows() {
     let found = run().gradient_at(&times, loss, Until::Time(5.0)).unwrap();
     let gradient = all(&found.loss.unwrap().1);
     for (k, found) in gradient.into_iter().enumerate() {
-        let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow<2>)| {
+        let of = |(i, row): (usize, &discrete_herglotz::sensitivity::TangentRow)| {
             let (state, column) = (&row.state, &row.columns[k]);
             let of_products = column.q[0] * state.v[1] + state.q[0] * column.v[1];
             weight(i) * (of_products + column.z * state.p[0] + state.z * column.p[0])
@@ -87,7 +81,7 @@ fn losses_of_rows() {
         let short = short.tangent(&variables, Until::Time(row.state.t)).unwrap();
         for (a, b) in row.columns.iter().zip(&short.columns).take(8) {
             assert!(
-                (a.q - b.q).norm() + (a.v - b.v).norm() + (a.z - b.z).abs() <= 1e-11,
+                (&a.q - &b.q).norm() + (&a.v - &b.v).norm() + (a.z - b.z).abs() <= 1e-11,
                 "t = {}: {a:?}, {b:?}",
                 row.state.t
             );
@@ -103,7 +97,7 @@ fn long_runs() {
     let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(1000));
     let recorded = run().record(Until::Time(100.0)).unwrap();
     assert_eq!(recorded.outcome().status, Status::Completed);
-    let covector = EndCovector { q: [1.0].into(), ..EndCovector::zero() };
+    let covector = EndCovector { q: [1.0].into(), ..EndCovector::zero(1) };
     let gradient = recorded.pullback(&covector).unwrap();
     assert_eq!(gradient, recorded.pullback(&covector).unwrap());
     let tangent = run().tangent(&Variable::all(&problem), Until::Time(100.0)).unwrap();

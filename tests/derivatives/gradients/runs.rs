@@ -1,11 +1,12 @@
 //! Differences of runs, and the comparison of all derivatives with each other.
 
-use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
 use contact_geom::{Parametric, VelocityPoint, legendre};
 use discrete_herglotz::rules::{self, CompositionMethod};
 use discrete_herglotz::sensitivity::{EndCovector, StateDerivative, Tangent, Variable};
-use discrete_herglotz::{GaussCollocation, Outcome, Problem, Run, SplittingScheme, Start, Status, Steps, Until};
+use discrete_herglotz::{
+    GaussCollocation, Outcome, Problem, Run, SplittingScheme, Start, Status, Steps, Until, Vector,
+};
 
 /// An integrator whose runs are differentiated.
 pub trait Method: Copy {
@@ -104,17 +105,17 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
 
     /// Central differences of the run, extrapolated four times: the error is of order ten in the distance, and round-off
     /// of the run is divided by the smallest distance, 1/2048 of a typical value.
-    fn difference(&self, variable: &Variable) -> StateDerivative<N> {
+    fn difference(&self, variable: &Variable) -> StateDerivative {
         const LEVELS: usize = 5;
-        let mut table: Vec<StateDerivative<N>> = (0..LEVELS)
+        let mut table: Vec<StateDerivative> = (0..LEVELS)
             .map(|level| {
                 let by = 0.5_f64.powi(7 + level as i32);
                 let [a, b] = [by, -by].map(|by| self.moved(variable, by));
-                let over = |a: SVector<f64, N>, b: SVector<f64, N>| (a - b) / (2.0 * by);
+                let over = |a: &Vector, b: &Vector| (a - b) / (2.0 * by);
                 StateDerivative {
-                    q: over(a.q.fixed(), b.q.fixed()),
-                    v: over(a.v.unwrap().fixed(), b.v.unwrap().fixed()),
-                    p: over(a.p.fixed(), b.p.fixed()),
+                    q: over(&a.q, &b.q),
+                    v: over(&a.v.unwrap(), &b.v.unwrap()),
+                    p: over(&a.p, &b.p),
                     z: (a.z.unwrap() - b.z.unwrap()) / (2.0 * by),
                 }
             })
@@ -122,17 +123,19 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
         for order in 1..LEVELS {
             let factor = 4.0_f64.powi(order as i32);
             for level in (order..LEVELS).rev() {
-                let (coarse, fine) = (table[level - 1], table[level]);
+                let (coarse, fine) = (&table[level - 1], &table[level]);
                 let better = |fine: f64, coarse: f64| fine + (fine - coarse) / (factor - 1.0);
+                let each =
+                    |fine: &Vector, coarse: &Vector| fine.iter().zip(coarse).map(|(a, b)| better(*a, *b)).collect();
                 table[level] = StateDerivative {
-                    q: fine.q.zip_map(&coarse.q, better),
-                    v: fine.v.zip_map(&coarse.v, better),
-                    p: fine.p.zip_map(&coarse.p, better),
+                    q: each(&fine.q, &coarse.q),
+                    v: each(&fine.v, &coarse.v),
+                    p: each(&fine.p, &coarse.p),
                     z: better(fine.z, coarse.z),
                 };
             }
         }
-        table[LEVELS - 1]
+        table.swap_remove(LEVELS - 1)
     }
 
     /// Whether the motion is completed, with an end that differs by at most a twentieth from that of a run with twice as
@@ -165,7 +168,7 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
 
     /// Compares tangents with gradients for every variable; the tolerance is relative to the largest derivative, which is
     /// returned with the tangent.
-    pub fn agree(&self, name: &str, adjoint: f64) -> (Vec<Variable>, Tangent<N>, f64) {
+    pub fn agree(&self, name: &str, adjoint: f64) -> (Vec<Variable>, Tangent, f64) {
         let problem = self.problem();
         let run = || self.method.run(&problem).steps(Steps::Count(self.steps));
         let variables = Variable::all(&problem);
@@ -183,10 +186,11 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
             (&plain.q, &plain.p, plain.z),
             "{name}"
         );
-        let units: Vec<EndCovector<N>> = (0..3 * N + 1).map(unit).collect();
+        let units: Vec<EndCovector> = (0..3 * N + 1).map(unit::<N>).collect();
         let gradients = recorded.pullbacks(&units).unwrap();
         let size = tangent.columns.iter().flat_map(numbers).fold(1e-30, |m, x| max_or_nan(m, x.abs()));
         for (k, (variable, column)) in variables.iter().zip(&tangent.columns).enumerate() {
+            assert_eq!(numbers(column).len(), 3 * N + 1, "{name}");
             for (i, of_column) in numbers(column).into_iter().enumerate() {
                 let gradient = &gradients[i];
                 let all: Vec<f64> = gradient
@@ -209,13 +213,13 @@ impl<L: Parametric<N>, M: Method, const N: usize> Case<'_, L, M, N> {
 }
 
 /// The components q, v, p, z.
-fn numbers<const N: usize>(x: &StateDerivative<N>) -> Vec<f64> {
+fn numbers(x: &StateDerivative) -> Vec<f64> {
     x.q.iter().chain(&x.v).chain(&x.p).chain([&x.z]).copied().collect()
 }
 
 /// The covector of a component, in the same order.
-fn unit<const N: usize>(index: usize) -> EndCovector<N> {
-    let mut covector = EndCovector::zero();
+fn unit<const N: usize>(index: usize) -> EndCovector {
+    let mut covector = EndCovector::zero(N);
     let part = index % N;
     match index / N {
         0 => covector.q[part] = 1.0,

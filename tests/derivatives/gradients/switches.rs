@@ -209,7 +209,7 @@ fn two_impacts_at_one_instant() {
         for (k, column) in tangent.columns.iter().enumerate() {
             let mut expected = SVector::<f64, 2>::zeros();
             expected[k % 2] = if k < 2 { -1.0 } else { -2.0 };
-            assert!((column.q - expected).norm() <= 1e-13, "h = {h}, {:?}: {}", variables[k], column.q);
+            assert!((&column.q - expected).norm() <= 1e-13, "h = {h}, {:?}: {:?}", variables[k], column.q);
         }
     }
 }
@@ -301,6 +301,6 @@ fn accumulating_impacts() {
     let system = SwitchingOne::from(system);
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.3));
-    let found = run.gradient_of(|end| (end.q[0], EndCovector::zero()), Until::Time(6.0)).unwrap();
+    let found = run.gradient_of(|end| (end.q[0], EndCovector::zero(1)), Until::Time(6.0)).unwrap();
     assert!(found.loss.is_none() && found.outcome.status != Status::Completed, "{}", found.outcome.status);
 }

@@ -8,7 +8,7 @@ use contact_geom::{
 };
 use contact_geom::{HamiltonianDerivatives, VelocityPoint};
 use discrete_herglotz::sensitivity::{
-    EndCovector, EndState, Gradient, SensitivityError, StateDerivative, TangentRow, Variable,
+    EndCovector, Gradient, MotionState, SensitivityError, StateDerivative, TangentRow, Variable,
 };
 use discrete_herglotz::{GaussCollocation, Problem, Run, Start, Status, Steps, Until};
 
@@ -30,14 +30,14 @@ fn two() -> Start<2> {
 }
 
 /// The components q, v, p, z.
-fn numbers<const N: usize>(x: &StateDerivative<N>) -> Vec<f64> {
+fn numbers(x: &StateDerivative) -> Vec<f64> {
     x.q.iter().chain(&x.v).chain(&x.p).chain([&x.z]).copied().collect()
 }
 
 /// The covectors of these components.
-fn units<const N: usize>() -> Vec<EndCovector<N>> {
+fn units<const N: usize>() -> Vec<EndCovector> {
     let unit = |index: usize| {
-        let mut of = EndCovector::zero();
+        let mut of = EndCovector::zero(N);
         match index / N {
             0 => of.q[index % N] = 1.0,
             1 => of.v[index % N] = 1.0,
@@ -50,7 +50,7 @@ fn units<const N: usize>() -> Vec<EndCovector<N>> {
 }
 
 /// The derivatives in the order of [`Variable::all`].
-fn entries<const N: usize>(of: &Gradient<N>) -> Vec<f64> {
+fn entries(of: &Gradient) -> Vec<f64> {
     let start = of.q.iter().chain(&of.rate).chain([&of.z]);
     start.chain(&of.parameters).chain([&of.t0, &of.t_end]).copied().collect()
 }
@@ -98,12 +98,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         let problem = Problem::new(changed.as_ref().unwrap_or(self.lagrangian), t0, start).unwrap();
         let outcome = self.run(&problem).run(Until::Time(t_end)).unwrap();
         assert_eq!(outcome.status, Status::Completed);
-        numbers(&StateDerivative {
-            q: outcome.q.fixed::<N>(),
-            v: outcome.v.unwrap().fixed(),
-            p: outcome.p.fixed(),
-            z: outcome.z.unwrap(),
-        })
+        numbers(&StateDerivative { q: outcome.q, v: outcome.v.unwrap(), p: outcome.p, z: outcome.z.unwrap() })
     }
 
     /// Central differences, extrapolated once: the error is of order four in the distance 1/512, below 1e-9, and the
@@ -125,7 +120,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         assert_eq!(variables.len(), 2 * N + 1 + self.lagrangian.parameter_count() + 2);
         let until = Until::Time(SPAN.1);
         let tangent = self.run(&problem).tangent(&variables, until).unwrap();
-        let gradients = self.run(&problem).record(until).unwrap().pullbacks(&units()).unwrap();
+        let gradients = self.run(&problem).record(until).unwrap().pullbacks(&units::<N>()).unwrap();
         let size = largest(tangent.columns.iter().flat_map(numbers).collect::<Vec<_>>().iter());
         for (k, (variable, column)) in variables.iter().zip(&tangent.columns).enumerate() {
             let differences = self.difference(variable);
@@ -147,18 +142,18 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
         let times = [SPAN.0, 0.33, 0.47, SPAN.0 + 0.6, 1.5];
         let rows = self.run(&problem).tangent_at(variables, &times, until).unwrap().rows;
         assert_eq!(rows.len(), times.len());
-        let units: Vec<EndCovector<N>> = units();
-        let of = |i: usize| units[(2 * i + 1) % units.len()];
-        let value = |(i, state): (usize, &EndState<N>)| {
-            let EndState { q, v, p, z, .. } = *state;
+        let units = units::<N>();
+        let of = |i: usize| units[(2 * i + 1) % units.len()].clone();
+        let value = |(i, state): (usize, &MotionState)| {
+            let MotionState { q, v, p, z, .. } = state.clone();
             StateDerivative { q, v, p, z }.dot(&of(i))
         };
         let loss =
-            |states: &[EndState<N>]| (states.iter().enumerate().map(value).sum(), (0..states.len()).map(of).collect());
+            |states: &[MotionState]| (states.iter().enumerate().map(value).sum(), (0..states.len()).map(of).collect());
         let (_, gradient) = self.run(&problem).gradient_at(&times, loss, until).unwrap().loss.unwrap();
         let size = largest(rows.iter().flat_map(|row| row.columns.iter().flat_map(numbers)).collect::<Vec<_>>().iter());
         for (k, (variable, backward)) in variables.iter().zip(entries(&gradient)).enumerate() {
-            let of_row = |(i, row): (usize, &TangentRow<N>)| row.columns[k].dot(&of(i));
+            let of_row = |(i, row): (usize, &TangentRow)| row.columns[k].dot(&of(i));
             let forward: f64 = rows.iter().enumerate().map(of_row).sum();
             let apart = (forward - backward).abs() / size;
             assert!(apart <= 1e-13, "{name}, rows, {variable}: {forward:e} and {backward:e}");
@@ -207,8 +202,8 @@ fn the_tangent_is_conformally_contact() {
         );
         for j in 0..2 * N {
             let dz = if j < N { p[j] } else { 0.0 };
-            let (dq, dz) = (columns[j].q + columns[2 * N].q * dz, columns[j].z + columns[2 * N].z * dz);
-            let defect = (dz - tangent.outcome.p.fixed::<N>().dot(&dq)).abs();
+            let (dq, dz) = (&columns[j].q + &columns[2 * N].q * dz, columns[j].z + columns[2 * N].z * dz);
+            let defect = (dz - tangent.outcome.p.dot(&dq)).abs();
             assert!(defect <= 1e3 * f64::EPSILON * largest(matrix.iter()), "{name}: {defect:e} in column {j}");
         }
     }

@@ -129,11 +129,7 @@ pub trait Parametric<const N: usize>: Lagrangian<N> {
     /// [`UnknownParameter`] if there is none of this name.
     fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
         let names = self.parameter_names();
-        names.iter().position(|known| known == name).ok_or_else(|| UnknownParameter {
-            name: name.to_owned(),
-            nearest: nearest_name(name, names.iter().map(String::as_str)).map(str::to_owned),
-            known: names,
-        })
+        names.iter().position(|known| known == name).ok_or_else(|| UnknownParameter::new(name, names))
     }
 }
 
@@ -147,6 +143,14 @@ pub struct UnknownParameter {
     pub nearest: Option<String>,
     /// The names of all parameters.
     pub known: Vec<String>,
+}
+
+impl UnknownParameter {
+    /// The error of a name that is not among these.
+    pub fn new(name: &str, known: Vec<String>) -> Self {
+        let nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
+        UnknownParameter { name: name.to_owned(), nearest, known }
+    }
 }
 
 impl UnknownParameter {

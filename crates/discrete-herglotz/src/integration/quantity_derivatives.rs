@@ -21,11 +21,4 @@ impl<const N: usize> QuantityDerivatives<N> {
         },
         force: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
     };
-
-    /// Adds a multiple of other derivatives.
-    pub fn add(&mut self, factor: f64, other: &Self) {
-        self.l += factor * other.l;
-        self.gradient = self.gradient.plus(other.gradient.scale(factor));
-        self.force += other.force * factor;
-    }
 }

@@ -1,34 +1,33 @@
 //! Columns that are carried along the steps of a run.
 
-use crate::Problem;
 use crate::integration::WholeStep;
 use crate::run::discretization::Discretization;
 use crate::sensitivity::columns::Column;
+use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::{SwitchTime, TangentRow, row};
-use crate::sensitivity::{EndState, SensitivityError};
-use contact_geom::Parametric;
+use crate::sensitivity::{MotionState, SensitivityError};
 
 /// Columns, with the rows and the zeros of switching functions on their way.
-pub(super) struct CarriedColumns<'r, 'p, L, const N: usize> {
-    pub problem: &'r Problem<'p, L, N>,
+pub(super) struct CarriedColumns<'r, 'p> {
+    pub problem: &'r Differentiable<'p>,
     pub steps: &'r Discretization<'p>,
-    pub engine: StepTangent<'p, N>,
+    pub engine: StepTangent<'p>,
     /// For shortened steps and parts of steps.
-    pub row_engine: RowTangent<'p, N>,
-    pub columns: Vec<Column<N>>,
+    pub row_engine: RowTangent<'p>,
+    pub columns: Vec<Column>,
     pub times: RowTimes,
-    pub rows: Vec<TangentRow<N>>,
+    pub rows: Vec<TangentRow>,
     pub switches: Vec<SwitchTime>,
 }
 
-impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
+impl<'r, 'p> CarriedColumns<'r, 'p> {
     pub fn new(
-        problem: &'r Problem<'p, L, N>,
+        problem: &'r Differentiable<'p>,
         steps: &'r Discretization<'p>,
-        engine: StepTangent<'p, N>,
-        columns: Vec<Column<N>>,
+        engine: StepTangent<'p>,
+        columns: Vec<Column>,
         times: RowTimes,
     ) -> Self {
         let (rows, switches) = (Vec::new(), Vec::new());
@@ -60,14 +59,14 @@ impl<'r, 'p, L: Parametric<N>, const N: usize> CarriedColumns<'r, 'p, L, N> {
         let (steps, problem) = (self.steps, self.problem);
         while let Some(t) = self.times.next_within((step.start().0, end)) {
             let (short, state, v) = steps.shortened(step, t).map_err(failed)?;
-            let start = |i: usize, column: &Column<N>| match starts {
+            let start = |i: usize, column: &Column| match starts {
                 Some(starts) => starts[i],
                 None => column.time_after(k),
             };
             let columns = self.columns.iter().enumerate();
             let mut columns: Vec<_> = columns.map(|(i, column)| column.to_fixed_time(start(i, column))).collect();
             self.row_engine.push(&mut self.engine, problem, &short, &mut columns).map_err(failed)?;
-            let state = EndState::at(t, &state, &v);
+            let state = MotionState::at(t, &state, &v);
             self.rows.push(row(problem, state, &columns, |_| 0.0).map_err(failed)?);
         }
         Ok(())

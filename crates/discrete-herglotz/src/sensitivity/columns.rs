@@ -1,28 +1,28 @@
 //! Tangents that are carried forward along a run, and covectors that are carried back.
 
 use crate::sensitivity::linear_stages::StageTangent;
-use contact_geom::nalgebra::SVector;
-use contact_geom::numbers::{MaxAbsOrNan, max_abs_or_nan, max_or_nan};
-use contact_geom::{ChartVector, PhasePoint};
+use crate::{Components, State, Vector};
+use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 
 /// The tangent `(dq, dp, dz)` of a motion along one variable.
-pub(crate) struct Column<const N: usize> {
-    pub q: SVector<f64, N>,
-    pub p: SVector<f64, N>,
+pub(crate) struct Column {
+    pub q: Vector,
+    pub p: Vector,
     pub z: f64,
     /// The parameter that it is the derivative with respect to, if any.
     pub parameter: Option<usize>,
     /// The derivatives of the time at the start of the run and of the step size.
     pub dt0: f64,
     pub dh: f64,
-    pub(super) rates: StageTangent<N>,
+    /// Empty before the first step.
+    pub(super) rates: StageTangent,
     /// Whether the rates are those of a step before, from which the iteration starts.
     pub(super) warm: bool,
 }
 
-impl<const N: usize> Column<N> {
-    pub fn new(q: SVector<f64, N>, p: SVector<f64, N>, z: f64) -> Self {
-        Column { q, p, z, parameter: None, dt0: 0.0, dh: 0.0, rates: StageTangent::ZERO, warm: false }
+impl Column {
+    pub fn new(q: Vector, p: Vector, z: f64) -> Self {
+        Column { q, p, z, parameter: None, dt0: 0.0, dh: 0.0, rates: StageTangent::default(), warm: false }
     }
 
     /// The column of a parameter.
@@ -42,50 +42,50 @@ impl<const N: usize> Column<N> {
 
     /// The column for a step to a fixed time, where the time of its start has this derivative.
     pub fn to_fixed_time(&self, dt: f64) -> Self {
-        Self::copied(self).of_times(dt, -dt)
+        self.copied().of_times(dt, -dt)
     }
 
-    /// The derivative in the length of a step from a fixed state.
-    pub fn of_length() -> Self {
-        Column::new(SVector::zeros(), SVector::zeros(), 0.0).of_times(0.0, 1.0)
+    /// The derivative in the length of a step from a fixed state of n coordinates.
+    pub fn of_length(n: usize) -> Self {
+        Column::new(Vector::zeros(n), Vector::zeros(n), 0.0).of_times(0.0, 1.0)
     }
 
     /// Sets the tangent of the state.
-    pub fn set_state(&mut self, to: &ChartVector<N>) {
+    pub fn set_state(&mut self, to: Components) {
         (self.q, self.p, self.z, self.warm) = (to.x, to.y, to.z, false);
     }
 
     /// The tangent of the state.
-    pub fn state(&self) -> ChartVector<N> {
-        ChartVector { x: self.q, y: self.p, z: self.z }
+    pub fn state(&self) -> Components {
+        Components { x: self.q.clone(), y: self.p.clone(), z: self.z }
     }
 
     /// Carries the column over a step of length zero, with these rates of the state.
-    pub fn push_at_once(&mut self, rates: &ChartVector<N>) {
-        self.set_state(&self.state().plus(rates.scale(self.dh)));
+    pub fn push_at_once(&mut self, rates: &Components) {
+        self.set_state(self.state().plus(&rates.scale(self.dh)));
     }
 
     /// The column at a fixed time, where the state after this number of steps has these rates.
-    pub fn at_fixed_time(&self, steps: usize, rates: &PhasePoint<N>) -> Self {
-        let (mut column, dt) = (Self::copied(self), self.time_after(steps));
-        column.q -= rates.q * dt;
-        column.p -= rates.p * dt;
+    pub fn at_fixed_time(&self, steps: usize, rates: &State) -> Self {
+        let (mut column, dt) = (self.copied(), self.time_after(steps));
+        column.q -= &(&rates.q * dt);
+        column.p -= &(&rates.p * dt);
         column.z -= rates.z * dt;
         column
     }
 
     /// Adds a multiple of another tangent, with that of its rates.
     pub fn add_multiple(&mut self, factor: f64, other: &Self) {
-        self.q += other.q * factor;
-        self.p += other.p * factor;
+        self.q += &(&other.q * factor);
+        self.p += &(&other.p * factor);
         self.z += other.z * factor;
         self.rates.add_multiple(factor, &other.rates);
     }
 
     /// Multiplies the tangent by a factor, with its rates.
     pub fn scale(&mut self, factor: f64) {
-        self.q *= factor;
-        self.p *= factor;
+        self.q = &self.q * factor;
+        self.p = &self.p * factor;
         self.z *= factor;
         self.rates.scale(factor);
     }
@@ -97,8 +97,8 @@ impl<const N: usize> Column<N> {
 
     /// The same tangent without an initial guess of its rates.
     fn copied(&self) -> Self {
-        let Column { q, p, z, parameter, dt0, dh, .. } = *self;
-        Column { parameter, dt0, dh, ..Column::new(q, p, z) }
+        let Column { q, p, z, parameter, dt0, dh, .. } = self;
+        Column { parameter: *parameter, dt0: *dt0, dh: *dh, ..Column::new(q.clone(), p.clone(), *z) }
     }
 
     /// The largest component.
@@ -108,9 +108,9 @@ impl<const N: usize> Column<N> {
 }
 
 /// The derivatives `(g_q, g_p, g_z)` of a number in the state, with those in parameters, time and step size so far.
-pub(crate) struct Covector<const N: usize> {
-    pub q: SVector<f64, N>,
-    pub p: SVector<f64, N>,
+pub(crate) struct Covector {
+    pub q: Vector,
+    pub p: Vector,
     pub z: f64,
     pub parameters: Vec<f64>,
     /// The derivatives in the time of the start of the run, for fixed steps, and in the step size.
@@ -118,13 +118,14 @@ pub(crate) struct Covector<const N: usize> {
     pub step: f64,
     /// The largest component so far.
     pub largest: f64,
-    pub(super) rates: StageTangent<N>,
+    /// Empty before the first step.
+    pub(super) rates: StageTangent,
     /// Whether the rates are those of a step before, from which the iteration starts.
     pub(super) warm: bool,
 }
 
-impl<const N: usize> Covector<N> {
-    pub fn new(of_state: &ChartVector<N>, parameters: Vec<f64>) -> Self {
+impl Covector {
+    pub fn new(of_state: Components, parameters: Vec<f64>) -> Self {
         let largest = max_or_nan(of_state.max_abs_or_nan(), 0.0);
         Covector {
             largest,
@@ -134,23 +135,23 @@ impl<const N: usize> Covector<N> {
             parameters,
             time: 0.0,
             step: 0.0,
-            rates: StageTangent::ZERO,
+            rates: StageTangent::default(),
             warm: false,
         }
     }
 
     /// The derivatives in the state.
-    pub fn state(&self) -> ChartVector<N> {
-        ChartVector { x: self.q, y: self.p, z: self.z }
+    pub fn state(&self) -> Components {
+        Components { x: self.q.clone(), y: self.p.clone(), z: self.z }
     }
 
     /// Sets the derivatives in the state.
-    pub fn set_state(&mut self, to: &ChartVector<N>) {
+    pub fn set_state(&mut self, to: Components) {
         (self.q, self.p, self.z, self.warm) = (to.x, to.y, to.z, false);
     }
 
     /// Carries the covector back over a step of length zero, with these rates of the state.
-    pub fn pull_at_once(&mut self, rates: &ChartVector<N>) {
+    pub fn pull_at_once(&mut self, rates: &Components) {
         self.step += self.q.dot(&rates.x) + self.p.dot(&rates.y) + self.z * rates.z;
     }
 
@@ -166,20 +167,14 @@ impl<const N: usize> Covector<N> {
     }
 
     /// Adds a covector of the state at a fixed time, which the motion has after this number of steps, with these rates.
-    pub fn add_at_fixed_time(
-        &mut self,
-        of_state: &ChartVector<N>,
-        parameters: &[f64],
-        rates: &PhasePoint<N>,
-        steps: usize,
-    ) {
+    pub fn add_at_fixed_time(&mut self, of_state: &Components, parameters: &[f64], rates: &State, steps: usize) {
         self.add_state(of_state, parameters);
         self.add_time(-(of_state.x.dot(&rates.q) + of_state.y.dot(&rates.p) + of_state.z * rates.z), steps);
     }
 
-    pub fn add_state(&mut self, of_state: &ChartVector<N>, parameters: &[f64]) {
-        self.q += of_state.x;
-        self.p += of_state.y;
+    pub fn add_state(&mut self, of_state: &Components, parameters: &[f64]) {
+        self.q += &of_state.x;
+        self.p += &of_state.y;
         self.z += of_state.z;
         self.parameters.iter_mut().zip(parameters).for_each(|(sum, of)| *sum += of);
     }

@@ -8,12 +8,12 @@
 use crate::integration::PartPoint;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Column;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use crate::sensitivity::switch::{Argument, Switch, difference};
-use crate::{StepError, theory::legendre_inverse};
-use contact_geom::nalgebra::{SMatrix, SVector};
+use crate::system::products::times;
+use crate::{Components, Point, State, StepError, System, Vector};
+use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
-use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
 
 /// The distance from the surface of the first of three points from which one-sided limits are extrapolated, relative to
 /// the position and to its change in a step.
@@ -23,99 +23,86 @@ const SURFACE_DISTANCE: f64 = 1e-9;
 const WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
 
 /// The derivatives of the factor lambda and of the normal.
-pub(crate) struct CornerDerivatives<const N: usize> {
+pub(crate) struct CornerDerivatives {
     lambda: f64,
-    normal: SVector<f64, N>,
+    normal: Vector,
     /// Of lambda in `(q, p-, z)`, in the time and in the parameters.
-    of_state: ChartVector<N>,
+    of_state: Components,
     of_time: f64,
     of_parameters: Vec<f64>,
     /// Of the normal in q, in the time and in the parameters.
-    normal_q: SMatrix<f64, N, N>,
-    normal_t: SVector<f64, N>,
-    normal_parameters: Vec<SVector<f64, N>>,
+    normal_q: DMatrix<f64>,
+    normal_t: Vector,
+    normal_parameters: Vec<Vector>,
 }
 
 /// The velocity of a momentum and the first derivatives of L on one side.
-struct OneSided<const N: usize> {
-    v: SVector<f64, N>,
-    gradient: ChartVector<N>,
+struct OneSided {
+    v: Vector,
+    gradient: Components,
     time: f64,
     parameters: Vec<f64>,
 }
 
-impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
+impl Switch<'_, '_> {
     /// The velocity of a momentum and the derivatives of L there, as limits from the side to which `toward` points. On the
     /// surface itself the mass may be that of either side.
     ///
     /// # Errors
-    /// Those of [`legendre_inverse`].
-    fn one_sided(
-        &self,
-        p: SVector<f64, N>,
-        guess: &SVector<f64, N>,
-        toward: &SVector<f64, N>,
-    ) -> Result<OneSided<N>, StepError> {
-        let lagrangian = self.problem.lagrangian;
-        let mut of = ParameterDerivatives::new(lagrangian);
-        let PhasePoint { q, z, .. } = self.at.state.fixed::<N>();
-        let zero = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
-        let mut sum = OneSided { v: zero.x, gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
+    /// Those of [`legendre_inverse`](System::legendre_inverse).
+    fn one_sided(&self, p: &Vector, guess: &Vector, toward: &Vector) -> Result<OneSided, StepError> {
+        let system = self.problem.system();
+        let mut of = self.problem.of.quantities();
+        let State { q, z, .. } = &self.at.state;
+        let zero = Components::zeros(q.len());
+        let mut sum = OneSided { v: zero.x.clone(), gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
         for (weight, k) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
-            let (t, state) = (self.at.t, PhasePoint { q: q + toward * k, p, z });
-            let x = legendre_inverse(lagrangian, t, &state, guess)?;
-            sum.v += x.v * weight;
-            sum.gradient = sum.gradient.plus(lagrangian.gradient(t, &x).scale(weight));
-            sum.time += weight * of.at(lagrangian, Quantity::Time, t, &x).l;
+            let (t, state) = (self.at.t, State { q: q + toward * k, p: p.clone(), z: *z });
+            let x = system.legendre_inverse(t, &state, guess)?;
+            sum.v += &x.v * weight;
+            sum.gradient = sum.gradient.plus(&system.gradient(t, &x).scale(weight));
+            sum.time += weight * of.at(Quantity::Time, t, &x).l;
             for (index, parameter) in sum.parameters.iter_mut().enumerate() {
-                *parameter += weight * of.at(lagrangian, Quantity::Parameter(index), t, &x).l;
+                *parameter += weight * of.at(Quantity::Parameter(index), t, &x).l;
             }
         }
         Ok(sum)
     }
 
     /// The normal `g_q` and the rate `g_t` of the surface, at a point that is moved, by differences.
-    fn normal(&self, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Vec<f64>> {
-        let value = |lagrangian: &L, t: f64, x: &VelocityPoint<N>| {
-            let mut values = Vec::new();
-            lagrangian.switching_functions(t, x, &mut values);
-            values.get(self.index).map(|g| vec![*g])
-        };
-        let arguments = (0..N).map(Argument::Position).chain([Argument::Time]);
-        let normal = arguments.map(|along| difference(along, (lagrangian, t, x), self.h, value));
+    fn normal(&self, system: &dyn System, t: f64, x: &Point) -> Option<Vec<f64>> {
+        let arguments = (0..x.q.len()).map(Argument::Position).chain([Argument::Time]);
+        let normal = arguments.map(|along| difference(along, (t, x), self.h, &|t, x| self.function(system, t, x)));
         normal.map(|of| of?.first().copied()).collect()
     }
 
     /// The derivatives of the corner at the switch, after which the motion is at `next`, on the other side if it is
     /// refracted. The second derivatives of the surface are found by differences.
-    pub(super) fn corner(
-        &self,
-        next: &PartPoint,
-        is_refracted: bool,
-    ) -> Result<CornerDerivatives<N>, SensitivityError> {
+    pub(super) fn corner(&self, next: &PartPoint, is_refracted: bool) -> Result<CornerDerivatives, SensitivityError> {
         let undefined = || self.failed(StepError::NonFinite);
-        let (lagrangian, count) = (self.problem.lagrangian, self.problem.lagrangian.parameter_count());
-        let gradient = self.normal(lagrangian, self.at.t, &self.point()).ok_or_else(undefined)?;
-        let (normal, rate) = (SVector::<f64, N>::from_fn(|i, _| gradient[i]), gradient[N]);
-        let second = |along: Argument| self.difference(along, |l, t, x| self.normal(l, t, x));
-        let mut normal_q = SMatrix::<f64, N, N>::zeros();
-        for j in 0..N {
+        let (problem, n) = (self.problem, self.problem.dimension());
+        let gradient = self.normal(problem.system(), self.at.t, &self.point()).ok_or_else(undefined)?;
+        let (normal, rate) = (Vector::from(&gradient[..n]), gradient[n]);
+        let second = |along: Argument| self.difference(along, |system, t, x| self.normal(system, t, x));
+        let mut normal_q = DMatrix::zeros(n, n);
+        for j in 0..n {
             let of = second(Argument::Position(j))?;
-            (0..N).for_each(|i| normal_q[(i, j)] = of[i]);
+            (0..n).for_each(|i| normal_q[(i, j)] = of[i]);
         }
-        let of_normal = |of: &[f64]| SVector::<f64, N>::from_fn(|i, _| of[i]);
+        let of_normal = |of: &[f64]| Vector::from(&of[..n]);
         let in_time = second(Argument::Time)?;
+        let count = problem.of.parameters().len();
         let in_parameters = (0..count).map(|k| second(Argument::Parameter(k))).collect::<Result<Vec<_>, _>>()?;
 
         let size = max_abs_or_nan(self.at.state.q.iter().copied());
         let moved = max_abs_or_nan(self.at.v.iter().map(|v| v * self.h));
         let length = SURFACE_DISTANCE * if max_or_nan(size, moved) > 0.0 { max_or_nan(size, moved) } else { 1.0 };
         let side = if self.rising { -1.0 } else { 1.0 };
-        let toward = normal * (side * length / normal.norm());
-        let from = if is_refracted { -toward } else { toward };
-        let [p_before, p_after] = [&self.at.state.p, &next.state.p].map(|p| p.fixed::<N>());
-        let before = self.one_sided(p_before, &self.at.v.fixed(), &toward).map_err(|cause| self.failed(cause))?;
-        let after = self.one_sided(p_after, &next.v.fixed(), &from).map_err(|cause| self.failed(cause))?;
+        let toward = &normal * (side * length / normal.norm());
+        let from = if is_refracted { -toward.clone() } else { toward.clone() };
+        let [p_before, p_after] = [&self.at.state.p, &next.state.p];
+        let before = self.one_sided(p_before, &self.at.v, &toward).map_err(|cause| self.failed(cause))?;
+        let after = self.one_sided(p_after, &next.v, &from).map_err(|cause| self.failed(cause))?;
         let (v_before, v_after) = (before.v, after.v);
 
         let lambda = (p_after - p_before).dot(&normal) / normal.dot(&normal);
@@ -123,22 +110,22 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
         if !(divisor.abs() > 0.0 && lambda.is_finite()) {
             return Err(undefined());
         }
-        let jump = after.gradient.minus(before.gradient);
+        let jump = after.gradient.minus(&before.gradient);
         let normal_t = of_normal(&in_time);
-        let explicit = |of: &[f64]| lambda * (v_after.dot(&of_normal(of)) + of[N]);
+        let explicit = |of: &[f64]| lambda * (v_after.dot(&of_normal(of)) + of[n]);
         let parameters = in_parameters.iter().enumerate();
         let of_parameters =
             parameters.map(|(k, of)| (after.parameters[k] - before.parameters[k] - explicit(of)) / divisor).collect();
         Ok(CornerDerivatives {
             lambda,
-            normal,
-            of_state: ChartVector {
-                x: (jump.x - (normal_q.transpose() * v_after + normal_t) * lambda) / divisor,
-                y: (v_before - v_after) / divisor,
+            of_state: Components {
+                x: (jump.x - (times(&normal_q.transpose(), &v_after) + &normal_t) * lambda) / divisor,
+                y: (v_before - &v_after) / divisor,
                 z: jump.z / divisor,
             },
             of_time: (after.time - before.time - explicit(&in_time)) / divisor,
             of_parameters,
+            normal,
             normal_q,
             normal_t,
             normal_parameters: in_parameters.iter().map(|of| of_normal(of)).collect(),
@@ -146,24 +133,26 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     }
 }
 
-impl<const N: usize> CornerDerivatives<N> {
+impl CornerDerivatives {
     /// The tangent `(q, p, z)` after the corner.
-    pub(super) fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
-        let ChartVector { x: q, y: p, z } = column.state();
+    pub(super) fn along(&self, column: &Column, dt: f64) -> Components {
+        let state = column.state();
         let of_parameter = column.parameter.and_then(|k| self.of_parameters.get(k)).copied().unwrap_or(0.0);
-        let lambda = self.of_state.dot(&column.state()) + self.of_time * dt + of_parameter;
-        let explicit =
-            column.parameter.and_then(|k| self.normal_parameters.get(k)).copied().unwrap_or_else(SVector::zeros);
-        let normal = self.normal_q * q + self.normal_t * dt + explicit;
-        ChartVector { x: q, y: p + self.normal * lambda + normal * self.lambda, z }
+        let lambda = self.of_state.dot(&state) + self.of_time * dt + of_parameter;
+        let mut normal = times(&self.normal_q, &state.x) + &self.normal_t * dt;
+        if let Some(explicit) = column.parameter.and_then(|k| self.normal_parameters.get(k)) {
+            normal += explicit;
+        }
+        let Components { x, y, z } = state;
+        Components { x, y: y + &self.normal * lambda + normal * self.lambda, z }
     }
 
     /// The derivatives in the state before the corner, in the parameters and in the time.
-    pub(super) fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+    pub(super) fn pull(&self, of: &Components) -> (Components, Vec<f64>, f64) {
         let of_lambda = of.y.dot(&self.normal);
-        let of_normal = of.y * self.lambda;
-        let mut state = of.plus(self.of_state.scale(of_lambda));
-        state.x += self.normal_q.transpose() * of_normal;
+        let of_normal = &of.y * self.lambda;
+        let mut state = of.clone().plus(&self.of_state.scale(of_lambda));
+        state.x += times(&self.normal_q.transpose(), &of_normal);
         let parameters = self.of_parameters.iter().zip(&self.normal_parameters);
         let parameters = parameters.map(|(a, normal)| a * of_lambda + normal.dot(&of_normal)).collect();
         (state, parameters, self.of_time * of_lambda + self.normal_t.dot(&of_normal))

@@ -4,33 +4,29 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
-use crate::integration::{QuantityDerivatives, SolvedStages};
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::columns::{Column, Covector};
-use crate::sensitivity::fixed_stages::FixedStages;
 use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::{Differentiable, ExplicitDerivatives, Quantities, Quantity};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
-use crate::sensitivity::stage_system::StageSystem;
 use crate::sensitivity::step_maps::{Direction, StepMaps};
-use crate::{Problem, StepError};
-use contact_geom::nalgebra::SVector;
+use crate::{Point, StepError};
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{Parametric, VelocityPoint};
 use pulp::{Simd, WithSimd};
 
 /// The tangent of steps of one length in one direction, with its workspace.
-pub(crate) struct Engine<'a, const N: usize> {
-    system: &'a dyn StageSystem<N>,
+pub(crate) struct Engine<'a> {
+    problem: Differentiable<'a>,
     forward: StepMaps,
     maps: StepMaps,
-    at: StageDerivatives<N>,
-    linear: LinearStages<N>,
-    given: Inhomogeneity<N>,
-    of_parameters: ParameterDerivatives<N>,
+    at: StageDerivatives,
+    linear: LinearStages,
+    given: Inhomogeneity,
+    of_parameters: Box<dyn Quantities + 'a>,
     /// Whether L or the force depend on the time.
     timed: bool,
     /// Whether the maps for constant mass and rate apply.
@@ -40,31 +36,31 @@ pub(crate) struct Engine<'a, const N: usize> {
     arch: Instructions,
 }
 
-impl<'a, const N: usize> Engine<'a, N> {
-    pub fn new<L: Parametric<N>>(problem: &Problem<'a, L, N>, s: usize, h: f64, direction: Direction) -> Self {
-        let lagrangian = problem.lagrangian;
+impl<'a> Engine<'a> {
+    pub fn new(problem: &Differentiable<'a>, s: usize, h: f64, direction: Direction) -> Self {
+        let (n, structure) = (problem.dimension(), &problem.problem.structure);
         let at = StageDerivatives::new(problem);
-        let velocity_terms = !at.form.separable || const { L::HINTS.forced };
-        let condenses = !velocity_terms && at.form.affine && problem.structure.has_constant_rate();
+        let velocity_terms = !at.form.separable || problem.system().hints().forced;
+        let condenses = !velocity_terms && at.form.affine && structure.has_constant_rate();
         Engine {
-            system: lagrangian,
             forward: StepMaps::new(s, h, Direction::Forward),
             maps: StepMaps::new(s, h, direction),
-            linear: LinearStages::new(direction, !at.form.affine, velocity_terms),
+            linear: LinearStages::new(n, direction, !at.form.affine, velocity_terms),
             condenses: condenses && at.form.inverse_mass.is_some(),
             actions: None,
             at,
-            given: Inhomogeneity::ZERO,
-            of_parameters: ParameterDerivatives::new(lagrangian),
-            timed: !problem.structure.autonomous,
+            given: Inhomogeneity::zeros(n),
+            of_parameters: problem.of.quantities(),
+            timed: !structure.autonomous,
             arch: Instructions::new(),
+            problem: problem.clone(),
         }
     }
 
     /// An engine for a shortened step, which is kept in `engine`.
-    pub fn of_row<'e, L: Parametric<N>>(
+    pub fn of_row<'e>(
         engine: &'e mut Option<Self>,
-        problem: &Problem<'a, L, N>,
+        problem: &Differentiable<'a>,
         step: &SolvedStages,
         direction: Direction,
     ) -> &'e mut Self {
@@ -80,27 +76,36 @@ impl<'a, const N: usize> Engine<'a, N> {
     ///
     /// # Errors
     /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
-    pub fn push(&mut self, step: &SolvedStages, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
-        self.arch.dispatch(Push { engine: self, step: &FixedStages::of(step)?, k, columns })
+    pub fn push(&mut self, step: &SolvedStages, k: usize, columns: &mut [Column]) -> Result<f64, StepError> {
+        self.check(step)?;
+        self.arch.dispatch(Push { engine: self, step, k, columns })
     }
 
     /// Carries covectors from the end of a step, the k-th of the run, to its start.
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &SolvedStages, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
-        self.arch.dispatch(Pull { engine: self, step: &FixedStages::of(step)?, k, covectors })
+    pub fn pull(&mut self, step: &SolvedStages, k: usize, covectors: &mut [Covector]) -> Result<(), StepError> {
+        self.check(step)?;
+        self.arch.dispatch(Pull { engine: self, step, k, covectors })
+    }
+
+    /// # Errors
+    /// [`StepError::NonFinite`] for stages with another number of coordinates.
+    fn check(&self, step: &SolvedStages) -> Result<(), StepError> {
+        let (n, SolvedStages { start, v, force, .. }) = (self.at.q.len(), step);
+        let same = [start.q.len(), start.p.len(), v.len(), force.len()] == [n; 4];
+        if same { Ok(()) } else { Err(StepError::NonFinite) }
     }
 
     /// Evaluates the derivatives at the stages of a step.
     #[inline(always)]
-    fn prepare(&mut self, step: &FixedStages<'_, N>) -> Result<(), StepError> {
+    fn prepare(&mut self, step: &SolvedStages) -> Result<(), StepError> {
         if self.actions.is_none() && !step.knows_l {
-            let (t, x) =
-                (step.t, VelocityPoint { q: step.start.q, v: SVector::from_fn(|d, _| step.v[d].0[0]), z: 0.0 });
-            self.actions = self.forward.resolvent(-self.system.rate_at(t, &x));
+            let x = Point { q: step.start.q.clone(), v: step.v.iter().map(|v| v.0[0]).collect(), z: 0.0 };
+            self.actions = self.forward.resolvent(-self.problem.system().gradient(step.t, &x).z);
         }
-        self.system.evaluate(self.arch, &mut self.at, &self.forward, step, self.actions.as_ref())?;
+        self.problem.of.evaluate_stages(self.arch, &mut self.at, &self.forward, step, self.actions.as_ref())?;
         if self.condenses
             && !self.linear.is_condensed()
             && let Some(inverse) = &self.at.form.inverse_mass
@@ -112,45 +117,45 @@ impl<'a, const N: usize> Engine<'a, N> {
     }
 
     #[inline(always)]
-    fn push_column<S: Simd>(
-        &mut self,
-        step: &FixedStages<'_, N>,
-        k: usize,
-        column: &mut Column<N>,
-    ) -> Result<(), StepError> {
-        let s = step.s;
+    fn push_column<S: Simd>(&mut self, step: &SolvedStages, k: usize, column: &mut Column) -> Result<(), StepError> {
+        let (s, n) = (step.s, self.at.q.len());
+        column.rates.reserve(n);
         let fraction = column.dh / step.h;
         self.set_sources(step, k, column);
         let (given, at) = (&mut self.given, &self.at);
-        for d in 0..N {
-            given.q[d] = Stages([column.q[d]; MAX_STAGES]);
-            given.p[d] = Stages([column.p[d]; MAX_STAGES]);
+        let (given_q, given_p, q, p) = (&mut given.q[..n], &mut given.p[..n], &column.q[..n], &column.p[..n]);
+        for d in 0..n {
+            given_q[d] = Stages([q[d]; MAX_STAGES]);
+            given_p[d] = Stages([p[d]; MAX_STAGES]);
         }
         given.z = Stages([column.z; MAX_STAGES]);
         given.r = Stages::ZERO;
         if fraction != 0.0 {
             given.has_r = true;
+            let (at_q, l_v, q0, p0) = (&at.q[..n], &at.l_v[..n], &step.start.q[..n], &step.start.p[..n]);
             for i in 0..s {
-                for d in 0..N {
-                    given.q[d].0[i] += fraction * (at.q[d].0[i] - step.start.q[d]);
-                    given.p[d].0[i] += fraction * (at.rho.0[i] * at.l_v[d].0[i] - step.start.p[d]);
+                for d in 0..n {
+                    given_q[d].0[i] += fraction * (at_q[d].0[i] - q0[d]);
+                    given_p[d].0[i] += fraction * (at.rho.0[i] * l_v[d].0[i] - p0[d]);
                 }
                 given.z.0[i] += fraction * (at.z.0[i] - step.start.z);
                 given.r.0[i] = fraction * (at.rho.0[i] - 1.0);
             }
         }
         if column.warm {
-            extrapolate::<S, N>(&self.maps, &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
+            extrapolate::<S>(&self.maps, &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
         }
         self.linear.solve::<S>(&self.maps, &self.given, &mut column.rates)?;
         let (rates, maps) = (&column.rates, &self.maps);
         let (rho, scaled) = (self.at.end_rho, end_value::<S>(maps, &rates.r_rate) + fraction * (self.at.end_rho - 1.0));
-        for d in 0..N {
-            let moved = end_value::<S>(&self.forward, &step.v[d]);
-            let pushed = end_value::<S>(&self.forward, &step.force[d]);
-            column.q[d] += end_value::<S>(maps, &rates.v[d]) + fraction * moved;
-            let p = column.p[d] + end_value::<S>(maps, &rates.p_rate[d]) + fraction * pushed;
-            column.p[d] = (p - self.at.end_p[d] * scaled) / rho;
+        let (q, p, end_p) = (&mut column.q[..n], &mut column.p[..n], &self.at.end_p[..n]);
+        let (of_q, of_p, v, force) = (&rates.v[..n], &rates.p_rate[..n], &step.v[..n], &step.force[..n]);
+        for d in 0..n {
+            let moved = end_value::<S>(&self.forward, &v[d]);
+            let pushed = end_value::<S>(&self.forward, &force[d]);
+            q[d] += end_value::<S>(maps, &of_q[d]) + fraction * moved;
+            let end = p[d] + end_value::<S>(maps, &of_p[d]) + fraction * pushed;
+            p[d] = (end - end_p[d] * scaled) / rho;
         }
         column.z += end_value::<S>(maps, &rates.z_rate) + fraction * end_value::<S>(&self.forward, &self.at.l);
         column.warm = true;
@@ -158,34 +163,43 @@ impl<'a, const N: usize> Engine<'a, N> {
     }
 
     /// Sets the sources of a column: the derivatives of the rates with respect to its parameter and to the time.
-    fn set_sources(&mut self, step: &FixedStages<'_, N>, k: usize, column: &Column<N>) {
-        let given = &mut self.given;
-        given.has_r = false;
+    #[inline(always)]
+    fn set_sources(&mut self, step: &SolvedStages, k: usize, column: &Column) {
         let start = column.dt0 + k as f64 * column.dh;
         let moves = self.timed && (start != 0.0 || column.dh != 0.0);
-        if column.parameter.is_none() && !moves {
-            given.v_source = [Stages::ZERO; N];
-            given.p_source = [Stages::ZERO; N];
-            given.z_source = Stages::ZERO;
-            given.r_source = Stages::ZERO;
+        let given = &mut self.given;
+        given.has_r = column.parameter.is_some() || moves;
+        if given.has_r {
+            self.evaluate_sources(step, column, moves.then_some(start));
             return;
         }
-        given.has_r = true;
+        given.v_source.fill(Stages::ZERO);
+        given.p_source.fill(Stages::ZERO);
+        given.z_source = Stages::ZERO;
+        given.r_source = Stages::ZERO;
+    }
+
+    /// Sets the sources that do not vanish; `start` is the derivative of the time at the start of the step, unless the
+    /// sources do not depend on the time. Not inlined, since it evaluates the system stage by stage.
+    #[inline(never)]
+    fn evaluate_sources(&mut self, step: &SolvedStages, column: &Column, start: Option<f64>) {
+        let (n, given, of_parameters) = (self.at.q.len(), &mut self.given, &mut self.of_parameters);
         let c = &Coefficients::of(step.s).c;
+        let (_, mut x) = self.at.point(0);
         for i in 0..step.s {
-            let (t, x) = self.at.point(i);
-            let mut of = QuantityDerivatives::ZERO;
-            if let Some(k) = column.parameter {
-                of.add(1.0, &self.system.quantity_at(&mut self.of_parameters, Quantity::Parameter(k), t, &x));
-            }
-            if moves {
+            let t = self.at.move_point(i, &mut x);
+            let mut of = match column.parameter {
+                Some(k) => of_parameters.at(Quantity::Parameter(k), t, &x),
+                None => ExplicitDerivatives::zeros(n),
+            };
+            if let Some(start) = start {
                 let factor = start + c[i].0 * column.dh;
-                of.add(factor, &self.system.quantity_at(&mut self.of_parameters, Quantity::Time, t, &x));
+                of.add(factor, &of_parameters.at(Quantity::Time, t, &x));
             }
-            let rho = self.at.rho.0[i];
-            for d in 0..N {
-                given.v_source[d].0[i] = rho * of.gradient.y[d];
-                given.p_source[d].0[i] = rho * (of.gradient.x[d] + of.force[d]);
+            let (rho, of_q, of_v, force) = (self.at.rho.0[i], &of.gradient.x[..n], &of.gradient.y[..n], &of.force[..n]);
+            for d in 0..n {
+                given.v_source[d].0[i] = rho * of_v[d];
+                given.p_source[d].0[i] = rho * (of_q[d] + force[d]);
             }
             given.z_source.0[i] = of.l;
             given.r_source.0[i] = rho * of.gradient.z;
@@ -195,29 +209,32 @@ impl<'a, const N: usize> Engine<'a, N> {
     #[inline(always)]
     fn pull_covector<S: Simd>(
         &mut self,
-        step: &FixedStages<'_, N>,
+        step: &SolvedStages,
         k: usize,
-        covector: &mut Covector<N>,
+        covector: &mut Covector,
     ) -> Result<(), StepError> {
-        let (given, rho) = (&mut self.given, self.at.end_rho);
-        let w_q = covector.p / rho;
+        let (n, given, rho) = (self.at.q.len(), &mut self.given, self.at.end_rho);
+        covector.rates.reserve(n);
+        let w_q = &covector.p / rho;
         let w_z = self.at.end_p.dot(&w_q);
-        for d in 0..N {
-            given.q[d] = Stages([w_q[d]; MAX_STAGES]);
-            given.p[d] = Stages([-covector.q[d]; MAX_STAGES]);
+        let (given_q, given_p, w_q, of_q) = (&mut given.q[..n], &mut given.p[..n], &w_q[..n], &covector.q[..n]);
+        for d in 0..n {
+            given_q[d] = Stages([w_q[d]; MAX_STAGES]);
+            given_p[d] = Stages([-of_q[d]; MAX_STAGES]);
         }
         given.z = Stages([w_z; MAX_STAGES]);
         given.r = Stages([covector.z; MAX_STAGES]);
         given.has_r = covector.z != 0.0;
         if covector.warm {
-            extrapolate::<S, N>(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
+            extrapolate::<S>(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
         }
         self.linear.solve::<S>(&self.maps, &self.given, &mut covector.rates)?;
         self.add_derivatives::<S>(step, k, covector);
         let (rates, maps) = (&covector.rates, &self.maps);
-        for d in 0..N {
-            covector.p[d] = w_q[d] + end_value::<S>(maps, &rates.v[d]);
-            covector.q[d] -= end_value::<S>(maps, &rates.p_rate[d]);
+        let (q, p, v, p_rate) = (&mut covector.q[..n], &mut covector.p[..n], &rates.v[..n], &rates.p_rate[..n]);
+        for d in 0..n {
+            p[d] = w_q[d] + end_value::<S>(maps, &v[d]);
+            q[d] -= end_value::<S>(maps, &p_rate[d]);
         }
         covector.z += end_value::<S>(maps, &rates.r_rate);
         covector.warm = true;
@@ -226,14 +243,15 @@ impl<'a, const N: usize> Engine<'a, N> {
 
     /// Adds the derivatives with respect to parameters, time and step size over the step.
     #[inline(always)]
-    fn add_derivatives<S: Simd>(&mut self, step: &FixedStages<'_, N>, k: usize, covector: &mut Covector<N>) {
-        let (w, at) = (&covector.rates, &self.at);
+    fn add_derivatives<S: Simd>(&mut self, step: &SolvedStages, k: usize, covector: &mut Covector) {
+        let (w, at, n) = (&covector.rates, &self.at, self.at.q.len());
         // The pairing of the covector with the rates of the motion.
-        let mut stretch = product(&w.z, step.rate);
+        let mut stretch = product(&w.z, &step.rate);
         add_product(&mut stretch, &w.r, &at.l);
-        for d in 0..N {
-            add_product(&mut stretch, &w.q[d], &step.force[d]);
-            subtract_product(&mut stretch, &w.p[d], &at.v[d]);
+        let (w_q, w_p, v, force) = (&w.q[..n], &w.p[..n], &at.v[..n], &step.force[..n]);
+        for d in 0..n {
+            add_product(&mut stretch, &w_q[d], &force[d]);
+            subtract_product(&mut stretch, &w_p[d], &v[d]);
         }
         covector.step += end_value::<S>(&self.forward, &stretch) / step.h;
         let weights = self.forward.weights;
@@ -252,20 +270,21 @@ impl<'a, const N: usize> Engine<'a, N> {
     }
 
     /// The derivative in a quantity over the step, with weights.
-    fn derivative_in(&mut self, quantity: Quantity, w: &StageTangent<N>, weights: &Stages) -> f64 {
-        self.system.quantity_along(self.arch, &mut self.of_parameters, quantity, &self.at, (w, weights))
+    #[inline(always)]
+    fn derivative_in(&mut self, quantity: Quantity, w: &StageTangent, weights: &Stages) -> f64 {
+        self.of_parameters.along(self.arch, quantity, &self.at, (w, weights))
     }
 }
 
 /// Columns over a step, compiled for one instruction set.
-struct Push<'e, 'a, const N: usize> {
-    engine: &'e mut Engine<'a, N>,
-    step: &'e FixedStages<'e, N>,
+struct Push<'e, 'a> {
+    engine: &'e mut Engine<'a>,
+    step: &'e SolvedStages,
     k: usize,
-    columns: &'e mut [Column<N>],
+    columns: &'e mut [Column],
 }
 
-impl<const N: usize> WithSimd for Push<'_, '_, N> {
+impl WithSimd for Push<'_, '_> {
     type Output = Result<f64, StepError>;
 
     #[inline(always)]
@@ -282,14 +301,14 @@ impl<const N: usize> WithSimd for Push<'_, '_, N> {
 }
 
 /// Covectors over a step, compiled for one instruction set.
-struct Pull<'e, 'a, const N: usize> {
-    engine: &'e mut Engine<'a, N>,
-    step: &'e FixedStages<'e, N>,
+struct Pull<'e, 'a> {
+    engine: &'e mut Engine<'a>,
+    step: &'e SolvedStages,
     k: usize,
-    covectors: &'e mut [Covector<N>],
+    covectors: &'e mut [Covector],
 }
 
-impl<const N: usize> WithSimd for Pull<'_, '_, N> {
+impl WithSimd for Pull<'_, '_> {
     type Output = Result<(), StepError>;
 
     #[inline(always)]
@@ -307,10 +326,10 @@ impl<const N: usize> WithSimd for Pull<'_, '_, N> {
 /// Takes the polynomials of the rates over one step as the initial guess of the next one, with the factors of (v, z')
 /// and of r'.
 #[inline(always)]
-fn extrapolate<S: Simd, const N: usize>(maps: &StepMaps, rates: &mut StageTangent<N>, [of_motion, of_r]: [f64; 2]) {
-    for d in 0..N {
-        extrapolate_rates::<S>(maps, &mut rates.v[d], of_motion);
-        extrapolate_rates::<S>(maps, &mut rates.p_rate[d], of_r);
+fn extrapolate<S: Simd>(maps: &StepMaps, rates: &mut StageTangent, [of_motion, of_r]: [f64; 2]) {
+    for (v, p_rate) in rates.v.iter_mut().zip(&mut rates.p_rate) {
+        extrapolate_rates::<S>(maps, v, of_motion);
+        extrapolate_rates::<S>(maps, p_rate, of_r);
     }
     extrapolate_rates::<S>(maps, &mut rates.z_rate, of_motion);
     extrapolate_rates::<S>(maps, &mut rates.r_rate, of_r);

@@ -4,7 +4,7 @@ use crate::ensemble::EnsembleError;
 use crate::ensemble::shards;
 use crate::ensemble::single::Common;
 use crate::run::Interruption;
-use crate::sensitivity::{EndCovector, EndState, Loss, LossGradient, SensitivityError, Tangent, Variable};
+use crate::sensitivity::{EndCovector, Loss, LossGradient, MotionState, SensitivityError, Tangent, Variable};
 use crate::{Ensemble, InputError, Problem, Run, Until};
 use contact_geom::Parametric;
 use std::ops::ControlFlow;
@@ -17,13 +17,13 @@ const SHARDS_PER_THREAD: usize = 8;
 
 /// The gradients of the losses of the members of an ensemble; see [`Ensemble::gradient`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct BatchGradient<const N: usize> {
+pub struct BatchGradient {
     /// The members in the order of their index. A member whose run was not completed has no loss, and its outcome says
     /// why; one that cannot be differentiated has an error.
-    pub members: Vec<Result<LossGradient<N>, SensitivityError>>,
+    pub members: Vec<Result<LossGradient, SensitivityError>>,
 }
 
-impl<const N: usize> BatchGradient<N> {
+impl BatchGradient {
     /// The sum of the losses of all members, and its gradient in the parameters where these have the same values for all
     /// members; summed in the order of the members. `None` if a member has no gradient.
     pub fn total(&self) -> Option<(f64, Vec<f64>)> {
@@ -42,7 +42,7 @@ impl<const N: usize> BatchGradient<N> {
     }
 
     /// The members without a gradient, by their index.
-    pub fn failed(&self) -> impl Iterator<Item = (usize, &Result<LossGradient<N>, SensitivityError>)> {
+    pub fn failed(&self) -> impl Iterator<Item = (usize, &Result<LossGradient, SensitivityError>)> {
         self.members.iter().enumerate().filter(|(_, member)| !matches!(member, Ok(LossGradient { loss: Some(_), .. })))
     }
 }
@@ -82,7 +82,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// # Errors
     /// [`EnsembleError::Empty`], [`EnsembleError::Threads`], and [`EnsembleError::Member`] if there is no integrator or no
     /// step. Errors of a run are those of its member.
-    pub fn gradient(&self, loss: &(impl Loss<N> + Sync), until: Until) -> Result<BatchGradient<N>, EnsembleError> {
+    pub fn gradient(&self, loss: &(impl Loss<N> + Sync), until: Until) -> Result<BatchGradient, EnsembleError> {
         self.gradient_of(|_, end| end.differentiate(loss), until)
     }
 
@@ -93,9 +93,9 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// Those of [`gradient`](Self::gradient).
     pub fn gradient_of(
         &self,
-        loss: impl Fn(usize, &EndState<N>) -> (f64, EndCovector<N>) + Sync,
+        loss: impl Fn(usize, &MotionState) -> (f64, EndCovector) + Sync,
         until: Until,
-    ) -> Result<BatchGradient<N>, EnsembleError> {
+    ) -> Result<BatchGradient, EnsembleError> {
         self.each_run(until, |index, run| run.gradient_of(|end| loss(index, end), until))
             .map(|members| BatchGradient { members })
     }
@@ -109,9 +109,9 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     pub fn gradient_at(
         &self,
         times: &[f64],
-        loss: impl Fn(usize, &[EndState<N>]) -> (f64, Vec<EndCovector<N>>) + Sync,
+        loss: impl Fn(usize, &[MotionState]) -> (f64, Vec<EndCovector>) + Sync,
         until: Until,
-    ) -> Result<BatchGradient<N>, EnsembleError> {
+    ) -> Result<BatchGradient, EnsembleError> {
         self.each_run(until, |index, run| run.gradient_at(times, |states| loss(index, states), until))
             .map(|members| BatchGradient { members })
     }
@@ -126,7 +126,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         variables: &[Variable],
         times: &[f64],
         until: Until,
-    ) -> Result<Vec<Result<Tangent<N>, SensitivityError>>, EnsembleError> {
+    ) -> Result<Vec<Result<Tangent, SensitivityError>>, EnsembleError> {
         self.each_run(until, |_, run| run.tangent_at(variables, times, until))
     }
 

@@ -1,11 +1,11 @@
 //! Derivatives of the times of events.
 
-use crate::StepError;
 use crate::sensitivity::switch::{MIN_RATE, terms};
-use crate::sensitivity::{EndCovector, EndState, Loss, SensitivityError};
+use crate::sensitivity::{EndCovector, Loss, MotionState, SensitivityError};
+use crate::{Components, Point, StepError};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
 
-impl<const N: usize> EndState<N> {
+impl MotionState {
     /// The partial derivatives, in this state, of the time at which a function of the state is zero: this is a state of the
     /// motion at a zero, such as that of a [`Crossing`](crate::Crossing), and the time of the zero has the derivative
     /// `dt = -dg / g'`, where dg is the derivative for a fixed time and g' the rate along the motion.
@@ -38,24 +38,25 @@ impl<const N: usize> EndState<N> {
     /// # Errors
     /// [`SensitivityError::Grazing`] where the rate of the function is round-off, [`SensitivityError::Loss`] where its
     /// derivatives are not finite.
-    pub fn event_time(
+    pub fn event_time<L: Lagrangian<N>, const N: usize>(
         &self,
-        lagrangian: &impl Lagrangian<N>,
+        lagrangian: &L,
         function: &impl Loss<N>,
-    ) -> Result<EndCovector<N>, SensitivityError> {
+    ) -> Result<EndCovector, SensitivityError> {
         let (value, of) = self.differentiate(function);
         if !of.is_finite() {
             return Err(SensitivityError::Loss { value });
         }
-        let x = VelocityPoint { q: self.q, v: self.v, z: self.z };
+        let at = self.fixed::<N>();
+        let x = VelocityPoint { q: at.q, v: at.v, z: at.z };
         let singular = |_| SensitivityError::Step { step: 0, cause: StepError::NonFinite };
-        let field = herglotz_field(lagrangian, self.t, &x).map_err(singular)?;
+        let field = Components::from(herglotz_field(lagrangian, self.t, &x).map_err(singular)?);
         let (_, slope) = lagrangian.with_gradient_and_force(self.t, &x);
-        let of_p = of.p.dot(&(slope.x + self.p * slope.z));
+        let of_p = of.p.dot(&(slope.x + &self.p * slope.z));
         let rate = of.t + of.q.dot(&field.x) + of.v.dot(&field.y) + of_p + of.z * field.z;
         // The terms over a unit of the time in which the state changes by its rates.
-        let size =
-            terms(&of, (self.t, &x), &field, 1.0) + of.p.iter().zip(&self.p).map(|(a, b)| (a * b).abs()).sum::<f64>();
+        let size = terms(&of, (self.t, &Point::from(x)), &field, 1.0)
+            + of.p.iter().zip(&self.p).map(|(a, b)| (a * b).abs()).sum::<f64>();
         // Written so that a NaN is refused.
         if rate.abs() > MIN_RATE * size {
             let factor = -1.0 / rate;

@@ -3,35 +3,35 @@
 use crate::integration::{Motion, PartPoint, WholeStep};
 use crate::run::discretization::Discretization;
 use crate::run::{Outcome, Plan, Row, Rows, Run, Until};
-use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
-use crate::sensitivity::end_state::{EndCovector, EndState, Loss, VelocityDependence};
 use crate::sensitivity::gradient_parts::PartCovectors;
 use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem, Quantity};
 use crate::sensitivity::row_times::{check_times, is_same_time};
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::no_tangent;
-use crate::{InputError, Problem, Status, StepError, Stepper, Vector};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Hessian, Parametric, VelocityPoint};
+use crate::sensitivity::velocity_dependence::VelocityDependence;
+use crate::sensitivity::{EndCovector, Loss, MotionState, SensitivityError};
+use crate::system::products::times;
+use crate::{InputError, Point, Problem, SecondDerivatives, Status, StepError, Stepper, Vector};
+use contact_geom::{GeometryError, Parametric};
 use std::ops::Range;
 
 /// The gradient of a number that depends on the end of a run, with respect to all variables of the run; see
 /// [`Variable`](crate::sensitivity::Variable) for what is fixed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Gradient<const N: usize> {
+pub struct Gradient {
     /// In the initial position.
-    pub q: SVector<f64, N>,
+    pub q: Vector,
     /// In the initial velocity, or in the initial momentum if the start was given by it.
-    pub rate: SVector<f64, N>,
+    pub rate: Vector,
     /// In the initial action.
     pub z: f64,
-    /// In the parameters, in the order of [`Parametric::parameter_names`]; NaN for a parameter in which the steps of a
-    /// splitting are not differentiable, because its hypotheses hold only for one value. For a
-    /// [`CustomMethod`](crate::CustomMethod), parameters and times are NaN: its discrete Lagrangian is differentiated in the
-    /// state alone.
+    /// In the parameters, in the order of [`Parametric::parameter_names`](contact_geom::Parametric::parameter_names);
+    /// NaN for a parameter in which the steps of a splitting are not differentiable, because its hypotheses hold only for
+    /// one value. For a [`CustomMethod`](crate::CustomMethod), parameters and times are NaN: its discrete Lagrangian is
+    /// differentiated in the state alone.
     pub parameters: Vec<f64>,
     /// In the time of the start, for a fixed end time and a fixed number of steps.
     pub t0: f64,
@@ -44,41 +44,26 @@ pub struct Gradient<const N: usize> {
 
 /// A run with the gradient of a loss of its end.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LossGradient<const N: usize> {
+pub struct LossGradient {
     /// The outcome of the run.
     pub outcome: Outcome,
     /// The value of the loss and its gradient; `None` if the run was not completed, for the reason that the status of
     /// the outcome gives.
-    pub loss: Option<(f64, Gradient<N>)>,
+    pub loss: Option<(f64, Gradient)>,
 }
 
 /// A run that was performed and of which gradients can be computed, any number of them.
 ///
 /// The memory does not grow with the number of steps: states are kept at intervals, and the steps between them are taken
 /// again, so that the stages are bitwise those of the run.
-pub struct RecordedRun<'p, L, const N: usize> {
-    problem: &'p Problem<'p, L, N>,
+pub struct RecordedRun<'p> {
+    problem: Differentiable<'p>,
     plan: Plan<'p>,
     outcome: Outcome,
     kept: KeptStates,
 }
 
 impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
-    /// Performs the run and keeps what its gradients need.
-    ///
-    /// # Errors
-    /// Those of [`run`](Self::run), and [`SensitivityError::NoTangent`].
-    pub fn record(self, until: Until) -> Result<RecordedRun<'p, L, N>, SensitivityError> {
-        let run = self.differentiable()?;
-        let problem = run.problem;
-        let plan = run.plan(until)?;
-        // An integrator without a tangent is refused before the run.
-        StepTangent::new(problem, &plan.steps, Direction::Backward)?;
-        let mut kept = KeptStates::new();
-        let outcome = run.observed(&plan, &mut kept)?;
-        Ok(RecordedRun { problem, plan, outcome, kept })
-    }
-
     /// Performs the run, and computes the value and the gradient of a loss of its end by the adjoint. The gradient is
     /// that of the discrete run, to round-off: of the steps that were given, or that were chosen for an accuracy, which
     /// are not differentiated themselves.
@@ -105,19 +90,48 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// # Errors
     /// Those of [`record`](Self::record) and of [`RecordedRun::pullback`]; [`SensitivityError::Loss`] where the loss or
     /// its derivative is not finite.
-    pub fn gradient(self, loss: &impl Loss<N>, until: Until) -> Result<LossGradient<N>, SensitivityError> {
+    pub fn gradient(self, loss: &impl Loss<N>, until: Until) -> Result<LossGradient, SensitivityError> {
         self.gradient_of(|end| end.differentiate(loss), until)
     }
+}
 
-    /// The same for a loss that is given as a function with its partial derivatives in the end state.
+impl<'p> Run<'p, '_> {
+    /// The gradient of a loss, as of a run of a [`Problem`].
+    ///
+    /// # Errors
+    /// The same; [`InputError::Geometry`](crate::InputError::Geometry) for a loss of another number of coordinates.
+    pub fn gradient<const N: usize>(self, loss: &impl Loss<N>, until: Until) -> Result<LossGradient, SensitivityError> {
+        check_length("the argument of the loss", N, self.problem.system.dimension())?;
+        self.gradient_of(|end| end.differentiate(loss), until)
+    }
+}
+
+impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
+    /// Performs the run and keeps what its gradients need.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run), and [`SensitivityError::NoTangent`].
+    pub fn record(self, until: Until) -> Result<RecordedRun<'p>, SensitivityError> {
+        let run = self.differentiable()?;
+        let problem = run.problem.differentiable();
+        let plan = run.plan(until)?;
+        // An integrator without a tangent is refused before the run.
+        StepTangent::new(&problem, &plan.steps, Direction::Backward)?;
+        let mut kept = KeptStates::new();
+        let outcome = run.observed(&plan, &mut kept)?;
+        Ok(RecordedRun { problem, plan, outcome, kept })
+    }
+
+    /// Performs the run, and computes the value and the gradient of a loss of its end, which is given as a function with its
+    /// partial derivatives, by the adjoint; see [`gradient`](Run::gradient).
     ///
     /// # Errors
     /// Those of [`gradient`](Self::gradient).
     pub fn gradient_of(
         self,
-        loss: impl FnOnce(&EndState<N>) -> (f64, EndCovector<N>),
+        loss: impl FnOnce(&MotionState) -> (f64, EndCovector),
         until: Until,
-    ) -> Result<LossGradient<N>, SensitivityError> {
+    ) -> Result<LossGradient, SensitivityError> {
         let recorded = self.record(until)?;
         let Some(end) = recorded.end() else { return Ok(LossGradient { outcome: recorded.outcome, loss: None }) };
         let (value, covector) = loss(&end);
@@ -129,7 +143,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     }
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
+impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
     /// The same for a loss of the states at these times, which are in the order of the run: a function with its partial
     /// derivatives in each of them. The times are fixed, except the end of the run.
     ///
@@ -138,14 +152,14 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     pub fn gradient_at(
         self,
         times: &[f64],
-        loss: impl FnOnce(&[EndState<N>]) -> (f64, Vec<EndCovector<N>>),
+        loss: impl FnOnce(&[MotionState]) -> (f64, Vec<EndCovector>),
         until: Until,
-    ) -> Result<LossGradient<N>, SensitivityError> {
+    ) -> Result<LossGradient, SensitivityError> {
         let run = self.differentiable()?;
-        let problem = run.problem;
+        let problem = run.problem.differentiable();
         let plan = run.plan(until)?;
         // An integrator without a tangent is refused before the run.
-        StepTangent::new(problem, &plan.steps, Direction::Backward)?;
+        StepTangent::new(&problem, &plan.steps, Direction::Backward)?;
         let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;
         let (kept, rows) = both;
@@ -153,11 +167,11 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
             return Ok(LossGradient { outcome, loss: None });
         }
         let recorded = RecordedRun { problem, plan, outcome, kept };
-        let state = |row: &Row| {
-            let v = row.v.as_ref().map_or_else(|| SVector::from_element(f64::NAN), Vector::fixed);
-            EndState { t: row.t, q: row.q.fixed(), v, p: row.p.fixed(), z: row.z.unwrap_or(f64::NAN) }
+        let state = |Row { t, q, v, p, z, .. }: Row| {
+            let v = v.unwrap_or_else(|| Vector::repeat(q.len(), f64::NAN));
+            MotionState { t, q, v, p, z: z.unwrap_or(f64::NAN) }
         };
-        let states: Vec<EndState<N>> = rows.rows.iter().map(state).collect();
+        let states: Vec<MotionState> = rows.rows.into_iter().map(state).collect();
         let (value, covectors) = loss(&states);
         if !(value.is_finite() && covectors.iter().all(EndCovector::is_finite)) {
             return Err(SensitivityError::Loss { value });
@@ -167,24 +181,25 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
+impl RecordedRun<'_> {
     /// The outcome of the run.
     pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }
 
     /// The end of a completed run; `None` if it was not completed.
-    pub fn end(&self) -> Option<EndState<N>> {
+    pub fn end(&self) -> Option<MotionState> {
         let Outcome { status, t, v, .. } = &self.outcome;
         let v = v.as_ref().filter(|_| *status == Status::Completed)?;
-        Some(EndState::at(*t, &self.outcome.state(), v))
+        Some(MotionState::at(*t, &self.outcome.state(), v))
     }
 
     /// The gradient of a number with these partial derivatives in the end state.
     ///
     /// # Errors
-    /// [`SensitivityError::Step`] where the adjoint of a step cannot be computed, as for a run that was not completed.
-    pub fn pullback(&self, covector: &EndCovector<N>) -> Result<Gradient<N>, SensitivityError> {
+    /// [`SensitivityError::Step`] where the adjoint of a step cannot be computed, as for a run that was not completed;
+    /// [`InputError::Geometry`](crate::InputError::Geometry) for derivatives in another number of coordinates.
+    pub fn pullback(&self, covector: &EndCovector) -> Result<Gradient, SensitivityError> {
         let mut all = self.pullbacks(std::slice::from_ref(covector))?;
         all.pop().ok_or(SensitivityError::Step { step: 0, cause: StepError::NonFinite })
     }
@@ -193,7 +208,7 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     ///
     /// # Errors
     /// Those of [`pullback`](Self::pullback).
-    pub fn pullbacks(&self, covectors: &[EndCovector<N>]) -> Result<Vec<Gradient<N>>, SensitivityError> {
+    pub fn pullbacks(&self, covectors: &[EndCovector]) -> Result<Vec<Gradient>, SensitivityError> {
         self.pull(covectors, &[], &[])
     }
 
@@ -203,18 +218,18 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     /// # Errors
     /// Those of [`pullback`](Self::pullback); [`InputError::Times`](crate::InputError::Times),
     /// [`InputError::Count`](crate::InputError::Count) where there are fewer covectors than times.
-    pub fn pullback_at(&self, times: &[f64], covectors: &[EndCovector<N>]) -> Result<Gradient<N>, SensitivityError> {
+    pub fn pullback_at(&self, times: &[f64], covectors: &[EndCovector]) -> Result<Gradient, SensitivityError> {
         let steps = &self.plan.steps;
         check_times(times, (steps.problem.t0, steps.t_end))?;
         if covectors.len() != times.len() {
             let (found, least) = (covectors.len(), times.len());
             return Err(InputError::Count { what: "the number of covectors", least, found }.into());
         }
-        let (mut end, mut inner) = (EndCovector::zero(), times.len());
+        let (mut end, mut inner) = (EndCovector::zero(self.problem.dimension()), times.len());
         if let (Some(t), Some(last)) = (times.last(), covectors.last())
             && is_same_time(*t, self.outcome.t)
         {
-            (end, inner) = (*last, inner - 1);
+            (end, inner) = (last.clone(), inner - 1);
         }
         let mut all = self.pull(&[end], &times[..inner], &covectors[..inner])?;
         all.pop().ok_or(SensitivityError::Step { step: 0, cause: StepError::NonFinite })
@@ -223,24 +238,26 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     /// Carries covectors of the end back to the start, and adds those of rows to the first of them.
     fn pull(
         &self,
-        of_end: &[EndCovector<N>],
+        of_end: &[EndCovector],
         times: &[f64],
-        of_rows: &[EndCovector<N>],
-    ) -> Result<Vec<Gradient<N>>, SensitivityError> {
-        let steps = &self.plan.steps;
-        let problem = self.problem;
+        of_rows: &[EndCovector],
+    ) -> Result<Vec<Gradient>, SensitivityError> {
+        let (problem, steps) = (&self.problem, &self.plan.steps);
+        for covector in of_end.iter().chain(of_rows) {
+            check_size(covector, problem.dimension())?;
+        }
         let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
         let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
-        let x = VelocityPoint { q: end.q, v: end.v, z: end.z };
+        let x = Point { q: end.q, v: end.v, z: end.z };
         let of_velocity =
             VelocityDependence::at(problem, end.t, &x, &end.p).map_err(|e| failed(self.outcome.steps, e))?;
         // The derivatives in the end time for a fixed state (q, p, z).
         let mut explicit_times = Vec::with_capacity(of_end.len());
-        let mut all: Vec<Covector<N>> = Vec::with_capacity(of_end.len());
+        let mut all: Vec<Covector> = Vec::with_capacity(of_end.len());
         for covector in of_end {
             let (of_state, parameters, time) = of_velocity.pull(covector);
             explicit_times.push(time);
-            all.push(Covector::new(&of_state, parameters));
+            all.push(Covector::new(of_state, parameters));
         }
         let mut engine = StepTangent::new(problem, steps, Direction::Backward)?;
         let mut rows = RowCovectors { problem, steps, times, of_rows, tangent: RowTangent::new() };
@@ -276,24 +293,42 @@ impl<L: Parametric<N>, const N: usize> RecordedRun<'_, L, N> {
     }
 }
 
-/// The covectors of rows that are not yet added, from the last to the first.
-pub(super) struct RowCovectors<'r, 'p, L, const N: usize> {
-    problem: &'r Problem<'p, L, N>,
-    steps: &'r Discretization<'p>,
-    times: &'r [f64],
-    of_rows: &'r [EndCovector<N>],
-    tangent: RowTangent<'p, N>,
+/// Checks the number of coordinates of a covector.
+///
+/// # Errors
+/// Those of [`check_length`].
+fn check_size(covector: &EndCovector, n: usize) -> Result<(), InputError> {
+    let EndCovector { q, v, p, .. } = covector;
+    let vectors = [("q of a covector", q), ("v of a covector", v), ("p of a covector", p)];
+    vectors.into_iter().try_for_each(|(what, vector)| check_length(what, vector.len(), n))
 }
 
-impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
+/// Checks that there are n coordinates.
+///
+/// # Errors
+/// [`InputError::Geometry`] if not.
+fn check_length(what: &'static str, found: usize, n: usize) -> Result<(), InputError> {
+    if found == n { Ok(()) } else { Err(GeometryError::WrongSize { what, expected: n, found }.into()) }
+}
+
+/// The covectors of rows that are not yet added, from the last to the first.
+pub(super) struct RowCovectors<'r, 'p> {
+    problem: &'r Differentiable<'p>,
+    steps: &'r Discretization<'p>,
+    times: &'r [f64],
+    of_rows: &'r [EndCovector],
+    tangent: RowTangent<'p>,
+}
+
+impl<'p> RowCovectors<'_, 'p> {
     /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start; `engine` is the tangent of whole
     /// steps.
     fn add(
         &mut self,
-        engine: &mut StepTangent<'p, N>,
+        engine: &mut StepTangent<'p>,
         step: &WholeStep,
         k: usize,
-        to: &mut Covector<N>,
+        to: &mut Covector,
     ) -> Result<(), StepError> {
         let of_start = self.add_within(engine, step, to)?;
         to.add_time(of_start, k);
@@ -308,9 +343,9 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     /// derivative in the time of this start.
     pub fn add_within(
         &mut self,
-        engine: &mut StepTangent<'p, N>,
+        engine: &mut StepTangent<'p>,
         step: &WholeStep,
-        to: &mut Covector<N>,
+        to: &mut Covector,
     ) -> Result<f64, StepError> {
         let problem = self.problem;
         let (start, _) = step.start();
@@ -337,7 +372,7 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
     }
 
     /// Adds the covector of a row at the start of a step, the k-th of the run.
-    pub fn add_at_start(&mut self, at: &PartPoint, k: usize, to: &mut Covector<N>) -> Result<(), StepError> {
+    pub fn add_at_start(&mut self, at: &PartPoint, k: usize, to: &mut Covector) -> Result<(), StepError> {
         if !self.is_next(at.t) {
             return Ok(());
         }
@@ -345,59 +380,54 @@ impl<'p, L: Parametric<N>, const N: usize> RowCovectors<'_, 'p, L, N> {
         let at = PartPoint { t: at.t, state: at.state.clone(), v };
         let Some(row) = self.take(&at)? else { return Ok(()) };
         let rates = self.steps.rates(at.t, &at.state, Some(&at.v))?;
-        to.add_at_fixed_time(&row.state(), &row.parameters, &rates.fixed(), k);
+        to.add_at_fixed_time(&row.state(), &row.parameters, &rates, k);
         Ok(())
     }
 
     /// The covector of a row at a point, if there is one at its time.
-    pub fn take_at(&mut self, at: &PartPoint) -> Result<Option<Covector<N>>, StepError> {
+    pub fn take_at(&mut self, at: &PartPoint) -> Result<Option<Covector>, StepError> {
         if self.is_next(at.t) { self.take(at) } else { Ok(None) }
     }
 
     /// The covector of the last row, at its point.
-    fn take(&mut self, at: &PartPoint) -> Result<Option<Covector<N>>, StepError> {
+    fn take(&mut self, at: &PartPoint) -> Result<Option<Covector>, StepError> {
         let (Some((_, times)), Some((covector, of_rows))) = (self.times.split_last(), self.of_rows.split_last()) else {
             return Ok(None);
         };
         (self.times, self.of_rows) = (times, of_rows);
         let (of_state, parameters, _) =
-            VelocityDependence::at(self.problem, at.t, &at.point().fixed(), &at.state.p.fixed())?.pull(covector);
-        Ok(Some(Covector::new(&of_state, parameters)))
+            VelocityDependence::at(self.problem, at.t, &at.point(), &at.state.p)?.pull(covector);
+        Ok(Some(Covector::new(of_state, parameters)))
     }
 }
 
 /// The gradient in the variables of the start from that in the initial state `(q, p, z)`; `explicit` is the derivative in
 /// the end time for a fixed end state.
-fn gradient<L: Parametric<N>, const N: usize>(
-    problem: &Problem<'_, L, N>,
-    covector: &Covector<N>,
-    explicit: f64,
-    steps: usize,
-) -> Gradient<N> {
+fn gradient(of: &Differentiable<'_>, covector: &Covector, explicit: f64, steps: usize) -> Gradient {
     let size = covector.size();
     let of_step = covector.step / steps.max(1) as f64;
     let mut gradient = Gradient {
-        q: covector.q,
-        rate: covector.p,
+        q: covector.q.clone(),
+        rate: covector.p.clone(),
         z: covector.z,
         parameters: covector.parameters.clone(),
         t0: covector.time - of_step,
         t_end: of_step + explicit,
         growth: if covector.largest > size { covector.largest / size } else { 1.0 },
     };
+    let problem = &of.problem;
     if !problem.from_momentum {
         // p = L_v(t, q, v, z; theta).
-        let (lagrangian, x) = (problem.lagrangian, &problem.start);
-        let at = (x, &problem.state.p);
-        let Hessian { qv, vv, vz, .. } = lagrangian.hessian(problem.t0, x);
-        gradient.q += qv * covector.p;
-        gradient.rate = vv * covector.p;
-        gradient.z += vz.dot(&covector.p);
-        let mut of = ParameterDerivatives::new(lagrangian);
+        let (t0, p) = (problem.t0, &covector.p);
+        let SecondDerivatives { qv, vv, vz, .. } = problem.system.hessian(t0, &problem.start);
+        gradient.q += &times(&qv, p);
+        gradient.rate = times(&vv, p);
+        gradient.z += vz.dot(p);
+        let (mut quantities, at) = (of.of.quantities(), (&problem.start, &problem.state.p));
         for (k, sum) in gradient.parameters.iter_mut().enumerate() {
-            *sum += of.of_momentum(lagrangian, Quantity::Parameter(k), problem.t0, at).dot(&covector.p);
+            *sum += quantities.of_momentum(Quantity::Parameter(k), t0, at).dot(p);
         }
-        gradient.t0 += of.of_momentum(lagrangian, Quantity::Time, problem.t0, at).dot(&covector.p);
+        gradient.t0 += quantities.of_momentum(Quantity::Time, t0, at).dot(p);
     }
     gradient
 }

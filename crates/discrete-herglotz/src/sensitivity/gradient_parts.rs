@@ -10,35 +10,34 @@ use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
 use crate::sensitivity::gradient::RowCovectors;
+use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent};
 use crate::sensitivity::switch::Switch;
-use crate::{Problem, StepError};
-use contact_geom::nalgebra::SVector;
+use crate::{Components, StepError};
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{ChartVector, Parametric};
 
 /// Carries covectors over the parts of steps.
-pub(super) struct PartCovectors<'r, 'p, L, const N: usize> {
-    pub problem: &'r Problem<'p, L, N>,
+pub(super) struct PartCovectors<'r, 'p> {
+    pub problem: &'r Differentiable<'p>,
     pub steps: &'r Discretization<'p>,
-    pub tangent: RowTangent<'p, N>,
+    pub tangent: RowTangent<'p>,
 }
 
-impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
+impl<'p> PartCovectors<'_, 'p> {
     /// Carries covectors from the end of a step, the k-th of the run, to its start, and adds those of its rows to the
     /// first of them; `engine` is the tangent of whole steps.
     pub fn pull(
         &mut self,
-        engine: &mut StepTangent<'p, N>,
+        engine: &mut StepTangent<'p>,
         (parts, k): (&[SolvedPart], usize),
-        all: &mut [Covector<N>],
-        rows: &mut RowCovectors<'_, 'p, L, N>,
+        all: &mut [Covector],
+        rows: &mut RowCovectors<'_, 'p>,
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
         // The derivatives in the time of the end of a part.
         let mut times = vec![0.0; all.len()];
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.next.rates(self.steps).map_err(failed)?.fixed();
+            let rates = last.next.rates(self.steps).map_err(failed)?;
             for (covector, time) in all.iter_mut().zip(&mut times) {
                 let along = covector.state().dot(&rates);
                 covector.add_time(along, k + 1);
@@ -72,9 +71,9 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     /// Carries covectors over a part; `times` are their derivatives in the time of its end, and then of its start.
     fn pull_part(
         &mut self,
-        engine: &mut StepTangent<'p, N>,
+        engine: &mut StepTangent<'p>,
         (part, k): (&SolvedPart, usize),
-        all: &mut [Covector<N>],
+        all: &mut [Covector],
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
@@ -85,7 +84,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
             if let Some(change) = switch.passage(passage, &part.next)? {
                 for (covector, time) in all.iter_mut().zip(&mut *times) {
                     let (state, parameters, of_time) = change.pull(&covector.state());
-                    covector.set_state(&ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+                    covector.set_state(Components::zeros(problem.dimension()));
                     covector.add_state(&state, &parameters);
                     *time += of_time;
                 }
@@ -96,7 +95,7 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
         self.pull_over(engine, part, all).map_err(failed)?;
         let mut of_function = None;
         if let Some(gradient) = gradient {
-            let mut covector = Covector::new(&gradient.state, gradient.parameters.clone());
+            let mut covector = Covector::new(gradient.state.clone(), gradient.parameters.clone());
             self.pull_over(engine, part, std::slice::from_mut(&mut covector)).map_err(failed)?;
             let [of_start, of_length] = covector.take_times();
             let rate = gradient.rate(of_length, t)?;
@@ -130,18 +129,18 @@ impl<'p, L: Parametric<N>, const N: usize> PartCovectors<'_, 'p, L, N> {
     /// Carries covectors over a part for a fixed time of its end.
     fn pull_over(
         &mut self,
-        engine: &mut StepTangent<'p, N>,
+        engine: &mut StepTangent<'p>,
         part: &SolvedPart,
-        all: &mut [Covector<N>],
+        all: &mut [Covector],
     ) -> Result<(), StepError> {
         match &part.step {
             Some(step) => {
                 // The rates of the step after it are those of another length.
-                all.iter_mut().for_each(|covector| covector.set_state(&covector.state()));
+                all.iter_mut().for_each(|covector| covector.set_state(covector.state()));
                 self.tangent.pull(engine, self.problem, step, all)
             }
             None => {
-                let rates = part.from.rates(self.steps)?.fixed();
+                let rates = part.from.rates(self.steps)?;
                 all.iter_mut().for_each(|covector| covector.pull_at_once(&rates));
                 Ok(())
             }

@@ -5,13 +5,12 @@ use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, StepView, Stop, Un
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
+use crate::sensitivity::parametric_system::DifferentiableProblem;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::tangent::no_tangent;
-use crate::{InputError, Problem, State, StepError};
-use contact_geom::Parametric;
-use contact_geom::nalgebra::SVector;
+use crate::{InputError, State, StepError, Vector};
 use contact_geom::numbers::max_abs_or_nan;
 use std::ops::ControlFlow;
 
@@ -53,9 +52,9 @@ impl LyapunovExponents {
 }
 
 /// A frame of tangents that is carried along a run, and made orthonormal after each step.
-struct Frame<'r, 'p, L, const N: usize> {
+struct Frame<'r, 'p> {
     plan: &'r Plan<'p>,
-    carried: CarriedColumns<'r, 'p, L, N>,
+    carried: CarriedColumns<'r, 'p>,
     /// The logarithms of the factors by which the frame was stretched.
     logarithms: Vec<f64>,
     /// The time and the logarithms in the middle of the run.
@@ -65,22 +64,23 @@ struct Frame<'r, 'p, L, const N: usize> {
     failure: Option<SensitivityError>,
 }
 
-/// The directions z, then the first n of q, then those of p in the reverse order.
+/// The directions z, then the first n of q, then those of p in the reverse order; `dimension` is the number of all
+/// coordinates.
 ///
 /// For constant `L_z` the direction z is invariant, and the spans of the first k of the others are, in `(q, p)`, isotropic
 /// and their symplectic complements the spans of the first 2n - k, which steps preserve. So the stretching factors of
 /// paired directions have the product `sigma_d` in each step.
-fn initial_frame<const N: usize>(n: usize) -> Vec<Column<N>> {
-    let zero = SVector::<f64, N>::zeros();
-    let unit = |i: usize| SVector::<f64, N>::from_fn(|j, _| f64::from(u8::from(i == j)));
-    let positions = (0..n).map(|i| Column::new(unit(i), zero, 0.0));
-    let momenta = (0..n).rev().map(|i| Column::new(zero, unit(i), 0.0));
-    std::iter::once(Column::new(zero, zero, 1.0)).chain(positions).chain(momenta).collect()
+fn initial_frame(n: usize, dimension: usize) -> Vec<Column> {
+    let zero = || Vector::zeros(dimension);
+    let unit = |i: usize| Vector::from_fn(dimension, |j| f64::from(u8::from(i == j)));
+    let positions = (0..n).map(|i| Column::new(unit(i), zero(), 0.0));
+    let momenta = (0..n).rev().map(|i| Column::new(zero(), unit(i), 0.0));
+    std::iter::once(Column::new(zero(), zero(), 1.0)).chain(positions).chain(momenta).collect()
 }
 
 /// Makes columns orthonormal, in their order, and adds the logarithms of their lengths; a second pass makes them orthogonal to
 /// round-off.
-fn orthonormalise<const N: usize>(columns: &mut [Column<N>], logarithms: &mut [f64]) -> Result<(), StepError> {
+fn orthonormalise(columns: &mut [Column], logarithms: &mut [f64]) -> Result<(), StepError> {
     for (i, logarithm) in logarithms.iter_mut().enumerate() {
         let (before, rest) = columns.split_at_mut(i);
         let Some(column) = rest.first_mut() else { return Ok(()) };
@@ -99,7 +99,7 @@ fn orthonormalise<const N: usize>(columns: &mut [Column<N>], logarithms: &mut [f
     Ok(())
 }
 
-impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
+impl Frame<'_, '_> {
     fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
@@ -117,7 +117,7 @@ impl<L: Parametric<N>, const N: usize> Frame<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Observer for Frame<'_, '_, L, N> {
+impl Observer for Frame<'_, '_> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }
@@ -142,7 +142,7 @@ impl<L: Parametric<N>, const N: usize> Observer for Frame<'_, '_, L, N> {
     }
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
+impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
     /// Performs the run and computes its Lyapunov exponents by the method of Benettin and others (1980): the tangent of
     /// the discrete run, made orthonormal after each step.
     ///
@@ -164,42 +164,44 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// [`SensitivityError::Step`] where the tangent of a
     /// step cannot be computed. A run that ends early is reported as the status of the outcome.
     pub fn lyapunov_exponents(self, until: Until) -> Result<LyapunovExponents, SensitivityError> {
-        self.lyapunov_exponents_within(N, until)
+        let coordinates = self.problem.differentiable().dimension();
+        self.lyapunov_exponents_within(coordinates, until)
     }
 
     /// The same for the first n coordinates of a motion in which the others are at rest and act on nothing, as where the
     /// type of a system has more coordinates than its formula: `2n + 1` exponents.
     ///
     /// # Errors
-    /// Those of [`lyapunov_exponents`](Self::lyapunov_exponents), [`SensitivityError::Coordinate`] for more than `N`
-    /// coordinates, and [`InputError::Count`] for none.
+    /// Those of [`lyapunov_exponents`](Self::lyapunov_exponents), [`SensitivityError::Coordinate`] for more coordinates
+    /// than the problem has, and [`InputError::Count`] for none.
     pub fn lyapunov_exponents_within(
         self,
         coordinates: usize,
         until: Until,
     ) -> Result<LyapunovExponents, SensitivityError> {
+        let problem = self.problem.differentiable();
+        let dimension = problem.dimension();
         match coordinates {
             0 => return Err(InputError::Count { what: "the number of coordinates", least: 1, found: 0 }.into()),
-            n if n > N => return Err(SensitivityError::Coordinate { index: n - 1, count: N }),
+            n if n > dimension => return Err(SensitivityError::Coordinate { index: n - 1, count: dimension }),
             _ => {}
         }
         let run = self.differentiable()?.with_conformal_factor();
-        let problem = run.problem;
         let plan = run.plan(until)?;
         if plan.steps.info.constrained {
             // Of the 2n + 1 directions of the frame only those that are tangent to the constraints are of the motion.
             let method = plan.steps.info.name.clone();
             return Err(SensitivityError::UnderConstraints { method, what: "Lyapunov exponents" });
         }
-        let engine = StepTangent::new(problem, &plan.steps, Direction::Forward)?;
-        let columns = initial_frame(coordinates);
-        let t0 = problem.t0;
+        let engine = StepTangent::new(&problem, &plan.steps, Direction::Forward)?;
+        let columns = initial_frame(coordinates, dimension);
+        let t0 = problem.problem.t0;
         let mut frame = Frame {
             plan: &plan,
             logarithms: vec![0.0; columns.len()],
-            carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(&[])),
+            carried: CarriedColumns::new(&problem, &plan.steps, engine, columns, RowTimes::new(&[])),
             middle: None,
-            before: (t0, problem.state.into()),
+            before: (t0, problem.problem.state.clone()),
             taken: 0,
             failure: None,
         };

@@ -11,12 +11,7 @@ use contact_geom::{ChartVector, Derivatives, Dual, Parametric, PhasePoint, Veloc
 use num_traits::{One, Zero};
 use pulp::Simd;
 
-/// What is differentiated with respect to: a parameter, or the time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Quantity {
-    Parameter(usize),
-    Time,
-}
+pub(crate) use crate::sensitivity::parametric_system::Quantity;
 
 /// A number with a derivative along one direction and the gradient of both.
 type WithGradient<const N: usize> = Dual<Dual<f64, ChartVector<N>>, SVector<Dual<f64, ChartVector<N>>, 1>>;
@@ -190,8 +185,8 @@ impl<const N: usize> ParameterDerivatives<N> {
         &self,
         lagrangian: &L,
         quantity: Quantity,
-        at: &StageDerivatives<N>,
-        w: &StageTangent<N>,
+        at: &StageDerivatives,
+        w: &StageTangent,
         weights: &Stages,
     ) -> Option<f64> {
         if const { L::HINTS.forced } || self.theta.len() > MAX_PARAMETERS_IN_LANES {
@@ -205,10 +200,11 @@ impl<const N: usize> ParameterDerivatives<N> {
         if let Quantity::Parameter(k) = quantity {
             theta[k].d[0] = KernelDual::one();
         }
+        let (at_q, at_v, w_q, w_v) = (&at.q[..N], &at.v[..N], &w.q[..N], &w.v[..N]);
         let mut sum = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(at.s) {
-            let q: SVector<Nested<S>, N> = vector!(|d| moving(&at.q[d], &w.q[d], r));
-            let v: SVector<Nested<S>, N> = vector!(|d| moving(&at.v[d], &w.v[d], r));
+            let q: SVector<Nested<S>, N> = vector!(|d| moving(&at_q[d], &w_q[d], r));
+            let v: SVector<Nested<S>, N> = vector!(|d| moving(&at_v[d], &w_v[d], r));
             let mut time = Nested::<S>::constant(KernelDual::constant(at.times.block::<S>(r)));
             if quantity == Quantity::Time {
                 time.d[0] = KernelDual::one();

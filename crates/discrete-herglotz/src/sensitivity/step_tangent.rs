@@ -6,10 +6,10 @@ use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::engine::Engine;
-use crate::sensitivity::flows::FlowEngine;
+use crate::sensitivity::flows::FlowTangent;
+use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::step_maps::Direction;
-use crate::{Problem, State, StepError, Stepper};
-use contact_geom::Parametric;
+use crate::{State, StepError, Stepper};
 
 /// A step that was taken, with what its tangent needs.
 #[expect(clippy::large_enum_variant, reason = "a box would be an allocation in each step")]
@@ -20,20 +20,20 @@ pub(crate) enum TakenStep {
 }
 
 /// The tangent of the steps of an integrator, forward or as its adjoint.
-pub(crate) enum StepTangent<'a, const N: usize> {
+pub(crate) enum StepTangent<'a> {
     /// From the stages of contact Gauss collocation.
-    Collocation(Box<Engine<'a, N>>),
+    Collocation(Box<Engine<'a>>),
     /// From the sub-flows of a splitting, a rule or a composition.
-    Flow(Box<FlowEngine<'a, N>>),
+    Flow(Box<dyn FlowTangent + 'a>),
 }
 
-impl<'a, const N: usize> StepTangent<'a, N> {
+impl<'a> StepTangent<'a> {
     /// The tangent of the steps of a run.
     ///
     /// # Errors
     /// [`SensitivityError::NoTangent`] and [`SensitivityError::UnderConstraints`] for an integrator without tangent; those of the steps of a splitting.
-    pub fn new<L: Parametric<N>>(
-        problem: &Problem<'a, L, N>,
+    pub fn new(
+        problem: &Differentiable<'a>,
         steps: &Discretization<'a>,
         direction: Direction,
     ) -> Result<Self, SensitivityError> {
@@ -43,7 +43,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
             return refused("");
         }
         // The steps of a Lagrangian that is given by a contact Hamiltonian have a formula.
-        if const { !L::HINTS.hamiltonian } && info.collocation.is_some() && steps.integrator.step_formula().is_none() {
+        if !problem.is_hamiltonian() && info.collocation.is_some() && steps.integrator.step_formula().is_none() {
             let engine = Engine::new(problem, steps.stages(), steps.h, direction);
             return Ok(StepTangent::Collocation(Box::new(engine)));
         }
@@ -52,7 +52,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
-            Some(formula) => Ok(StepTangent::Flow(Box::new(FlowEngine::new(problem, formula, &steps.integrator)?))),
+            Some(formula) => Ok(StepTangent::Flow(problem.of.flows(&problem.problem, formula, &steps.integrator)?)),
             None if info.constrained => {
                 Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })
             }
@@ -90,7 +90,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     ///
     /// # Errors
     /// [`StepError`] where the equations of the tangent cannot be solved.
-    pub fn push(&mut self, step: &WholeStep, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+    pub fn push(&mut self, step: &WholeStep, k: usize, columns: &mut [Column]) -> Result<f64, StepError> {
         match (self, step) {
             (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.push(step, k, columns),
             (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.push(step, k, columns),
@@ -102,7 +102,7 @@ impl<'a, const N: usize> StepTangent<'a, N> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &WholeStep, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+    pub fn pull(&mut self, step: &WholeStep, k: usize, covectors: &mut [Covector]) -> Result<(), StepError> {
         match (self, step) {
             (StepTangent::Collocation(engine), WholeStep::Collocation(step)) => engine.pull(step, k, covectors),
             (StepTangent::Flow(engine), WholeStep::Flow(step)) => engine.pull(step, k, covectors),
@@ -112,11 +112,11 @@ impl<'a, const N: usize> StepTangent<'a, N> {
 }
 
 /// The tangent of shortened steps and of parts of steps, which is kept from one to the next.
-pub(crate) struct RowTangent<'a, const N: usize> {
-    collocation: Option<Engine<'a, N>>,
+pub(crate) struct RowTangent<'a> {
+    collocation: Option<Engine<'a>>,
 }
 
-impl<'a, const N: usize> RowTangent<'a, N> {
+impl<'a> RowTangent<'a> {
     pub fn new() -> Self {
         RowTangent { collocation: None }
     }
@@ -125,16 +125,16 @@ impl<'a, const N: usize> RowTangent<'a, N> {
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
-    pub fn push<L: Parametric<N>>(
+    pub fn push(
         &mut self,
-        steps: &mut StepTangent<'a, N>,
-        problem: &Problem<'a, L, N>,
+        steps: &mut StepTangent<'a>,
+        problem: &Differentiable<'a>,
         step: &WholeStep,
-        columns: &mut [Column<N>],
+        columns: &mut [Column],
     ) -> Result<(), StepError> {
         match step {
             // Such steps of a Lagrangian that is given by a contact Hamiltonian are sub-flows.
-            WholeStep::Collocation(_) if const { L::HINTS.hamiltonian } => Err(StepError::NonFinite),
+            WholeStep::Collocation(_) if problem.is_hamiltonian() => Err(StepError::NonFinite),
             WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Forward);
                 engine.push(step, 0, columns).map(|_| ())
@@ -147,15 +147,15 @@ impl<'a, const N: usize> RowTangent<'a, N> {
     ///
     /// # Errors
     /// Those of [`StepTangent::push`].
-    pub fn pull<L: Parametric<N>>(
+    pub fn pull(
         &mut self,
-        steps: &mut StepTangent<'a, N>,
-        problem: &Problem<'a, L, N>,
+        steps: &mut StepTangent<'a>,
+        problem: &Differentiable<'a>,
         step: &WholeStep,
-        covectors: &mut [Covector<N>],
+        covectors: &mut [Covector],
     ) -> Result<(), StepError> {
         match step {
-            WholeStep::Collocation(_) if const { L::HINTS.hamiltonian } => Err(StepError::NonFinite),
+            WholeStep::Collocation(_) if problem.is_hamiltonian() => Err(StepError::NonFinite),
             WholeStep::Collocation(step) => {
                 let engine = Engine::of_row(&mut self.collocation, problem, step, Direction::Backward);
                 engine.pull(step, 0, covectors)

@@ -1,23 +1,24 @@
 //! The derivatives of a switching function and of a reset at its zero.
 
 use crate::integration::{PartPoint, Passage};
+use crate::numbers::ridders;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::corner_derivatives::CornerDerivatives;
-use crate::sensitivity::end_state::{EndCovector, VelocityDependence};
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use crate::sensitivity::{SensitivityError, ridders};
-use crate::{Problem, StepError};
+use crate::sensitivity::parametric_system::{Differentiable, Quantity};
+use crate::sensitivity::velocity_dependence::VelocityDependence;
+use crate::sensitivity::{EndCovector, SensitivityError};
+use crate::system::products::times;
+use crate::{AtSwitch, Components, Point, SecondDerivatives, StepError, System, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;
-use contact_geom::switching::Control;
-use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, VelocityPoint, herglotz_field};
+use contact_geom::{Dual, VelocityPoint};
 
 /// The rate of a function along the motion below which its zero is a tangential one, relative to the size of its terms
 /// and to a step: half of the digits, since the time of a tangential zero has half of them.
 pub(crate) const MIN_RATE: f64 = 1.5e-8;
 
 /// A number with its derivative along one direction.
-type Along = Dual<f64, SVector<f64, 1>>;
+pub(super) type Along = Dual<f64, SVector<f64, 1>>;
 
 fn moving(re: f64, d: f64) -> Along {
     Dual { re, d: SVector::<f64, 1>::from_element(d) }
@@ -25,7 +26,7 @@ fn moving(re: f64, d: f64) -> Along {
 
 /// An argument of a switching function or of a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Argument {
+pub(crate) enum Argument {
     Position(usize),
     Velocity(usize),
     Action,
@@ -39,9 +40,26 @@ fn arguments(n: usize, parameters: usize) -> impl Iterator<Item = Argument> {
     state.chain([Argument::Action, Argument::Time]).chain((0..parameters).map(Argument::Parameter))
 }
 
+/// Parameters, a time and a point, moving along an argument.
+pub(super) fn moving_point<const N: usize>(
+    along: Argument,
+    parameters: &[f64],
+    t: f64,
+    x: &Point,
+) -> (Vec<Along>, Along, VelocityPoint<N, Along>) {
+    let unit = |is: bool| f64::from(u8::from(is));
+    let x = x.fixed::<N>();
+    let theta = parameters.iter().enumerate();
+    let theta = theta.map(|(k, value)| moving(*value, unit(along == Argument::Parameter(k)))).collect();
+    let q = SVector::from_fn(|i, _| moving(x.q[i], unit(along == Argument::Position(i))));
+    let v = SVector::from_fn(|i, _| moving(x.v[i], unit(along == Argument::Velocity(i))));
+    let z = moving(x.z, unit(along == Argument::Action));
+    (theta, moving(t, unit(along == Argument::Time)), VelocityPoint { q, v, z })
+}
+
 /// A zero of a switching function at a point of the motion.
-pub(crate) struct Switch<'s, 'p, L, const N: usize> {
-    pub problem: &'s Problem<'p, L, N>,
+pub(crate) struct Switch<'s, 'p> {
+    pub problem: &'s Differentiable<'p>,
     pub index: usize,
     pub rising: bool,
     pub at: &'s PartPoint,
@@ -53,14 +71,14 @@ pub(crate) struct Switch<'s, 'p, L, const N: usize> {
 
 /// The derivatives of a switching function g: in the state `(q, p, z)` and in the parameters, for a fixed time, and in the
 /// time.
-pub(crate) struct SwitchGradient<const N: usize> {
-    pub state: ChartVector<N>,
+pub(crate) struct SwitchGradient {
+    pub state: Components,
     pub parameters: Vec<f64>,
     time: f64,
     min_rate: f64,
 }
 
-impl<const N: usize> SwitchGradient<N> {
+impl SwitchGradient {
     /// The rate of g along the motion; `along_state` is that for a fixed time.
     ///
     /// # Errors
@@ -72,7 +90,7 @@ impl<const N: usize> SwitchGradient<N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
+impl Switch<'_, '_> {
     pub(super) fn failed(&self, cause: StepError) -> SensitivityError {
         SensitivityError::Step { step: self.step, cause }
     }
@@ -82,58 +100,55 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     }
 
     /// The point of the motion.
-    pub(super) fn point(&self) -> VelocityPoint<N> {
-        self.at.point().fixed()
+    pub(super) fn point(&self) -> Point {
+        self.at.point()
+    }
+
+    /// The arguments.
+    fn arguments(&self) -> impl Iterator<Item = Argument> {
+        arguments(self.problem.dimension(), self.problem.of.parameters().len())
     }
 
     /// The dependence of the velocity on the state there.
-    fn velocity_dependence(&self) -> Result<VelocityDependence<N>, SensitivityError> {
-        VelocityDependence::at(self.problem, self.at.t, &self.point(), &self.at.state.p.fixed())
+    fn velocity_dependence(&self) -> Result<VelocityDependence, SensitivityError> {
+        VelocityDependence::at(self.problem, self.at.t, &self.point(), &self.at.state.p)
             .map_err(|cause| self.failed(cause))
     }
 
-    /// The parameters, the time and the point, moving along an argument.
-    pub(super) fn moving(&self, along: Argument) -> (Vec<Along>, Along, VelocityPoint<N, Along>) {
-        let unit = |is: bool| f64::from(u8::from(is));
-        let x = self.point();
-        let theta = self.problem.lagrangian.parameters().into_iter().enumerate();
-        let theta = theta.map(|(k, value)| moving(value, unit(along == Argument::Parameter(k)))).collect();
-        let q = SVector::from_fn(|i, _| moving(x.q[i], unit(along == Argument::Position(i))));
-        let v = SVector::from_fn(|i, _| moving(x.v[i], unit(along == Argument::Velocity(i))));
-        let z = moving(x.z, unit(along == Argument::Action));
-        (theta, moving(self.at.t, unit(along == Argument::Time)), VelocityPoint { q, v, z })
-    }
-
-    /// The derivative of a function of the Lagrangian, the time and the point along an argument, by differences.
+    /// The derivative of a function of the system, the time and the point along an argument, by differences.
     pub(super) fn difference(
         &self,
         along: Argument,
-        f: impl Fn(&L, f64, &VelocityPoint<N>) -> Option<Vec<f64>>,
+        f: impl Fn(&dyn System, f64, &Point) -> Option<Vec<f64>>,
     ) -> Result<Vec<f64>, SensitivityError> {
-        let (lagrangian, x) = (self.problem.lagrangian, self.point());
-        let found = difference(along, (lagrangian, self.at.t, &x), self.h, f);
+        let (problem, t, x) = (self.problem, self.at.t, self.point());
+        let found = match along {
+            Argument::Parameter(k) => difference_in_parameter(problem, k, &mut |system| f(system, t, &x)),
+            _ => difference(along, (t, &x), self.h, &|t, x| f(problem.system(), t, x)),
+        };
         found.ok_or_else(|| self.unknown("it cannot be evaluated at nearby states, times and parameters"))
+    }
+
+    /// The value of the switching function at a point.
+    pub(super) fn function(&self, system: &dyn System, t: f64, x: &Point) -> Option<Vec<f64>> {
+        let mut values = Vec::new();
+        system.switching_functions(t, x, &mut values);
+        values.get(self.index).map(|g| vec![*g])
     }
 
     /// The derivative of the switching function along an argument.
     fn function_along(&self, along: Argument) -> Result<f64, SensitivityError> {
-        let (theta, t, x) = self.moving(along);
-        if let Some(g) = self.problem.lagrangian.switching_function_at(&theta, self.index, t, &x) {
-            return Ok(g.d[0]);
+        if let Some(g) = self.problem.of.switching_function_along(along, self.index, self.at.t, &self.point()) {
+            return Ok(g);
         }
-        let value = |lagrangian: &L, t: f64, x: &VelocityPoint<N>| {
-            let mut values = Vec::new();
-            lagrangian.switching_functions(t, x, &mut values);
-            values.get(self.index).map(|g| vec![*g])
-        };
-        Ok(self.difference(along, value)?[0])
+        Ok(self.difference(along, |system, t, x| self.function(system, t, x))?[0])
     }
 
     /// The derivatives of the switching function.
-    pub fn gradient(&self) -> Result<SwitchGradient<N>, SensitivityError> {
-        let (lagrangian, x, t) = (self.problem.lagrangian, self.point(), self.at.t);
-        let (mut of, mut explicit) = (EndCovector::<N>::zero(), Vec::new());
-        for along in arguments(N, lagrangian.parameter_count()) {
+    pub fn gradient(&self) -> Result<SwitchGradient, SensitivityError> {
+        let (problem, x, t) = (self.problem, self.point(), self.at.t);
+        let (mut of, mut explicit) = (EndCovector::zero(problem.dimension()), Vec::new());
+        for along in self.arguments() {
             let g = self.function_along(along)?;
             match along {
                 Argument::Position(i) => of.q[i] = g,
@@ -143,7 +158,7 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
                 Argument::Parameter(_) => explicit.push(g),
             }
         }
-        let field = herglotz_field(lagrangian, t, &x).map_err(|_| self.failed(StepError::NonFinite))?;
+        let (field, _) = problem.system().rates(t, &x).map_err(|_| self.failed(StepError::NonFinite))?;
         let (state, mut parameters, time) = self.velocity_dependence()?.pull(&of);
         parameters.iter_mut().zip(explicit).for_each(|(sum, explicit)| *sum += explicit);
         Ok(SwitchGradient {
@@ -155,101 +170,103 @@ impl<L: Parametric<N>, const N: usize> Switch<'_, '_, L, N> {
     }
 
     /// The state after a reset, moving along an argument: `(q, v, z)`.
-    fn state_along(&self, along: Argument) -> Result<ChartVector<N>, SensitivityError> {
-        let (theta, t, x) = self.moving(along);
-        if let Some(to) = self.problem.lagrangian.state_after_switch_at(&theta, self.index, t, &x) {
-            return Ok(ChartVector { x: to.q.map(|x| x.d[0]), y: to.v.map(|x| x.d[0]), z: to.z.d[0] });
+    fn state_along(&self, along: Argument) -> Result<Components, SensitivityError> {
+        if let Some(to) = self.problem.of.state_after_switch_along(along, self.index, self.at.t, &self.point()) {
+            return Ok(to);
         }
-        let state = |lagrangian: &L, t: f64, x: &VelocityPoint<N>| {
-            let to = replaced(lagrangian.at_switch(self.index, t, x, self.rising))?;
+        let state = |system: &dyn System, t: f64, x: &Point| {
+            let to = replaced(system.at_switch(self.index, t, x, self.rising))?;
             Some(to.q.iter().chain(&to.v).chain([&to.z]).copied().collect())
         };
-        let of = self.difference(along, state)?;
-        Ok(ChartVector { x: SVector::from_fn(|i, _| of[i]), y: SVector::from_fn(|i, _| of[N + i]), z: of[2 * N] })
+        let (of, n) = (self.difference(along, state)?, self.problem.dimension());
+        Ok(Components { x: of[..n].into(), y: of[n..2 * n].into(), z: of[2 * n] })
     }
 
     /// The derivatives of the change of the state there, if it changes; `next` is the point after it.
-    pub fn passage(
-        &self,
-        passage: Passage,
-        next: &PartPoint,
-    ) -> Result<Option<PassageDerivatives<N>>, SensitivityError> {
+    pub fn passage(&self, passage: Passage, next: &PartPoint) -> Result<Option<PassageDerivatives>, SensitivityError> {
         match passage {
             Passage::Continuous => Ok(None),
-            Passage::Reset => self.reset().map(|reset| Some(PassageDerivatives::Reset(reset))),
-            Passage::Refraction => self.corner(next, true).map(|corner| Some(PassageDerivatives::Corner(corner))),
-            Passage::Reflection => self.corner(next, false).map(|corner| Some(PassageDerivatives::Corner(corner))),
+            Passage::Reset => Ok(Some(PassageDerivatives::Reset(Box::new(self.reset()?)))),
+            Passage::Refraction => Ok(Some(PassageDerivatives::Corner(Box::new(self.corner(next, true)?)))),
+            Passage::Reflection => Ok(Some(PassageDerivatives::Corner(Box::new(self.corner(next, false)?)))),
             Passage::Accumulation => Err(self.unknown("it is the limit of infinitely many resets")),
         }
     }
 
     /// The derivatives of the reset.
-    fn reset(&self) -> Result<ResetDerivatives<N>, SensitivityError> {
-        let (lagrangian, t) = (self.problem.lagrangian, self.at.t);
-        let images = arguments(N, lagrangian.parameter_count()).map(|along| self.state_along(along));
-        let images = images.collect::<Result<Vec<_>, _>>()?;
+    fn reset(&self) -> Result<ResetDerivatives, SensitivityError> {
+        let (problem, t) = (self.problem, self.at.t);
+        let images = self.arguments().map(|along| self.state_along(along)).collect::<Result<Vec<_>, _>>()?;
         let before = self.velocity_dependence()?;
-        let to = replaced(lagrangian.at_switch(self.index, t, &self.point(), self.rising));
+        let to = replaced(problem.system().at_switch(self.index, t, &self.point(), self.rising));
         let to = to.ok_or_else(|| self.unknown("the state is not replaced there"))?;
-        let mut of = ParameterDerivatives::new(lagrangian);
-        let parameters =
-            (0..of.count()).map(|k| of.at(lagrangian, Quantity::Parameter(k), t, &to).gradient.y).collect();
-        let time = of.at(lagrangian, Quantity::Time, t, &to).gradient.y;
-        Ok(ResetDerivatives { images, before, hessian: lagrangian.hessian(t, &to), parameters, time })
+        let mut of = problem.of.quantities();
+        let parameters = (0..of.count()).map(|k| of.at(Quantity::Parameter(k), t, &to).gradient.y).collect();
+        let time = of.at(Quantity::Time, t, &to).gradient.y;
+        Ok(ResetDerivatives { images, before, hessian: problem.system().hessian(t, &to), parameters, time })
     }
 }
 
-/// The derivative of a function of a Lagrangian, the time and the point along an argument, by differences, for a motion
-/// with steps of length h.
-pub(super) fn difference<L: Parametric<N>, const N: usize>(
+/// The derivative of a function of the time and the point along one of them, by differences, for a motion with steps of
+/// length h; `None` along a parameter.
+pub(super) fn difference(
     along: Argument,
-    (lagrangian, t, x): (&L, f64, &VelocityPoint<N>),
+    (t, x): (f64, &Point),
     h: f64,
-    f: impl Fn(&L, f64, &VelocityPoint<N>) -> Option<Vec<f64>>,
+    f: &dyn Fn(f64, &Point) -> Option<Vec<f64>>,
 ) -> Option<Vec<f64>> {
-    let theta = lagrangian.parameters();
     let size = match along {
         Argument::Position(i) => max_or_nan(x.q[i].abs(), (x.v[i] * h).abs()),
         Argument::Velocity(i) => x.v[i].abs(),
         Argument::Action => x.z.abs(),
         Argument::Time => h.abs(),
-        Argument::Parameter(k) => theta.get(k).map_or(0.0, |x| x.abs()),
+        Argument::Parameter(_) => return None,
     };
-    ridders::derivative(if size > 0.0 { size } else { 1.0 }, |by| {
-        let (mut t, mut x) = (t, *x);
+    ridders::derivative(scale(size), |by| {
+        let (mut t, mut x) = (t, x.clone());
         match along {
             Argument::Position(i) => x.q[i] += by,
             Argument::Velocity(i) => x.v[i] += by,
             Argument::Action => x.z += by,
             Argument::Time => t += by,
-            Argument::Parameter(k) => {
-                let mut theta = theta.clone();
-                *theta.get_mut(k)? += by;
-                return f(&lagrangian.with_parameters(&theta)?, t, &x);
-            }
+            Argument::Parameter(_) => {}
         }
-        f(lagrangian, t, &x)
+        f(t, &x)
     })
 }
 
+/// The derivative of a function of the system in a parameter, by differences.
+fn difference_in_parameter(
+    problem: &Differentiable<'_>,
+    k: usize,
+    f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>,
+) -> Option<Vec<f64>> {
+    let theta = problem.of.parameters();
+    ridders::derivative(scale(theta.get(k)?.abs()), |by| {
+        let mut theta = theta.clone();
+        *theta.get_mut(k)? += by;
+        problem.of.with_parameters(&theta, f)
+    })
+}
+
+/// The scale of the distances of differences, for an argument of this size.
+fn scale(size: f64) -> f64 {
+    if size > 0.0 { size } else { 1.0 }
+}
+
 /// The state with which a state is replaced, if it is.
-fn replaced<const N: usize>(control: Control<N>) -> Option<VelocityPoint<N>> {
-    match control {
-        Control::Replace(to) | Control::Conformal { to, .. } => Some(to),
-        _ => None,
+fn replaced(at: AtSwitch) -> Option<Point> {
+    match at {
+        AtSwitch::Replace { to, .. } => Some(to),
+        AtSwitch::Continue => None,
     }
 }
 
 /// The size of the terms of a function with these derivatives, over a step of length h of a motion.
-pub(crate) fn terms<const N: usize>(
-    of: &EndCovector<N>,
-    (t, x): (f64, &VelocityPoint<N>),
-    field: &ChartVector<N>,
-    h: f64,
-) -> f64 {
+pub(crate) fn terms(of: &EndCovector, (t, x): (f64, &Point), field: &Components, h: f64) -> f64 {
     let max = |of: f64, x: f64, y: f64| of.abs() * max_or_nan(x.abs(), y.abs());
     let mut sum = max(of.t, t, h) + max(of.z, x.z, field.z * h);
-    for i in 0..N {
+    for i in 0..x.q.len() {
         sum += max(of.q[i], max_or_nan(x.q[i].abs(), (x.v[i] * h).abs()), field.y[i] * h * h);
         sum += max(of.v[i], x.v[i], field.y[i] * h);
     }
@@ -257,14 +274,14 @@ pub(crate) fn terms<const N: usize>(
 }
 
 /// The derivatives of a change of the state at a switch.
-pub(crate) enum PassageDerivatives<const N: usize> {
-    Reset(ResetDerivatives<N>),
-    Corner(CornerDerivatives<N>),
+pub(crate) enum PassageDerivatives {
+    Reset(Box<ResetDerivatives>),
+    Corner(Box<CornerDerivatives>),
 }
 
-impl<const N: usize> PassageDerivatives<N> {
+impl PassageDerivatives {
     /// The tangent `(q, p, z)` after the change from that before it, whose time has the derivative `dt`.
-    pub fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
+    pub fn along(&self, column: &Column, dt: f64) -> Components {
         match self {
             PassageDerivatives::Reset(reset) => reset.along(column, dt),
             PassageDerivatives::Corner(corner) => corner.along(column, dt),
@@ -273,7 +290,7 @@ impl<const N: usize> PassageDerivatives<N> {
 
     /// The derivatives in the state `(q, p, z)` before the change, in the parameters and in the time, of a number with these
     /// derivatives in the state after it.
-    pub fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
+    pub fn pull(&self, of: &Components) -> (Components, Vec<f64>, f64) {
         match self {
             PassageDerivatives::Reset(reset) => reset.pull(of),
             PassageDerivatives::Corner(corner) => corner.pull(of),
@@ -282,22 +299,22 @@ impl<const N: usize> PassageDerivatives<N> {
 }
 
 /// The derivatives of a reset.
-pub(crate) struct ResetDerivatives<const N: usize> {
+pub(crate) struct ResetDerivatives {
     /// Those of the `(q, v, z)` after it in each argument.
-    images: Vec<ChartVector<N>>,
-    before: VelocityDependence<N>,
+    images: Vec<Components>,
+    before: VelocityDependence,
     /// The second derivatives of L after it, with those of `L_v` in the parameters and in the time.
-    hessian: Hessian<N>,
-    parameters: Vec<SVector<f64, N>>,
-    time: SVector<f64, N>,
+    hessian: SecondDerivatives,
+    parameters: Vec<Vector>,
+    time: Vector,
 }
 
-impl<const N: usize> ResetDerivatives<N> {
-    fn along(&self, column: &Column<N>, dt: f64) -> ChartVector<N> {
+impl ResetDerivatives {
+    fn along(&self, column: &Column, dt: f64) -> Components {
         let Column { q, p, z, parameter, .. } = column;
         let v = self.before.along(q, p, *z, *parameter, dt);
-        let mut sum = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 };
-        for (along, image) in arguments(N, self.parameters.len()).zip(&self.images) {
+        let mut sum = Components::zeros(q.len());
+        for (along, image) in arguments(q.len(), self.parameters.len()).zip(&self.images) {
             let factor = match along {
                 Argument::Position(i) => q[i],
                 Argument::Velocity(i) => v[i],
@@ -305,19 +322,22 @@ impl<const N: usize> ResetDerivatives<N> {
                 Argument::Time => dt,
                 Argument::Parameter(k) => f64::from(u8::from(*parameter == Some(k))),
             };
-            sum = sum.plus(image.scale(factor));
+            sum = sum.plus(&image.scale(factor));
         }
-        let Hessian { qv, vv, vz, .. } = &self.hessian;
-        let explicit = parameter.and_then(|k| self.parameters.get(k).copied()).unwrap_or_else(SVector::zeros);
-        let p = qv.transpose() * sum.x + vv * sum.y + vz * sum.z + explicit + self.time * dt;
-        ChartVector { y: p, ..sum }
+        let SecondDerivatives { qv, vv, vz, .. } = &self.hessian;
+        let mut p = times(&qv.transpose(), &sum.x) + times(vv, &sum.y) + vz * sum.z;
+        if let Some(explicit) = parameter.and_then(|k| self.parameters.get(k)) {
+            p += explicit;
+        }
+        Components { y: p + &self.time * dt, ..sum }
     }
 
-    fn pull(&self, of: &ChartVector<N>) -> (ChartVector<N>, Vec<f64>, f64) {
-        let Hessian { qv, vv, vz, .. } = &self.hessian;
-        let after = ChartVector { x: of.x + qv * of.y, y: vv * of.y, z: of.z + vz.dot(&of.y) };
-        let (mut before, mut explicit) = (EndCovector::<N>::zero(), Vec::new());
-        for (along, image) in arguments(N, self.parameters.len()).zip(&self.images) {
+    fn pull(&self, of: &Components) -> (Components, Vec<f64>, f64) {
+        let SecondDerivatives { qv, vv, vz, .. } = &self.hessian;
+        let after = Components { x: &of.x + times(qv, &of.y), y: times(vv, &of.y), z: of.z + vz.dot(&of.y) };
+        let (n, mut explicit) = (of.x.len(), Vec::new());
+        let mut before = EndCovector::zero(n);
+        for (along, image) in arguments(n, self.parameters.len()).zip(&self.images) {
             let factor = after.dot(image);
             match along {
                 Argument::Position(i) => before.q[i] = factor,

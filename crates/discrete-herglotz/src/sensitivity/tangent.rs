@@ -4,28 +4,27 @@ use crate::integration::Motion;
 use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView, Stop, Until};
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
-use crate::sensitivity::end_state::VelocityDependence;
+use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem};
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
 use crate::sensitivity::variable::Variable;
-use crate::sensitivity::{EndCovector, EndState, SensitivityError};
-use crate::{InputError, Problem, State, Status, StepError};
-use contact_geom::nalgebra::SVector;
+use crate::sensitivity::velocity_dependence::VelocityDependence;
+use crate::sensitivity::{EndCovector, MotionState, SensitivityError};
+use crate::{InputError, Point, State, Status, StepError, Vector};
 use contact_geom::numbers::max_or_nan;
-use contact_geom::{Parametric, VelocityPoint};
 use std::ops::ControlFlow;
 
 /// The derivatives of the final state of a run with respect to variables, one column for each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tangent<const N: usize> {
+pub struct Tangent {
     /// The outcome of the run. Where it ended early, the columns are those of the state that was reached after its last
     /// whole step.
     pub outcome: Outcome,
     /// The derivatives, in the order of the variables.
-    pub columns: Vec<StateDerivative<N>>,
+    pub columns: Vec<StateDerivative>,
     /// The states at the requested times, each with its derivatives.
-    pub rows: Vec<TangentRow<N>>,
+    pub rows: Vec<TangentRow>,
     /// The zeros of switching functions that the motion has met, in the order of the run.
     pub switches: Vec<SwitchTime>,
     /// The largest derivative along the run divided by the largest one at its end, at least one: round-off of the
@@ -47,30 +46,30 @@ pub struct SwitchTime {
 /// The state at a time with its derivatives, one column for each variable. The time is fixed, unless it is the end of the
 /// run, which may itself be a variable.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TangentRow<const N: usize> {
+pub struct TangentRow {
     /// The state.
-    pub state: EndState<N>,
+    pub state: MotionState,
     /// The derivatives, in the order of the variables.
-    pub columns: Vec<StateDerivative<N>>,
+    pub columns: Vec<StateDerivative>,
 }
 
 /// The derivative of a state with respect to one variable.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateDerivative<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateDerivative {
     /// Of the position.
-    pub q: SVector<f64, N>,
+    pub q: Vector,
     /// Of the velocity; NaN where no velocity has the momentum of the state.
-    pub v: SVector<f64, N>,
+    pub v: Vector,
     /// Of the momentum.
-    pub p: SVector<f64, N>,
+    pub p: Vector,
     /// Of the action.
     pub z: f64,
 }
 
 /// Carries columns along a run.
-struct Columns<'r, 'p, L, const N: usize> {
+struct Columns<'r, 'p> {
     plan: &'r Plan<'p>,
-    carried: CarriedColumns<'r, 'p, L, N>,
+    carried: CarriedColumns<'r, 'p>,
     /// The time and the state at the start of the next step.
     before: (f64, State),
     largest: f64,
@@ -78,14 +77,14 @@ struct Columns<'r, 'p, L, const N: usize> {
     failure: Option<SensitivityError>,
 }
 
-impl<const N: usize> StateDerivative<N> {
+impl StateDerivative {
     /// The derivative of a number with these partial derivatives in the state, for a fixed time.
-    pub fn dot(&self, of: &EndCovector<N>) -> f64 {
+    pub fn dot(&self, of: &EndCovector) -> f64 {
         self.q.dot(&of.q) + self.v.dot(&of.v) + self.p.dot(&of.p) + self.z * of.z
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
+impl Columns<'_, '_> {
     fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
@@ -104,14 +103,14 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
         }
         let failed = |cause| SensitivityError::Step { step: at.k, cause };
         let v = at.velocity().map_err(failed)?;
-        let state = EndState::at(at.t, &at.state, &v);
+        let state = MotionState::at(at.t, &at.state, &v);
         let problem = self.carried.problem;
         self.carried.rows.push(
             if at.last && at.k > 0 {
                 row(problem, state, &self.carried.columns, |column| column.time_after(at.k))
             } else {
                 // The end of the step moves with the times of the run, but not the row.
-                let rates = self.plan.steps.rates(at.t, &at.state, Some(&v)).map_err(failed)?.fixed();
+                let rates = self.plan.steps.rates(at.t, &at.state, Some(&v)).map_err(failed)?;
                 let columns: Vec<_> =
                     self.carried.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
                 row(problem, state, &columns, |_| 0.0)
@@ -122,7 +121,7 @@ impl<L: Parametric<N>, const N: usize> Columns<'_, '_, L, N> {
     }
 }
 
-impl<L: Parametric<N>, const N: usize> Observer for Columns<'_, '_, L, N> {
+impl Observer for Columns<'_, '_> {
     fn needs(&self) -> OutputRequest {
         OutputRequest::ACTION
     }
@@ -147,7 +146,7 @@ impl<L: Parametric<N>, const N: usize> Observer for Columns<'_, '_, L, N> {
     }
 }
 
-impl<L, const N: usize> Columns<'_, '_, L, N> {
+impl Columns<'_, '_> {
     fn end_on_failure(&mut self, result: Result<(), SensitivityError>) -> ControlFlow<Stop> {
         match result {
             Ok(()) => ControlFlow::Continue(()),
@@ -160,22 +159,23 @@ impl<L, const N: usize> Columns<'_, '_, L, N> {
 }
 
 /// A row with the derivatives of its velocity; `dt` are the derivatives of its time.
-pub(super) fn row<L: Parametric<N>, const N: usize>(
-    problem: &Problem<'_, L, N>,
-    state: EndState<N>,
-    columns: &[Column<N>],
-    dt: impl Fn(&Column<N>) -> f64,
-) -> Result<TangentRow<N>, StepError> {
-    let x = VelocityPoint { q: state.q, v: state.v, z: state.z };
+pub(super) fn row(
+    problem: &Differentiable<'_>,
+    state: MotionState,
+    columns: &[Column],
+    dt: impl Fn(&Column) -> f64,
+) -> Result<TangentRow, StepError> {
+    let x = Point { q: state.q.clone(), v: state.v.clone(), z: state.z };
     let of_velocity = VelocityDependence::at(problem, state.t, &x, &state.p)?;
-    let derivative = |column: &Column<N>| {
-        let Column { q, p, z, parameter, .. } = *column;
-        StateDerivative { q, v: of_velocity.along(&q, &p, z, parameter, dt(column)), p, z }
+    let derivative = |column: &Column| {
+        let Column { q, p, z, parameter, .. } = column;
+        let v = of_velocity.along(q, p, *z, *parameter, dt(column));
+        StateDerivative { q: q.clone(), v, p: p.clone(), z: *z }
     };
     Ok(TangentRow { state, columns: columns.iter().map(derivative).collect() })
 }
 
-impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
+impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
     /// Performs the run, and differentiates its final state with respect to variables. The derivatives are those of the
     /// discrete run, to round-off: of the steps that were given, or that were chosen for an accuracy, which are not
     /// differentiated themselves.
@@ -196,7 +196,7 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// Those of [`run`](Self::run), and [`SensitivityError`] for a variable that the problem does not have, for an
     /// integrator whose tangent is not implemented, and where the equations of a tangent cannot be solved. A run that
     /// ends early is reported as the status of the outcome.
-    pub fn tangent(self, variables: &[Variable], until: Until) -> Result<Tangent<N>, SensitivityError> {
+    pub fn tangent(self, variables: &[Variable], until: Until) -> Result<Tangent, SensitivityError> {
         self.tangent_at(variables, &[], until)
     }
 
@@ -206,17 +206,12 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// # Errors
     /// Those of [`tangent`](Self::tangent), and [`InputError::Times`](crate::InputError::Times) for times that are not
     /// in order or outside of the span of the run.
-    pub fn tangent_at(
-        self,
-        variables: &[Variable],
-        times: &[f64],
-        until: Until,
-    ) -> Result<Tangent<N>, SensitivityError> {
+    pub fn tangent_at(self, variables: &[Variable], times: &[f64], until: Until) -> Result<Tangent, SensitivityError> {
         let run = self.differentiable()?;
-        let problem = run.problem;
+        let problem = run.problem.differentiable();
         let plan = run.plan(until)?;
-        let engine = StepTangent::new(problem, &plan.steps, Direction::Forward)?;
-        let columns = variables.iter().map(|v| v.column(problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
+        let engine = StepTangent::new(&problem, &plan.steps, Direction::Forward)?;
+        let columns = variables.iter().map(|v| v.column(&problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
         if engine.only_in_start()
             && let Some(variable) = variables.iter().find(|variable| !variable.is_of_start())
         {
@@ -228,8 +223,8 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
         }
         let mut observer = Columns {
             plan: &plan,
-            carried: CarriedColumns::new(problem, &plan.steps, engine, columns, RowTimes::new(times)),
-            before: (problem.t0, problem.state.into()),
+            carried: CarriedColumns::new(&problem, &plan.steps, engine, columns, RowTimes::new(times)),
+            before: (problem.problem.t0, problem.problem.state.clone()),
             largest: 0.0,
             taken: 0,
             failure: None,
@@ -237,23 +232,24 @@ impl<'p, L: Parametric<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
         let outcome = run.observed(&plan, &mut observer)?;
         let Columns { carried: CarriedColumns { columns, rows, switches, .. }, largest, failure, .. } = observer;
         match failure {
-            None => Ok(Tangent { switches, ..tangent(problem, outcome, &columns, rows, largest) }),
+            None => Ok(Tangent { switches, ..tangent(&problem, outcome, &columns, rows, largest) }),
             Some(failure) => Err(failure),
         }
     }
 }
 
-fn tangent<L: Parametric<N>, const N: usize>(
-    problem: &Problem<'_, L, N>,
+fn tangent(
+    problem: &Differentiable<'_>,
     outcome: Outcome,
-    columns: &[Column<N>],
-    rows: Vec<TangentRow<N>>,
+    columns: &[Column],
+    rows: Vec<TangentRow>,
     largest: f64,
-) -> Tangent<N> {
-    let nan = SVector::from_element(f64::NAN);
-    let of_state = |column: &Column<N>| StateDerivative { q: column.q, v: nan, p: column.p, z: column.z };
+) -> Tangent {
+    let nan = || Vector::repeat(problem.dimension(), f64::NAN);
+    let of_state =
+        |column: &Column| StateDerivative { q: column.q.clone(), v: nan(), p: column.p.clone(), z: column.z };
     let last = outcome.v.as_ref().filter(|_| outcome.status == Status::Completed).and_then(|v| {
-        let state = EndState::at(outcome.t, &outcome.state(), v);
+        let state = MotionState::at(outcome.t, &outcome.state(), v);
         row(problem, state, columns, |column| column.time_after(outcome.steps)).ok()
     });
     let size = columns.iter().fold(0.0, |m, column| max_or_nan(m, column.size()));

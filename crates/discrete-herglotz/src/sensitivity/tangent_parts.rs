@@ -10,11 +10,10 @@ use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::switch::Switch;
 use crate::sensitivity::tangent::{SwitchTime, row};
-use crate::sensitivity::{EndState, SensitivityError};
-use contact_geom::Parametric;
+use crate::sensitivity::{MotionState, SensitivityError};
 use contact_geom::numbers::max_or_nan;
 
-impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
+impl CarriedColumns<'_, '_> {
     /// Carries the columns over the parts of a step, the k-th of the run; returns their largest component.
     pub(super) fn push_parts(&mut self, parts: &[SolvedPart], k: usize) -> Result<f64, SensitivityError> {
         // The derivatives of the time at the start of each part.
@@ -25,10 +24,10 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
         // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
             let rates = last.next.rates(self.steps);
-            let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?.fixed();
+            let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?;
             for (column, dt) in self.columns.iter_mut().zip(&times) {
                 let dh = column.time_after(k + 1) - dt;
-                column.set_state(&column.state().plus(rates.scale(dh)));
+                column.set_state(column.state().plus(&rates.scale(dh)));
             }
         }
         Ok(self.columns.iter().fold(0.0, |m, column| max_or_nan(m, column.size())))
@@ -45,20 +44,20 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
         if let Some(step) = &part.step {
             self.rows_within(step, part.to.t, Some(times), k)?;
         }
-        let mut fixed: Vec<Column<N>> =
+        let mut fixed: Vec<Column> =
             self.columns.iter().zip(&*times).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
-        fixed.push(Column::of_length());
+        fixed.push(Column::of_length(problem.dimension()));
         match &part.step {
             Some(step) => self.row_engine.push(&mut self.engine, problem, step, &mut fixed).map_err(failed)?,
             None => {
-                let rates = part.from.rates(steps).map_err(failed)?.fixed();
+                let rates = part.from.rates(steps).map_err(failed)?;
                 fixed.iter_mut().for_each(|column| column.push_at_once(&rates));
             }
         }
         let Some(along_length) = fixed.pop().map(|column| column.state()) else { return Ok(()) };
         let PartPoint { t, ref state, ref v } = part.to;
         if !is_last && self.times.next_at(t, false).is_some() {
-            let state = EndState::at(t, state, v);
+            let state = MotionState::at(t, state, v);
             self.rows.push(row(problem, state, &fixed, |_| 0.0).map_err(failed)?);
         }
         let mut change = None;
@@ -83,9 +82,9 @@ impl<L: Parametric<N>, const N: usize> CarriedColumns<'_, '_, L, N> {
             }
         }
         for ((column, mut fixed), dt) in self.columns.iter_mut().zip(fixed).zip(&*times) {
-            fixed.set_state(&fixed.state().plus(along_length.scale(*dt)));
+            fixed.set_state(fixed.state().plus(&along_length.scale(*dt)));
             let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
-            column.set_state(&state);
+            column.set_state(state);
         }
         Ok(())
     }

@@ -1,11 +1,10 @@
 //! The variables with respect to which a run is differentiated.
 
-use crate::Problem;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Column;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Hessian, Parametric};
+use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem, Quantity};
+use crate::system::products::{times, transposed_times};
+use crate::{SecondDerivatives, SystemProblem, Vector};
 use std::fmt::{Display, Formatter};
 
 /// A variable on which a run depends.
@@ -46,10 +45,12 @@ impl Display for Variable {
 
 impl Variable {
     /// All variables of a problem: the start in the order q, v or p, z; the parameters; the times.
-    pub fn all<L: Parametric<N>, const N: usize>(problem: &Problem<'_, L, N>) -> Vec<Variable> {
-        let rate = if problem.from_momentum { Variable::Momentum } else { Variable::Velocity };
-        let start = (0..N).map(Variable::Position).chain((0..N).map(rate)).chain([Variable::Action]);
-        let parameters = problem.lagrangian.parameter_names().into_iter().map(Variable::Parameter);
+    pub fn all<'p>(problem: &'p impl DifferentiableProblem<'p>) -> Vec<Variable> {
+        let problem = problem.differentiable();
+        let n = problem.dimension();
+        let rate = if problem.problem.from_momentum { Variable::Momentum } else { Variable::Velocity };
+        let start = (0..n).map(Variable::Position).chain((0..n).map(rate)).chain([Variable::Action]);
+        let parameters = problem.of.parameter_names().into_iter().map(Variable::Parameter);
         start.chain(parameters).chain([Variable::StartTime, Variable::EndTime]).collect()
     }
 
@@ -59,51 +60,49 @@ impl Variable {
     }
 
     /// The tangent of the start along the variable, for a run of this number of steps.
-    pub(crate) fn column<L: Parametric<N>, const N: usize>(
-        &self,
-        problem: &Problem<'_, L, N>,
-        steps: usize,
-    ) -> Result<Column<N>, SensitivityError> {
+    pub(crate) fn column(&self, problem: &Differentiable<'_>, steps: usize) -> Result<Column, SensitivityError> {
+        let n = problem.dimension();
         let unit = |index: usize| {
-            if index < N {
-                Ok(SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == index))))
+            if index < n {
+                Ok(Vector::from_fn(n, |i| f64::from(u8::from(i == index))))
             } else {
-                Err(SensitivityError::Coordinate { index, count: N })
+                Err(SensitivityError::Coordinate { index, count: n })
             }
         };
-        let zero = SVector::<f64, N>::zeros();
-        let (lagrangian, x) = (problem.lagrangian, &problem.start);
+        let zero = || Vector::zeros(n);
+        let SystemProblem { ref system, t0, start: ref x, ref state, from_momentum, .. } = problem.problem;
         // The derivatives of `p = L_v(t, q, v, z; theta)` for a given velocity.
-        let with = |q: SVector<f64, N>, v: SVector<f64, N>, z: f64| {
-            let Hessian { qv, vv, vz, .. } = lagrangian.hessian(problem.t0, x);
-            Column::new(q, qv.transpose() * q + vv * v + vz * z, z)
+        let with = |q: Vector, v: Vector, z: f64| {
+            let SecondDerivatives { qv, vv, vz, .. } = system.hessian(t0, x);
+            let p = transposed_times(&qv, &q) + times(&vv, &v) + vz * z;
+            Column::new(q, p, z)
         };
         let moved = |quantity: Quantity| {
-            if problem.from_momentum {
-                return zero;
+            if from_momentum {
+                return zero();
             }
-            ParameterDerivatives::new(lagrangian).of_momentum(lagrangian, quantity, problem.t0, (x, &problem.state.p))
+            problem.of.quantities().of_momentum(quantity, t0, (x, &state.p))
         };
         let [velocity, momentum] = ["velocity", "momentum"];
         Ok(match self {
-            Variable::Position(i) if problem.from_momentum => Column::new(unit(*i)?, zero, 0.0),
-            Variable::Position(i) => with(unit(*i)?, zero, 0.0),
-            Variable::Velocity(_) if problem.from_momentum => {
+            Variable::Position(i) if from_momentum => Column::new(unit(*i)?, zero(), 0.0),
+            Variable::Position(i) => with(unit(*i)?, zero(), 0.0),
+            Variable::Velocity(_) if from_momentum => {
                 return Err(SensitivityError::Start { given: momentum, other: velocity });
             }
-            Variable::Velocity(i) => with(zero, unit(*i)?, 0.0),
-            Variable::Momentum(i) if problem.from_momentum => Column::new(zero, unit(*i)?, 0.0),
+            Variable::Velocity(i) => with(zero(), unit(*i)?, 0.0),
+            Variable::Momentum(i) if from_momentum => Column::new(zero(), unit(*i)?, 0.0),
             Variable::Momentum(_) => return Err(SensitivityError::Start { given: velocity, other: momentum }),
-            Variable::Action if problem.from_momentum => Column::new(zero, zero, 1.0),
-            Variable::Action => with(zero, zero, 1.0),
+            Variable::Action if from_momentum => Column::new(zero(), zero(), 1.0),
+            Variable::Action => with(zero(), zero(), 1.0),
             Variable::Parameter(name) => {
-                let index = lagrangian.parameter_index(name)?;
-                Column::new(zero, moved(Quantity::Parameter(index)), 0.0).of_parameter(index)
+                let index = problem.of.parameter_index(name)?;
+                Column::new(zero(), moved(Quantity::Parameter(index)), 0.0).of_parameter(index)
             }
             Variable::StartTime => {
-                Column::new(zero, moved(Quantity::Time), 0.0).of_times(1.0, -1.0 / steps.max(1) as f64)
+                Column::new(zero(), moved(Quantity::Time), 0.0).of_times(1.0, -1.0 / steps.max(1) as f64)
             }
-            Variable::EndTime => Column::new(zero, zero, 0.0).of_times(0.0, 1.0 / steps.max(1) as f64),
+            Variable::EndTime => Column::new(zero(), zero(), 0.0).of_times(0.0, 1.0 / steps.max(1) as f64),
         })
     }
 }

@@ -1,7 +1,8 @@
 //! What a [`System`] computes from its value and its derivatives, unless it provides it.
 
-use super::{AtState, Components, Point, State, System, Vector};
+use super::{AtState, Components, ExplicitDerivatives, Point, Quantity, State, System, Vector};
 use crate::StepError;
+use crate::numbers::ridders;
 use crate::solve::{ITERATION_LIMIT, last_correction};
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::support::linear;
@@ -124,3 +125,37 @@ const NEARBY: f64 = 0.01;
 
 /// The number of rounding errors in a value.
 const ROUNDINGS: f64 = 4.0;
+
+/// The derivatives with respect to a quantity, by differences.
+pub(super) fn in_quantity(system: &(impl System + ?Sized), of: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
+    let n = x.q.len();
+    if of == Quantity::Time && system.structure().autonomous {
+        return ExplicitDerivatives::zeros(n);
+    }
+    let theta = system.parameters();
+    let scale = match of {
+        Quantity::Time => 1.0,
+        Quantity::Parameter(k) => theta.get(k).map_or(0.0, |theta| theta.abs()),
+    };
+    let found = ridders::derivative(if scale > 0.0 { scale } else { 1.0 }, |by| match of {
+        Quantity::Time => Some(numbers(system, t + by, x)),
+        Quantity::Parameter(k) => {
+            let mut theta = theta.clone();
+            *theta.get_mut(k)? += by;
+            Some(numbers(&*system.with_parameters(&theta)?, t, x))
+        }
+    });
+    let found = found.unwrap_or_else(|| vec![f64::NAN; 3 * n + 2]);
+    let of = |from: usize| Vector::from(&found[from..from + n]);
+    ExplicitDerivatives {
+        l: found[0],
+        gradient: Components { x: of(2), y: of(n + 2), z: found[1] },
+        force: of(2 * n + 2),
+    }
+}
+
+/// L, `L_z`, `L_q`, `L_v` and the applied force at a point.
+fn numbers(system: &(impl System + ?Sized), t: f64, x: &Point) -> Vec<f64> {
+    let (l, g, f) = (system.value(t, x), system.gradient(t, x), system.applied_force(t, x));
+    [&[l, g.z], &g.x[..], &g.y, &f].concat()
+}

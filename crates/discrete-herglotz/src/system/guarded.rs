@@ -1,12 +1,14 @@
 //! The border to the systems of a user.
 
 use super::{
-    AtSwitch, Components, ForceDerivatives, ForceKind, Kernels, Point, SecondDerivatives, State, System, Vector,
+    AtSwitch, Components, ExplicitDerivatives, ForceDerivatives, ForceKind, Kernels, Point, Quantity,
+    SecondDerivatives, State, System, Vector,
 };
 use crate::StepError;
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Hints, Structure};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::rc::Rc;
 
 /// A system of a user, by its value and its derivatives: where they have the wrong length, or the code panics, they are
 /// NaN, so that a run ends with a status.
@@ -82,6 +84,28 @@ impl System for Guarded<'_> {
             return None;
         }
         self.checked(|| self.system.force_derivatives(t, x), fits, none)
+    }
+    fn parameter_names(&self) -> Vec<String> {
+        self.checked(|| self.system.parameter_names(), |_| true, Vec::new)
+    }
+    fn parameters(&self) -> Vec<f64> {
+        let n = self.parameter_names().len();
+        self.checked(|| self.system.parameters(), |theta| theta.len() == n, || vec![f64::NAN; n])
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Rc<dyn System>> {
+        self.checked(|| self.system.with_parameters(theta), |_| true, || None)
+    }
+    fn in_quantity(&self, of: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
+        let n = self.n;
+        let fits = |found: &ExplicitDerivatives| {
+            found.gradient.x.len() == n && found.gradient.y.len() == n && found.force.len() == n
+        };
+        let none = || {
+            let line = || Vector::repeat(n, f64::NAN);
+            let gradient = Components { x: line(), y: line(), z: f64::NAN };
+            ExplicitDerivatives { l: f64::NAN, gradient, force: line() }
+        };
+        self.checked(|| self.system.in_quantity(of, t, x), fits, none)
     }
     fn kernels(&self) -> Option<Kernels> {
         self.checked(|| self.system.kernels(), |_| true, || None)

@@ -8,6 +8,7 @@ mod kernels;
 pub(crate) mod mass_matrix;
 mod points;
 pub(crate) mod products;
+mod quantity;
 mod typed;
 mod vector;
 
@@ -15,12 +16,14 @@ pub(crate) use guarded::Guarded;
 pub use kernels::Kernels;
 pub use points::{Components, Point, SecondDerivatives, State};
 
+pub use quantity::{ExplicitDerivatives, Quantity};
 pub use typed::TypedSystem;
 pub use vector::Vector;
 
 use crate::StepError;
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Defect, Defects, GeometryError, Hints, Structure};
+use std::rc::Rc;
 
 /// The velocity, and L with its derivatives, at a state.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,6 +133,28 @@ pub trait System {
     fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
         let _ = (t, x);
         None
+    }
+
+    /// The names of the parameters; by default there are none.
+    fn parameter_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Their values, in the order of the names.
+    fn parameters(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The same system with other values of the parameters; `None` where there is none, and by default.
+    fn with_parameters(&self, theta: &[f64]) -> Option<Rc<dyn System>> {
+        let _ = theta;
+        None
+    }
+
+    /// The derivatives with respect to a quantity, at a fixed point. By default they are found by differences, to about ten
+    /// digits, those in parameters from [`with_parameters`](Self::with_parameters).
+    fn in_quantity(&self, of: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
+        defaults::in_quantity(self, of, t, x)
     }
 
     /// Kernels of collocation, which evaluate the system at several stages at once in SIMD registers;

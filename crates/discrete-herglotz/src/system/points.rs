@@ -120,12 +120,6 @@ impl Components {
         Components { x: Vector::zeros(n), y: Vector::zeros(n), z: 0.0 }
     }
 
-    /// The same component everywhere, for n coordinates.
-    #[inline]
-    pub(crate) fn repeat(n: usize, x: f64) -> Self {
-        Components { x: Vector::repeat(n, x), y: Vector::repeat(n, x), z: x }
-    }
-
     /// The sum.
     #[inline]
     pub(crate) fn plus(mut self, other: &Self) -> Self {

@@ -192,6 +192,12 @@ impl From<&[f64]> for Vector {
     }
 }
 
+impl From<Vec<f64>> for Vector {
+    fn from(x: Vec<f64>) -> Self {
+        Vector::from(x.as_slice())
+    }
+}
+
 impl<const N: usize> From<[f64; N]> for Vector {
     #[inline]
     fn from(components: [f64; N]) -> Self {

@@ -142,7 +142,7 @@ fn runs_are_differentiated_in_parameters_and_times() {
         // The transpose, to the round-off of sums of a hundred terms of order one.
         let covector =
             EndCovector { t: 0.0, q: [0.3, -0.8].into(), v: [0.5, 0.2].into(), p: [-0.4, 1.1].into(), z: 0.7 };
-        let gradient = run().gradient_of(|_| (0.0, covector), Until::Time(SPAN[1])).unwrap().loss.unwrap().1;
+        let gradient = run().gradient_of(|_| (0.0, covector.clone()), Until::Time(SPAN[1])).unwrap().loss.unwrap().1;
         let times = [gradient.t0, gradient.t_end];
         for (k, by_adjoint) in gradient.parameters.iter().chain(&times).enumerate() {
             let forward = found.columns[k].dot(&covector);

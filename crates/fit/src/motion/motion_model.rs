@@ -195,7 +195,7 @@ impl<'a, L: Parametric<N>, const N: usize> MotionModel<'a, L, N> {
         start: (f64, VelocityPoint<N>),
         times: &[f64],
         variables: &[Variable],
-    ) -> Result<Vec<TangentRow<N>>, ModelFailure> {
+    ) -> Result<Vec<TangentRow>, ModelFailure> {
         if self.indices.iter().all(Option::is_none) {
             return tangent_rows(self.lagrangian, start, times, self.steps, variables);
         }
@@ -248,7 +248,7 @@ impl<L: Parametric<N>, const N: usize> PiecewiseModel for MotionModel<'_, L, N> 
 
     fn start_state(&self, theta: &[f64]) -> Vec<f64> {
         let x = self.state_at(theta);
-        numbers(&x.q, &x.v, x.z).collect()
+        numbers(x.q.as_slice(), x.v.as_slice(), x.z).collect()
     }
 
     fn observations(&self) -> Vec<Observation> {
@@ -306,11 +306,7 @@ impl<L: Parametric<N>, const N: usize> PiecewiseModel for MotionModel<'_, L, N> 
 }
 
 /// The numbers of a state, in the order q, v, z.
-fn numbers<'s, const N: usize>(
-    q: &'s SVector<f64, N>,
-    v: &'s SVector<f64, N>,
-    z: f64,
-) -> impl Iterator<Item = f64> + 's {
+fn numbers<'s>(q: &'s [f64], v: &'s [f64], z: f64) -> impl Iterator<Item = f64> + 's {
     q.iter().chain(v.iter()).copied().chain([z])
 }
 

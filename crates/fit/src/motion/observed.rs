@@ -1,6 +1,6 @@
 //! Observed quantities of a motion.
 
-use discrete_herglotz::sensitivity::{EndCovector, EndState, Loss, StateDerivative};
+use discrete_herglotz::sensitivity::{EndCovector, Loss, MotionState, StateDerivative};
 
 /// A quantity of a motion that was measured.
 pub enum Observed<'a, const N: usize> {
@@ -44,7 +44,7 @@ impl<'a, const N: usize> Observed<'a, N> {
     }
 
     /// The value at a state, and its derivatives along tangents of the state.
-    pub(crate) fn at(&self, state: &EndState<N>, columns: &[StateDerivative<N>], out: &mut Vec<f64>) -> f64 {
+    pub(crate) fn at(&self, state: &MotionState, columns: &[StateDerivative], out: &mut Vec<f64>) -> f64 {
         out.clear();
         match self {
             Observed::Position(i) => {
@@ -65,7 +65,7 @@ impl<'a, const N: usize> Observed<'a, N> {
             }
             Observed::Function(f) => {
                 let (value, d) = f.differentiate(state);
-                out.extend(columns.iter().map(|c| d.q.dot(&c.q) + d.v.dot(&c.v) + d.p.dot(&c.p) + d.z * c.z));
+                out.extend(columns.iter().map(|c| c.dot(&d)));
                 value
             }
         }
@@ -75,11 +75,11 @@ impl<'a, const N: usize> Observed<'a, N> {
 /// A function of the state of a motion with its partial derivatives. Every [`Loss`] is one.
 pub trait Observable<const N: usize> {
     /// The value and its partial derivatives.
-    fn differentiate(&self, state: &EndState<N>) -> (f64, EndCovector<N>);
+    fn differentiate(&self, state: &MotionState) -> (f64, EndCovector);
 }
 
 impl<T: Loss<N>, const N: usize> Observable<N> for T {
-    fn differentiate(&self, state: &EndState<N>) -> (f64, EndCovector<N>) {
+    fn differentiate(&self, state: &MotionState) -> (f64, EndCovector) {
         state.differentiate(self)
     }
 }

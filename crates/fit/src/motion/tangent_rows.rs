@@ -27,7 +27,7 @@ pub(crate) fn tangent_rows<L: Parametric<N>, const N: usize>(
     times: &[f64],
     StepChoice { stages, h }: StepChoice,
     variables: &[Variable],
-) -> Result<Vec<TangentRow<N>>, ModelFailure> {
+) -> Result<Vec<TangentRow>, ModelFailure> {
     let Some(end) = times.last().copied() else { return Ok(Vec::new()) };
     let problem = Problem::new(lagrangian, t0, start).map_err(undefined)?;
     let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(h));

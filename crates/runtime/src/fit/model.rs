@@ -2,10 +2,11 @@
 
 use super::{Fit, FitError, FittedMotion, FittedSeries, METHOD, MotionFit, MultiStart};
 use crate::{
-    Column, InitialVelocity, Motion, MotionState, RunMonitor, RuntimeError, Start, StepControl, System, velocity_name,
+    Column, InitialVelocity, Motion, RunMonitor, RuntimeError, Start, StateDerivative, StepControl, System,
+    velocity_name,
 };
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
-use discrete_herglotz::{Status, Steps};
+use discrete_herglotz::{Status, Steps, Vector};
 use formula_lagrangian::{Expression, ExpressionGradient};
 use herglotz_fit::{DMatrix, Model, ModelFailure, Observation, Piece, PieceValues, PiecewiseModel, ShootingFit};
 use std::cell::{Cell, RefCell};
@@ -28,12 +29,13 @@ enum Part {
 }
 
 impl Part {
-    fn of(self, state: &MotionState, i: usize) -> f64 {
+    /// The number of a state, or of the derivative of one: `(q, v, p)` and z.
+    fn of(self, [q, v, p]: [&[f64]; 3], z: f64, i: usize) -> f64 {
         let vector = match self {
-            Part::Position => &state.q,
-            Part::Velocity => &state.v,
-            Part::Momentum => &state.p,
-            Part::Action => return state.z,
+            Part::Position => q,
+            Part::Velocity => v,
+            Part::Momentum => p,
+            Part::Action => return z,
         };
         vector.get(i).copied().unwrap_or(f64::NAN)
     }
@@ -313,7 +315,8 @@ impl PiecewiseModel for FitModel<'_> {
             let (Some(state), Some(columns)) = (rows.states.get(at), rows.rows.get(at)) else { continue };
             let (value, slopes): (f64, Vec<f64>) = match (&self.quantities[quantity], &expressions[quantity]) {
                 (Quantity::Number(part, i), _) => {
-                    (part.of(state, *i), columns.iter().map(|column| part.of(column, *i)).collect())
+                    let of = |StateDerivative { q, v, p, z }: &StateDerivative| part.of([q, v, p], *z, *i);
+                    (part.of([&state.q, &state.v, &state.p], state.z, *i), columns.iter().map(of).collect())
                 }
                 (Quantity::Expression(_), Some(expression)) => {
                     let gradient = expression.gradient_at(state.t, &state.q, &state.v, state.z);
@@ -328,12 +331,12 @@ impl PiecewiseModel for FitModel<'_> {
             }
         }
         if let (Some(_), Some(state), Some(columns)) = (piece.to, rows.states.last(), rows.rows.last()) {
-            let numbers = |of: &MotionState| of.q.iter().chain(&of.v).chain([&of.z]).copied().collect::<Vec<_>>();
-            for (k, number) in numbers(state).into_iter().enumerate() {
+            let numbers = |q: &Vector, v: &Vector, z: f64| q.iter().chain(v).copied().chain([z]).collect::<Vec<_>>();
+            for (k, number) in numbers(&state.q, &state.v, state.z).into_iter().enumerate() {
                 found.values[piece.values.len() + k] = number;
             }
             for (place, column) in places.iter().zip(columns) {
-                for (k, number) in numbers(column).into_iter().enumerate() {
+                for (k, number) in numbers(&column.q, &column.v, column.z).into_iter().enumerate() {
                     found.derivatives[(piece.values.len() + k, *place)] = number;
                 }
             }
@@ -357,7 +360,7 @@ impl FitModel<'_> {
     }
 
     /// The derivative of an expression along that of the state, and in the variable itself where it is a parameter.
-    fn along(&self, gradient: &ExpressionGradient, variable: &Variable, column: &MotionState) -> f64 {
+    fn along(&self, gradient: &ExpressionGradient, variable: &Variable, column: &StateDerivative) -> f64 {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let of_state = dot(&gradient.q, &column.q) + dot(&gradient.v, &column.v) + gradient.z * column.z;
         let Variable::Parameter(name) = variable else { return of_state };

@@ -4,18 +4,23 @@ use super::Kernel;
 use super::formula_system::Observed;
 use super::recorder::Recorder;
 use super::run::{outcome_of, plan_of, requested};
+use super::sensitivity::{exponents_of, loss_gradient, sensitivity_of, unobserved};
 use super::sized::{checked, initial_state};
 use crate::{
-    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl,
+    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan,
+    RunMonitor, RuntimeError, Sensitivity, StepControl,
 };
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{Hints, ScalarSystem, Slopes, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
+use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{
-    AnyIntegrator, AtSwitch, Components, ForceDerivatives, ForceKind, GaussCollocation, InputError, Kernels, Point,
-    ResumeState, Run, SecondDerivatives, State, System, SystemProblem, Vector, ensemble::Tally,
+    AnyIntegrator, AtSwitch, Components, ExplicitDerivatives, ForceDerivatives, ForceKind, GaussCollocation,
+    InputError, Kernels, Point, Quantity, ResumeState, Run, SecondDerivatives, State, System, SystemProblem, Until,
+    Vector, ensemble::Tally,
 };
 use formula_lagrangian::{Formula, FormulaDerivatives, FormulaError};
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// A formula without constraints and impacts, in any number of coordinates: it runs by contact Gauss collocation.
@@ -98,6 +103,27 @@ impl System for ManyCoordinates {
     }
     fn breaks(&self) -> &[f64] {
         self.0.breaks()
+    }
+    fn parameter_names(&self) -> Vec<String> {
+        self.0.parameters().map(|(name, _)| name.to_owned()).collect()
+    }
+    fn parameters(&self) -> Vec<f64> {
+        self.0.parameters().map(|(_, value)| value).collect()
+    }
+    fn with_parameters(&self, theta: &[f64]) -> Option<Rc<dyn System>> {
+        Some(Rc::new(ManyCoordinates(Arc::new(self.0.with_parameters(theta)?))))
+    }
+    fn in_quantity(&self, of: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
+        let mut to = ExplicitDerivatives::zeros(x.q.len());
+        let parameter = match of {
+            Quantity::Time if self.0.proved().autonomous => return to,
+            Quantity::Time => None,
+            Quantity::Parameter(k) => Some(k),
+        };
+        let Components { x: q, y: v, z } = &mut to.gradient;
+        let all = [&mut q[..], &mut v[..], std::slice::from_mut(z), &mut to.force[..]];
+        to.l = self.0.explicit(parameter, t, (&x.q, &x.v, x.z), all);
+        to
     }
     fn kernels(&self) -> Option<Kernels> {
         Some(Kernels::of(self.0.clone()))
@@ -241,6 +267,47 @@ impl Kernel for ManyCoordinates {
         let mut recorder = Recorder::new(self, motion, monitor)?;
         let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
         outcome_of(run, motion, from, self.0.formula().dimension())
+    }
+
+    fn sensitivity(
+        &self,
+        motion: &Motion,
+        variables: &[Variable],
+        times: &[f64],
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        let motion = &unobserved(motion);
+        let problem = self.problem(motion)?;
+        let mut recorder = Recorder::new(self, motion, monitor)?;
+        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
+        Ok(sensitivity_of(&run.tangent_at(variables, times, Until::Time(motion.end))?, self.dimension()))
+    }
+
+    fn gradient(
+        &self,
+        motion: &Motion,
+        times: &[f64],
+        loss: &mut Loss<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        let motion = &unobserved(motion);
+        let problem = self.problem(motion)?;
+        let mut recorder = Recorder::new(self, motion, monitor)?;
+        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
+        Ok(loss_gradient(run.gradient_at(times, |states| loss(states), Until::Time(motion.end))?, self.dimension()))
+    }
+
+    fn lyapunov_exponents(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        let motion = &unobserved(motion);
+        let problem = self.problem(motion)?;
+        let mut recorder = Recorder::new(self, motion, monitor)?;
+        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
+        let found = run.lyapunov_exponents(Until::Time(motion.end))?;
+        Ok(exponents_of(found, self.0.proved(), self.0.has_force()))
     }
 
     fn ensemble(&self, _ensemble: &Ensemble<'_>, _monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {

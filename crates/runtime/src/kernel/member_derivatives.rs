@@ -5,7 +5,7 @@ use super::sensitivity::{covector, loss_gradient, sensitivity_of, state};
 use super::sized::Sized;
 use crate::{BatchLoss, Ensemble, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StepControl};
 use discrete_herglotz::ensemble::EnsembleError;
-use discrete_herglotz::sensitivity::{EndState, SensitivityError, Variable};
+use discrete_herglotz::sensitivity::{SensitivityError, Variable};
 use discrete_herglotz::{InputError, Until};
 use formula_lagrangian::FormulaLagrangian;
 
@@ -21,10 +21,10 @@ pub(super) fn gradients<const N: usize>(
 ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
     let n = system.0.formula().dimension();
     let found = each_block(system, ensemble, interrupt, |members, first| {
-        let of_states = |i: usize, states: &[EndState<N>]| {
+        let of_states = |i: usize, states: &[MotionState]| {
             let states: Vec<MotionState> = states.iter().map(|of| state(of, n)).collect();
             let (value, covectors) = loss(first + i, &states);
-            (value, covectors.iter().map(|of| covector(of, n)).collect())
+            (value, covectors.iter().map(|of| covector(of, n, N)).collect())
         };
         Ok(members.gradient_at(times, of_states, Until::Time(ensemble.end))?.members)
     })?;

@@ -5,52 +5,49 @@ use super::recorder::Recorder;
 use super::run;
 use super::sized::{Sized, coordinates};
 use crate::{
-    Gradient, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
-    StateCovector,
+    EndCovector, Gradient, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError,
+    Sensitivity, StateDerivative,
 };
-use contact_geom::Parametric;
-use contact_geom::nalgebra::SVector;
-use discrete_herglotz::Until;
-use discrete_herglotz::sensitivity::{EndCovector, EndState, StateDerivative, Tangent, Variable};
+use contact_geom::{Parametric, Structure};
+use discrete_herglotz::sensitivity::{Tangent, Variable};
+use discrete_herglotz::{Until, Vector};
 
 /// The motion without rows and events, which its derivatives do not need.
-fn unobserved(motion: &Motion) -> Motion {
+pub(super) fn unobserved(motion: &Motion) -> Motion {
     Motion { rows: None, columns: Vec::new(), events: Vec::new(), estimate: false, nodes: false, ..motion.clone() }
 }
 
-pub(super) fn state<const N: usize>(of: &EndState<N>, n: usize) -> MotionState {
-    let [q, v, p] = [&of.q, &of.v, &of.p].map(|x| coordinates(x.as_slice(), n).to_vec());
-    MotionState { t: of.t, q, v, p, z: of.z }
+/// The first n components of a vector.
+fn first(x: &Vector, n: usize) -> Vector {
+    coordinates(x, n).into()
 }
 
-fn derivative<const N: usize>(of: &StateDerivative<N>, n: usize) -> MotionState {
-    state(&EndState { t: 0.0, q: of.q, v: of.v, p: of.p, z: of.z }, n)
+/// The first n components of a vector, with 0 for those beyond, of `all` coordinates.
+fn padded(x: &Vector, n: usize, all: usize) -> Vector {
+    Vector::from_fn(all, |i| if i < n { x.get(i).copied().unwrap_or(f64::NAN) } else { 0.0 })
 }
 
-/// The partial derivatives of a number in a state, for the first n coordinates.
-pub(super) fn covector<const N: usize>(of: &StateCovector, n: usize) -> EndCovector<N> {
-    let vector =
-        |x: &[f64]| SVector::<f64, N>::from_fn(|i, _| if i < n { x.get(i).copied().unwrap_or(0.0) } else { 0.0 });
-    EndCovector { t: of.t, q: vector(&of.q), v: vector(&of.v), p: vector(&of.p), z: of.z }
+/// A state in the first n coordinates.
+pub(super) fn state(of: &MotionState, n: usize) -> MotionState {
+    MotionState { t: of.t, q: first(&of.q, n), v: first(&of.v, n), p: first(&of.p, n), z: of.z }
 }
 
-pub(super) fn loss_gradient<const N: usize>(
-    found: discrete_herglotz::sensitivity::LossGradient<N>,
-    n: usize,
-) -> LossGradient {
-    let of = |gradient: discrete_herglotz::sensitivity::Gradient<N>| Gradient {
-        q: coordinates(gradient.q.as_slice(), n).to_vec(),
-        velocity: coordinates(gradient.rate.as_slice(), n).to_vec(),
-        z: gradient.z,
-        parameters: gradient.parameters,
-        t0: gradient.t0,
-        t_end: gradient.t_end,
-        growth: gradient.growth,
-    };
+fn derivative(of: &StateDerivative, n: usize) -> StateDerivative {
+    StateDerivative { q: first(&of.q, n), v: first(&of.v, n), p: first(&of.p, n), z: of.z }
+}
+
+/// The partial derivatives of a number in a state of n coordinates, for `all` coordinates.
+pub(super) fn covector(of: &EndCovector, n: usize, all: usize) -> EndCovector {
+    let [q, v, p] = [&of.q, &of.v, &of.p].map(|x| padded(x, n, all));
+    EndCovector { t: of.t, q, v, p, z: of.z }
+}
+
+pub(super) fn loss_gradient(found: discrete_herglotz::sensitivity::LossGradient, n: usize) -> LossGradient {
+    let of = |gradient: Gradient| Gradient { q: first(&gradient.q, n), rate: first(&gradient.rate, n), ..gradient };
     LossGradient { status: found.outcome.status, loss: found.loss.map(|(value, gradient)| (value, of(gradient))) }
 }
 
-pub(super) fn sensitivity_of<const N: usize>(found: &Tangent<N>, n: usize) -> Sensitivity {
+pub(super) fn sensitivity_of(found: &Tangent, n: usize) -> Sensitivity {
     Sensitivity {
         status: found.outcome.status,
         unresolved: found.outcome.unresolved,
@@ -85,18 +82,27 @@ pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: u
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
     let found = run.lyapunov_exponents_within(n, Until::Time(motion.end))?;
-    let is_paired = system.0.structure().has_constant_rate() && !system.0.has_force();
-    Ok(LyapunovExponents {
+    Ok(exponents_of(found, &system.0.structure(), system.0.has_force()))
+}
+
+/// The exponents of a system with this structure.
+pub(super) fn exponents_of(
+    found: discrete_herglotz::sensitivity::LyapunovExponents,
+    structure: &Structure,
+    has_force: bool,
+) -> LyapunovExponents {
+    let is_paired = structure.has_constant_rate() && !has_force;
+    LyapunovExponents {
         status: found.outcome.status,
         t: found.outcome.t,
         steps: found.outcome.steps,
         pairing_defect: is_paired.then(|| found.pairing_defect()),
-        volume_defect: (!system.0.has_force()).then(|| found.volume_defect()),
+        volume_defect: (!has_force).then(|| found.volume_defect()),
         exponents: found.exponents,
         of_second_half: found.of_second_half,
         pairs: found.pairs,
         rate: found.rate,
-    })
+    }
 }
 
 pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
@@ -110,10 +116,10 @@ pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
     let (problem, n) = (system.problem_of(motion)?, system.0.formula().dimension());
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
-    let of_states = |states: &[EndState<N>]| {
+    let of_states = |states: &[MotionState]| {
         let states: Vec<MotionState> = states.iter().map(|of| state(of, n)).collect();
         let (value, covectors) = loss(&states);
-        (value, covectors.iter().map(|of| covector(of, n)).collect())
+        (value, covectors.iter().map(|of| covector(of, n, N)).collect())
     };
     let found = run.gradient_at(times, of_states, Until::Time(motion.end))?;
     Ok(loss_gradient(found, n))

@@ -1,7 +1,7 @@
 //! Derivatives of the motions of a system.
 
 use crate::{
-    Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity, StateCovector,
+    EndCovector, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
     System, velocity_name,
 };
 use discrete_herglotz::sensitivity::Variable;
@@ -176,10 +176,10 @@ fn check_events(motion: &Motion) -> Result<(), RuntimeError> {
 }
 
 /// The value of an expression of a state, its partial derivatives in the state, and those in the parameters.
-pub(super) fn of_expression(loss: &Expression, end: &MotionState) -> (f64, StateCovector, Vec<f64>) {
+pub(super) fn of_expression(loss: &Expression, end: &MotionState) -> (f64, EndCovector, Vec<f64>) {
     let ExpressionGradient { value, t, q, v, z, parameters, .. } = loss.gradient_at(end.t, &end.q, &end.v, end.z);
-    let zero = StateCovector::zero(end.q.len());
+    let zero = EndCovector::zero(end.q.len());
     // An expression of a conformal factor has no value here; it is reported as a loss that is not finite.
-    let covector = if value.is_nan() { zero } else { StateCovector { t, q, v, z, ..zero } };
+    let covector = if value.is_nan() { zero } else { EndCovector { t, q: q.into(), v: v.into(), z, ..zero } };
     (value, covector, parameters)
 }

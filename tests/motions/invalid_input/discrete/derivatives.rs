@@ -12,7 +12,7 @@ pub const TESTS: &[InputTest] = &[InputTest { entries: &["Variable::all"], run: 
 
 impl Parametric<1> for One {}
 
-fn numbers(all: &[StateDerivative<1>]) -> Vec<f64> {
+fn numbers(all: &[StateDerivative]) -> Vec<f64> {
     all.iter().flat_map(|x| [x.q[0], x.v[0], x.p[0], x.z]).collect()
 }
 

@@ -56,7 +56,28 @@ trait SubFlows<const N: usize> {
     }
 }
 
-/// The tangent of steps that are compositions of sub-flows, with its workspace.
+/// The tangent of steps that are compositions of sub-flows, without the Lagrangian and its number of coordinates.
+pub(crate) trait FlowTangent {
+    /// Why the steps are not differentiable in a parameter, if they are not.
+    fn obstacle(&self, parameter: usize) -> Option<&'static str>;
+
+    /// Whether the steps are differentiable with respect to their start alone.
+    fn only_in_start(&self) -> bool;
+
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
+    fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column]) -> Result<f64, StepError>;
+
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector]) -> Result<(), StepError>;
+}
+
+/// The sub-flows of a method, with their workspace.
 pub(crate) struct FlowEngine<'a, const N: usize> {
     method: Box<dyn SubFlows<N> + 'a>,
     of_parameters: ParameterDerivatives<N>,
@@ -109,16 +130,6 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
         Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
     }
 
-    /// Why the steps are not differentiable in a parameter, if they are not.
-    pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
-        self.obstacles.get(parameter).copied().flatten()
-    }
-
-    /// Whether the steps are differentiable with respect to their start alone.
-    pub fn only_in_start(&self) -> bool {
-        self.method.only_in_start()
-    }
-
     fn linearise(&mut self, step: &StepEnds, with_sources: bool) -> Result<(), StepError> {
         self.flows.clear();
         let of = with_sources.then_some(&mut self.of_parameters);
@@ -132,31 +143,37 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
         }
         Ok(())
     }
+}
 
-    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
-    ///
-    /// # Errors
-    /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
-    pub fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column<N>]) -> Result<f64, StepError> {
+impl<const N: usize> FlowTangent for FlowEngine<'_, N> {
+    fn obstacle(&self, parameter: usize) -> Option<&'static str> {
+        self.obstacles.get(parameter).copied().flatten()
+    }
+
+    fn only_in_start(&self) -> bool {
+        self.method.only_in_start()
+    }
+
+    fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column]) -> Result<f64, StepError> {
         let with_sources =
             columns.iter().any(|column| column.parameter.is_some() || column.dt0 != 0.0 || column.dh != 0.0);
         self.linearise(step, with_sources)?;
         let mut largest = 0.0;
         for column in columns {
-            self.flows.iter().for_each(|flow| flow.push(k, column));
+            let mut image = column.state().fixed();
+            self.flows.iter().for_each(|flow| flow.push(k, column, &mut image));
+            column.set_state(image.into());
             largest = max_or_nan(largest, column.size());
         }
         if largest.is_finite() { Ok(largest) } else { Err(StepError::NonFinite) }
     }
 
-    /// Carries covectors from the end of a step, the k-th of the run, to its start.
-    ///
-    /// # Errors
-    /// Those of [`push`](Self::push).
-    pub fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector<N>]) -> Result<(), StepError> {
+    fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector]) -> Result<(), StepError> {
         self.linearise(step, true)?;
         for covector in covectors {
-            self.flows.iter().rev().for_each(|flow| flow.pull(k, covector));
+            let mut image = covector.state().fixed();
+            self.flows.iter().rev().for_each(|flow| flow.pull(k, covector, &mut image));
+            covector.set_state(image.into());
             let size = covector.size();
             if !size.is_finite() {
                 return Err(StepError::NonFinite);

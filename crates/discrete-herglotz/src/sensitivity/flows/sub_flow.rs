@@ -24,9 +24,9 @@ impl<const N: usize> SubFlow<N> {
         Some([time, duration])
     }
 
-    /// Carries a column over the sub-flow, in the k-th step of the run.
-    pub fn push(&self, k: usize, column: &mut Column<N>) {
-        let mut image = self.state.push(&ChartVector { x: column.q, y: column.p, z: column.z });
+    /// Carries the tangent of a column over the sub-flow, in the k-th step of the run.
+    pub fn push(&self, k: usize, column: &Column, tangent: &mut ChartVector<N>) {
+        let mut image = self.state.push(tangent);
         if let Some(source) = column.parameter.and_then(|index| self.sources.get(index)) {
             image = image.plus(*source);
         }
@@ -36,21 +36,20 @@ impl<const N: usize> SubFlow<N> {
             let dt = column.dt0 + (k as f64 + self.start) * column.dh;
             image = image.plus(time.scale(dt)).plus(duration.scale(self.duration * column.dh));
         }
-        (column.q, column.p, column.z) = (image.x, image.y, image.z);
+        *tangent = image;
     }
 
-    /// Carries a covector back over the sub-flow, in the k-th step of the run.
-    pub fn pull(&self, k: usize, covector: &mut Covector<N>) {
-        let w = ChartVector { x: covector.q, y: covector.p, z: covector.z };
+    /// Carries the derivatives w in the state back over the sub-flow, in the k-th step of the run, and adds those in
+    /// parameters and times to a covector.
+    pub fn pull(&self, k: usize, covector: &mut Covector, w: &mut ChartVector<N>) {
         for (sum, source) in covector.parameters.iter_mut().zip(&self.sources) {
-            *sum += source.dot(&w);
+            *sum += source.dot(w);
         }
         if let Some([time, duration]) = self.of_times() {
-            let of_time = time.dot(&w);
+            let of_time = time.dot(w);
             covector.time += of_time;
-            covector.step += (k as f64 + self.start) * of_time + self.duration * duration.dot(&w);
+            covector.step += (k as f64 + self.start) * of_time + self.duration * duration.dot(w);
         }
-        let image = self.state.pull(&w);
-        (covector.q, covector.p, covector.z) = (image.x, image.y, image.z);
+        *w = self.state.pull(w);
     }
 }

@@ -20,15 +20,15 @@ pub(super) struct Kinds {
     pub r: bool,
 }
 
-impl<const N: usize> LinearStages<N> {
+impl LinearStages {
     /// Fixed-point iteration to round-off; `false` if it does not converge.
     #[inline(always)]
     pub(super) fn iterate<S: Simd>(
-        &self,
+        &mut self,
         kinds: Kinds,
         maps: &StepMaps,
-        given: &Inhomogeneity<N>,
-        x: &mut StageTangent<N>,
+        given: &Inhomogeneity,
+        x: &mut StageTangent,
     ) -> bool {
         let mut iteration = FixedPointIteration::until(1.0, 0.25);
         loop {
@@ -44,79 +44,85 @@ impl<const N: usize> LinearStages<N> {
     /// terms, if none are given. Returns the largest change of a rate, relative to the size of the terms.
     #[inline(always)]
     pub(super) fn update<S: Simd>(
-        &self,
+        &mut self,
         kinds: Kinds,
         maps: &StepMaps,
-        given: Option<&Inhomogeneity<N>>,
-        x: &mut StageTangent<N>,
+        given: Option<&Inhomogeneity>,
+        x: &mut StageTangent,
     ) -> f64 {
         let Kinds { motion, z, r } = kinds;
-        let s = maps.s;
+        let (s, n) = (maps.s, self.l_v.len());
         if r {
             x.r = summed::<S>(maps, &x.r_rate, given.map(|g| &g.r));
         }
         if z {
             x.z = summed::<S>(maps, &x.z_rate, given.map(|g| &g.z));
         }
+        let (x_v, x_q) = (&mut x.v[..n], &mut x.q[..n]);
+        let l_v = &self.l_v[..n];
         let mut worst = 0.0;
         if motion {
-            for d in 0..N {
-                x.q[d] = summed::<S>(maps, &x.v[d], given.map(|g| &g.q[d]));
+            let (x_p, x_p_rate, momentum) = (&mut x.p[..n], &mut x.p_rate[..n], &mut self.momentum[..n]);
+            let (p_r, p_z, v_z) = (&self.p_r[..n], &self.p_z[..n], &self.v_z[..n]);
+            for d in 0..n {
+                x_q[d] = summed::<S>(maps, &x_v[d], given.map(|g| &g.q[d]));
             }
-            for d in 0..N {
-                let mut rate = product(&x.r, &self.p_r[d]);
+            for d in 0..n {
+                let mut rate = product(&x.r, &p_r[d]);
                 if self.coupled {
-                    add_product(&mut rate, &x.z, &self.p_z[d]);
+                    add_product(&mut rate, &x.z, &p_z[d]);
                 }
-                for e in 0..N {
-                    add_product(&mut rate, &x.q[e], &self.p_q[d][e]);
+                for e in 0..n {
+                    add_product(&mut rate, &x_q[e], &self.p_q[(d, e)]);
                     if self.has_velocity_terms {
-                        add_product(&mut rate, &x.v[e], &self.p_v[d][e]);
+                        add_product(&mut rate, &x_v[e], &self.p_v[(d, e)]);
                     }
                 }
                 if let Some(given) = given {
                     add(&mut rate, &given.p_source[d]);
                 }
-                x.p_rate[d] = rate;
-                x.p[d] = summed::<S>(maps, &x.p_rate[d], given.map(|g| &g.p[d]));
+                x_p_rate[d] = rate;
+                x_p[d] = summed::<S>(maps, &rate, given.map(|g| &g.p[d]));
             }
-            let mut momentum = [Stages::ZERO; N];
-            for d in 0..N {
-                momentum[d] = x.p[d];
-                subtract_product(&mut momentum[d], &x.r, &self.l_v[d]);
+            for d in 0..n {
+                let mut of_v = x_p[d];
+                subtract_product(&mut of_v, &x.r, &l_v[d]);
                 if self.coupled {
-                    subtract_product(&mut momentum[d], &x.z, &self.v_z[d]);
+                    subtract_product(&mut of_v, &x.z, &v_z[d]);
                 }
                 if self.has_velocity_terms {
-                    for e in 0..N {
-                        subtract_product(&mut momentum[d], &x.q[e], &self.v_q[d][e]);
+                    for e in 0..n {
+                        subtract_product(&mut of_v, &x_q[e], &self.v_q[(d, e)]);
                     }
                 }
                 if let Some(given) = given {
+                    let source = &given.v_source[d];
                     for i in 0..MAX_STAGES {
-                        momentum[d].0[i] -= given.v_source[d].0[i];
+                        of_v.0[i] -= source.0[i];
                     }
                 }
+                momentum[d] = of_v;
             }
             let (mut change, mut size, mut length) = (0.0, 0.0, 0.0);
-            for d in 0..N {
+            for d in 0..n {
                 let mut v = Stages::ZERO;
-                for e in 0..N {
-                    add_product(&mut v, &momentum[e], &self.inverse_mass[d][e]);
+                for e in 0..n {
+                    add_product(&mut v, &momentum[e], &self.inverse_mass[(d, e)]);
                 }
-                compare(s, &v, &x.v[d], &mut change, &mut size);
+                compare(s, &v, &x_v[d], &mut change, &mut size);
                 let mut none = 0.0;
-                compare(s, &x.q[d], &x.q[d], &mut none, &mut length);
-                x.v[d] = v;
+                compare(s, &x_q[d], &x_q[d], &mut none, &mut length);
+                x_v[d] = v;
             }
             worst = relative(change, max_or_nan(size, length / maps.h.abs()));
         }
         let (mut z_rate, mut r_rate) = (Stages::ZERO, Stages::ZERO);
         if z {
+            let z_q = &self.z_q[..n];
             z_rate = product(&x.z, &self.l_z);
-            for d in 0..N {
-                add_product(&mut z_rate, &x.q[d], &self.z_q[d]);
-                add_product(&mut z_rate, &x.v[d], &self.l_v[d]);
+            for d in 0..n {
+                add_product(&mut z_rate, &x_q[d], &z_q[d]);
+                add_product(&mut z_rate, &x_v[d], &l_v[d]);
             }
             if let Some(given) = given {
                 add(&mut z_rate, &given.z_source);
@@ -126,10 +132,11 @@ impl<const N: usize> LinearStages<N> {
         if r {
             subtract_product(&mut r_rate, &x.r, &self.l_z);
             if motion {
+                let (r_q, r_v) = (&self.r_q[..n], &self.r_v[..n]);
                 subtract_product(&mut r_rate, &x.z, &self.r_z);
-                for d in 0..N {
-                    subtract_product(&mut r_rate, &x.q[d], &self.r_q[d]);
-                    subtract_product(&mut r_rate, &x.v[d], &self.r_v[d]);
+                for d in 0..n {
+                    subtract_product(&mut r_rate, &x_q[d], &r_q[d]);
+                    subtract_product(&mut r_rate, &x_v[d], &r_v[d]);
                 }
             }
             if let Some(given) = given {

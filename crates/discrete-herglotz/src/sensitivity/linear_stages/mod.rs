@@ -11,10 +11,11 @@ mod iteration;
 use crate::StepError;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::numbers::registers::Stages;
-use crate::sensitivity::stage_derivatives::{StageDerivatives, StageMatrix, StageVector};
+use crate::sensitivity::stage_derivatives::StageDerivatives;
+use crate::sensitivity::stage_matrix::{StageMatrix, StageVector, stage_vector};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use condensed::CondensedMaps;
-use contact_geom::nalgebra::SMatrix;
+use contact_geom::nalgebra::DMatrix;
 use direct::Fallback;
 use iteration::Kinds;
 use pulp::Simd;
@@ -29,59 +30,83 @@ use pulp::Simd;
 /// `p_z = L_qz + f_z`, `z_q = L_q`, `r_q = L_zq`, `r_v = L_zv`, `r_z = L_zz`. For its adjoint, the tangent of the step
 /// backward, the terms of the force are transposed: `v_q = L_vq + f_v^T`, `p_r = L_q`, `p_q = L_qq + f_q^T`,
 /// `p_v = L_qv`, `p_z = L_qz`, `z_q = L_q + f`, `r_q = L_zq + f_z`. The matrices are stored with the factor rho.
-pub(crate) struct LinearStages<const N: usize> {
+pub(crate) struct LinearStages {
     pub direction: Direction,
     /// Whether z and r act on the motion of q and P.
     coupled: bool,
-    inverse_mass: StageMatrix<N>,
-    l_v: StageVector<N>,
+    inverse_mass: StageMatrix,
+    l_v: StageVector,
     l_z: Stages,
-    v_q: StageMatrix<N>,
-    v_z: StageVector<N>,
-    p_r: StageVector<N>,
-    p_q: StageMatrix<N>,
-    p_v: StageMatrix<N>,
-    p_z: StageVector<N>,
-    z_q: StageVector<N>,
-    r_q: StageVector<N>,
-    r_v: StageVector<N>,
+    v_q: StageMatrix,
+    v_z: StageVector,
+    p_r: StageVector,
+    p_q: StageMatrix,
+    p_v: StageMatrix,
+    p_z: StageVector,
+    z_q: StageVector,
+    r_q: StageVector,
+    r_v: StageVector,
     r_z: Stages,
     /// Whether the equations have the terms `v_q`, `p_v`.
     has_velocity_terms: bool,
-    condensed: Option<Box<CondensedMaps<N>>>,
+    condensed: Option<Box<CondensedMaps>>,
     /// The equations are solved by LU factorisation where their iteration does not converge.
-    fallback: Option<Box<Fallback<N>>>,
+    fallback: Option<Box<Fallback>>,
+    /// `rho W v`, and the positions and the P' of the condensed equations without those that an iteration changes.
+    momentum: StageVector,
+    fixed_q: StageVector,
+    fixed_p_rate: StageVector,
 }
 
 /// The rates of a tangent at the stages, and its values there.
-#[derive(Clone)]
-pub(crate) struct StageTangent<const N: usize> {
-    pub v: StageVector<N>,
-    pub p_rate: StageVector<N>,
+#[derive(Clone, Debug)]
+pub(crate) struct StageTangent {
+    pub v: StageVector,
+    pub p_rate: StageVector,
     pub z_rate: Stages,
     pub r_rate: Stages,
-    pub q: StageVector<N>,
-    pub p: StageVector<N>,
+    pub q: StageVector,
+    pub p: StageVector,
     pub z: Stages,
     pub r: Stages,
 }
 
-impl<const N: usize> StageTangent<N> {
-    pub const ZERO: Self = StageTangent {
-        v: [Stages::ZERO; N],
-        p_rate: [Stages::ZERO; N],
-        z_rate: Stages::ZERO,
-        r_rate: Stages::ZERO,
-        q: [Stages::ZERO; N],
-        p: [Stages::ZERO; N],
-        z: Stages::ZERO,
-        r: Stages::ZERO,
-    };
+/// Without coordinates.
+impl Default for StageTangent {
+    fn default() -> Self {
+        StageTangent::zeros(0)
+    }
+}
+
+impl StageTangent {
+    /// The tangent 0 of n coordinates.
+    pub fn zeros(n: usize) -> Self {
+        let vector = || stage_vector(n);
+        StageTangent {
+            v: vector(),
+            p_rate: vector(),
+            z_rate: Stages::ZERO,
+            r_rate: Stages::ZERO,
+            q: vector(),
+            p: vector(),
+            z: Stages::ZERO,
+            r: Stages::ZERO,
+        }
+    }
+
+    /// Makes it a tangent of n coordinates, if it is not.
+    #[inline(always)]
+    pub fn reserve(&mut self, n: usize) {
+        if self.v.len() != n {
+            *self = StageTangent::zeros(n);
+        }
+    }
 
     /// Adds a multiple of the rates of another tangent; the values at the stages follow from the rates.
     #[inline(always)]
     pub fn add_multiple(&mut self, factor: f64, other: &Self) {
-        for d in 0..N {
+        self.reserve(other.v.len());
+        for d in 0..self.v.len() {
             add_scaled(&mut self.v[d], factor, &other.v[d]);
             add_scaled(&mut self.p_rate[d], factor, &other.p_rate[d]);
         }
@@ -92,9 +117,8 @@ impl<const N: usize> StageTangent<N> {
     /// Multiplies the rates by a factor.
     #[inline(always)]
     pub fn scale(&mut self, factor: f64) {
-        for d in 0..N {
-            scale(&mut self.v[d], factor);
-            scale(&mut self.p_rate[d], factor);
+        for rates in self.v.iter_mut().chain(&mut self.p_rate) {
+            scale(rates, factor);
         }
         scale(&mut self.z_rate, factor);
         scale(&mut self.r_rate, factor);
@@ -117,67 +141,74 @@ fn scale(to: &mut Stages, factor: f64) {
 }
 
 /// The inhomogeneous terms: the values without the rates, and sources of the rates (`rho W v` contains `-v`).
-#[derive(Clone)]
-pub(crate) struct Inhomogeneity<const N: usize> {
-    pub q: StageVector<N>,
-    pub p: StageVector<N>,
+pub(crate) struct Inhomogeneity {
+    pub q: StageVector,
+    pub p: StageVector,
     pub z: Stages,
     pub r: Stages,
-    pub v_source: StageVector<N>,
-    pub p_source: StageVector<N>,
+    pub v_source: StageVector,
+    pub p_source: StageVector,
     pub z_source: Stages,
     pub r_source: Stages,
     /// Whether there is a tangent of rho: r or its source is not 0.
     pub has_r: bool,
 }
 
-impl<const N: usize> Inhomogeneity<N> {
-    pub const ZERO: Self = Inhomogeneity {
-        q: [Stages::ZERO; N],
-        p: [Stages::ZERO; N],
-        z: Stages::ZERO,
-        r: Stages::ZERO,
-        v_source: [Stages::ZERO; N],
-        p_source: [Stages::ZERO; N],
-        z_source: Stages::ZERO,
-        r_source: Stages::ZERO,
-        has_r: false,
-    };
+impl Inhomogeneity {
+    /// No inhomogeneous terms, for n coordinates.
+    pub fn zeros(n: usize) -> Self {
+        let vector = || stage_vector(n);
+        Inhomogeneity {
+            q: vector(),
+            p: vector(),
+            z: Stages::ZERO,
+            r: Stages::ZERO,
+            v_source: vector(),
+            p_source: vector(),
+            z_source: Stages::ZERO,
+            r_source: Stages::ZERO,
+            has_r: false,
+        }
+    }
 }
 
-impl<const N: usize> LinearStages<N> {
-    /// The workspace; `coupled` states that z acts on the motion by more than a rate that depends on time alone.
-    pub fn new(direction: Direction, coupled: bool, has_velocity_terms: bool) -> Self {
-        let (vector, matrix) = ([Stages::ZERO; N], [[Stages::ZERO; N]; N]);
+impl LinearStages {
+    /// The workspace for n coordinates; `coupled` states that z acts on the motion by more than a rate that depends on
+    /// time alone.
+    pub fn new(n: usize, direction: Direction, coupled: bool, has_velocity_terms: bool) -> Self {
+        let (vector, matrix) = (|| stage_vector(n), || StageMatrix::zeros(n));
         LinearStages {
             direction,
             coupled,
-            inverse_mass: matrix,
-            l_v: vector,
+            inverse_mass: matrix(),
+            l_v: vector(),
             l_z: Stages::ZERO,
-            v_q: matrix,
-            v_z: vector,
-            p_r: vector,
-            p_q: matrix,
-            p_v: matrix,
-            p_z: vector,
-            z_q: vector,
-            r_q: vector,
-            r_v: vector,
+            v_q: matrix(),
+            v_z: vector(),
+            p_r: vector(),
+            p_q: matrix(),
+            p_v: matrix(),
+            p_z: vector(),
+            z_q: vector(),
+            r_q: vector(),
+            r_v: vector(),
             r_z: Stages::ZERO,
             has_velocity_terms,
             condensed: None,
             fallback: None,
+            momentum: vector(),
+            fixed_q: vector(),
+            fixed_p_rate: vector(),
         }
     }
 
     /// Prepares the maps for constant mass and rate, where the derivatives at the stages are set and L is separable.
     #[cold]
-    pub fn condense(&mut self, maps: &StepMaps, at: &StageDerivatives<N>, inverse_mass: &SMatrix<f64, N, N>) {
+    pub fn condense(&mut self, maps: &StepMaps, at: &StageDerivatives, inverse_mass: &DMatrix<f64>) {
         let gamma = at.l_z.0[0];
         let (z, r) = (maps.resolvent(-gamma), maps.resolvent(gamma));
         self.condensed = z.zip(r).map(|(z, r)| {
-            Box::new(CondensedMaps { inverse_mass: *inverse_mass, positions: maps.twice(&at.rho), z, r })
+            Box::new(CondensedMaps { inverse_mass: inverse_mass.clone(), positions: maps.twice(&at.rho), z, r })
         });
     }
 
@@ -193,46 +224,47 @@ impl<const N: usize> LinearStages<N> {
 
     /// Sets the coefficients from the derivatives at the stages.
     #[inline(always)]
-    pub fn set(&mut self, at: &StageDerivatives<N>) {
-        self.inverse_mass = at.inverse_mass;
-        self.l_v = at.l_v;
+    pub fn set(&mut self, at: &StageDerivatives) {
+        let n = self.l_v.len();
+        self.inverse_mass.copy_from(&at.inverse_mass);
+        self.l_v.copy_from_slice(&at.l_v);
         self.l_z = at.l_z;
-        self.p_r = at.l_q;
-        self.z_q = at.l_q;
-        for d in 0..N {
-            for e in 0..N {
-                self.p_q[d][e] = product(&at.rho, &at.qq[d][e]);
+        self.p_r.copy_from_slice(&at.l_q);
+        self.z_q.copy_from_slice(&at.l_q);
+        for d in 0..n {
+            for e in 0..n {
+                self.p_q[(d, e)] = product(&at.rho, &at.qq[(d, e)]);
                 if self.has_velocity_terms {
-                    self.v_q[d][e] = product(&at.rho, &at.qv[e][d]);
-                    self.p_v[d][e] = product(&at.rho, &at.qv[d][e]);
+                    self.v_q[(d, e)] = product(&at.rho, &at.qv[(e, d)]);
+                    self.p_v[(d, e)] = product(&at.rho, &at.qv[(d, e)]);
                 }
             }
         }
         if self.coupled {
             self.r_z = product(&at.rho, &at.zz);
-            for d in 0..N {
+            for d in 0..n {
                 self.v_z[d] = product(&at.rho, &at.vz[d]);
                 self.p_z[d] = product(&at.rho, &at.qz[d]);
                 (self.r_q[d], self.r_v[d]) = (self.p_z[d], self.v_z[d]);
             }
         }
         let Some(force) = &at.force else { return };
-        for d in 0..N {
+        for d in 0..n {
             match self.direction {
                 Direction::Forward => {
                     add(&mut self.p_r[d], &force.value[d]);
                     add(&mut self.p_z[d], &product(&at.rho, &force.z[d]));
-                    for e in 0..N {
-                        add(&mut self.p_q[d][e], &product(&at.rho, &force.q[d][e]));
-                        add(&mut self.p_v[d][e], &product(&at.rho, &force.v[d][e]));
+                    for e in 0..n {
+                        add(&mut self.p_q[(d, e)], &product(&at.rho, &force.q[(d, e)]));
+                        add(&mut self.p_v[(d, e)], &product(&at.rho, &force.v[(d, e)]));
                     }
                 }
                 Direction::Backward => {
                     add(&mut self.z_q[d], &force.value[d]);
                     add(&mut self.r_q[d], &product(&at.rho, &force.z[d]));
-                    for e in 0..N {
-                        add(&mut self.p_q[d][e], &product(&at.rho, &force.q[e][d]));
-                        add(&mut self.v_q[d][e], &product(&at.rho, &force.v[e][d]));
+                    for e in 0..n {
+                        add(&mut self.p_q[(d, e)], &product(&at.rho, &force.q[(e, d)]));
+                        add(&mut self.v_q[(d, e)], &product(&at.rho, &force.v[(e, d)]));
                     }
                 }
             }
@@ -247,8 +279,8 @@ impl<const N: usize> LinearStages<N> {
     pub fn solve<S: Simd>(
         &mut self,
         maps: &StepMaps,
-        given: &Inhomogeneity<N>,
-        x: &mut StageTangent<N>,
+        given: &Inhomogeneity,
+        x: &mut StageTangent,
     ) -> Result<(), StepError> {
         if self.coupled {
             return self.solve_for::<S>(Kinds { motion: true, z: true, r: true }, maps, given, x);
@@ -276,8 +308,8 @@ impl<const N: usize> LinearStages<N> {
         &mut self,
         kinds: Kinds,
         maps: &StepMaps,
-        given: &Inhomogeneity<N>,
-        x: &mut StageTangent<N>,
+        given: &Inhomogeneity,
+        x: &mut StageTangent,
     ) -> Result<(), StepError> {
         if !self.iterate::<S>(kinds, maps, given, x) {
             self.solve_directly::<S>(kinds, maps, given, x)?;

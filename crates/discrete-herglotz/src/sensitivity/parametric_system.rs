@@ -1,0 +1,138 @@
+//! Systems with parameters, as derivatives of runs see them.
+
+use crate::integration::SolvedStages;
+use crate::integration::{SharedIntegrator, StepFormula};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::registers::{StageMap, Stages};
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::flows::FlowTangent;
+use crate::sensitivity::linear_stages::StageTangent;
+use crate::sensitivity::of_parametric::OfParametric;
+use crate::sensitivity::of_system::OfSystem;
+use crate::sensitivity::stage_derivatives::StageDerivatives;
+use crate::sensitivity::step_maps::StepMaps;
+use crate::sensitivity::switch::Argument;
+use crate::{Components, Point, Problem, State, StepError, System, SystemProblem, Vector};
+use contact_geom::{Parametric, UnknownParameter};
+use std::rc::Rc;
+
+pub(crate) use crate::system::{ExplicitDerivatives, Quantity};
+
+/// Evaluates derivatives with respect to parameters and time, with the workspace for them.
+pub(crate) trait Quantities {
+    /// The number of parameters.
+    fn count(&self) -> usize;
+
+    /// The derivatives at a point.
+    fn at(&mut self, quantity: Quantity, t: f64, x: &Point) -> ExplicitDerivatives;
+
+    /// The derivative `H_ptheta` of a contact Hamiltonian at a state; NaN for a Lagrangian that is not given by one.
+    fn of_hamiltonian(&mut self, quantity: Quantity, t: f64, state: &State) -> Vector;
+
+    /// The derivative of the momentum `L_v` of a given velocity, at a state that has this velocity.
+    fn of_momentum(&mut self, quantity: Quantity, t: f64, at: (&Point, &Vector)) -> Vector;
+
+    /// `d(rho L_theta)[w] + rho f_theta . w_q` at the stages of a step, multiplied by the weights and summed.
+    fn along(
+        &mut self,
+        arch: Instructions,
+        quantity: Quantity,
+        at: &StageDerivatives,
+        along: (&StageTangent, &Stages),
+    ) -> f64;
+}
+
+/// A [`System`] with parameters, of which runs are differentiated. The linear algebra of the derivatives stands above it,
+/// and is compiled once for all systems.
+pub(crate) trait ParametricSystem<'a> {
+    /// The names of the parameters.
+    fn parameter_names(&self) -> Vec<String>;
+
+    /// Their values, in the order of the names.
+    fn parameters(&self) -> Vec<f64>;
+
+    /// The index of a parameter.
+    ///
+    /// # Errors
+    /// [`UnknownParameter`] if there is none of this name.
+    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter>;
+
+    /// A function of the system for other values of the parameters; `None` where there is no such system.
+    fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>>;
+
+    /// The derivative of a switching function along an argument; `None` where it is not known.
+    fn switching_function_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<f64>;
+
+    /// The derivative of the `(q, v, z)` after a reset along an argument; `None` where it is not known.
+    fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components>;
+
+    /// The derivatives with respect to parameters and time.
+    fn quantities(&self) -> Box<dyn Quantities + 'a>;
+
+    /// Evaluates the derivatives at the stages of a step; `forward` are its maps. Where the step does not have its values of
+    /// L, L is `L_0 + gamma z` with constant gamma, and `actions` maps `z0 + A L_0` to z.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where W is singular at a stage, [`StepError::NonFinite`] where a derivative is not finite.
+    fn evaluate_stages(
+        &self,
+        arch: Instructions,
+        at: &mut StageDerivatives,
+        forward: &StepMaps,
+        step: &SolvedStages,
+        actions: Option<&StageMap>,
+    ) -> Result<(), StepError>;
+
+    /// The tangent of steps that are compositions of sub-flows.
+    ///
+    /// # Errors
+    /// Those of the steps of the method.
+    fn flows(
+        &self,
+        problem: &SystemProblem<'a>,
+        formula: StepFormula,
+        integrator: &SharedIntegrator<'a>,
+    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError>;
+}
+
+/// A problem whose runs can be differentiated: of a [`Parametric`] Lagrangian, or of any [`System`].
+pub trait DifferentiableProblem<'a> {
+    /// The problem with the derivatives of its system.
+    fn differentiable(&'a self) -> Differentiable<'a>;
+}
+
+impl<'a, L: Parametric<N>, const N: usize> DifferentiableProblem<'a> for Problem<'a, L, N> {
+    fn differentiable(&'a self) -> Differentiable<'a> {
+        Differentiable { problem: self.of_system(), of: Rc::new(OfParametric(self.lagrangian)) }
+    }
+}
+
+impl<'a> DifferentiableProblem<'a> for SystemProblem<'a> {
+    fn differentiable(&'a self) -> Differentiable<'a> {
+        Differentiable { problem: self.clone(), of: Rc::new(OfSystem(self.system.clone())) }
+    }
+}
+
+/// A problem with the derivatives of its system, as derivatives of runs use it.
+#[derive(Clone)]
+pub struct Differentiable<'a> {
+    pub(crate) problem: SystemProblem<'a>,
+    pub(crate) of: Rc<dyn ParametricSystem<'a> + 'a>,
+}
+
+impl<'a> Differentiable<'a> {
+    /// The number of coordinates.
+    pub(crate) fn dimension(&self) -> usize {
+        self.problem.system.dimension()
+    }
+
+    /// The system.
+    pub(crate) fn system(&self) -> &(dyn System + 'a) {
+        &*self.problem.system
+    }
+
+    /// Whether the Lagrangian is given by a contact Hamiltonian.
+    pub(crate) fn is_hamiltonian(&self) -> bool {
+        self.problem.system.hints().hamiltonian
+    }
+}
