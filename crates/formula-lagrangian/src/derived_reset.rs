@@ -5,6 +5,7 @@ use crate::impacts::DerivedImpact;
 use crate::resets::{Change, Direction, FormulaReset, Variable};
 use crate::tape::Tape;
 use crate::{Graph, Id};
+use contact_geom::nalgebra::{DMatrix, DVector};
 use contact_geom::switching::Control;
 use contact_geom::{Lagrangian, VelocityPoint};
 
@@ -105,20 +106,26 @@ impl DerivedReset {
         self.rest.as_ref().map_or(Control::Continue, |rest| Control::Replace(rest.after(t, x)))
     }
 
-    /// Whether it is an impact.
-    pub fn is_impact(&self) -> bool {
-        matches!(self.change, DerivedChange::Impact(_))
-    }
-
-    /// Replaces a state `(q, v, z)` by that after the reset; `false` in the other direction. The velocity after an impact,
-    /// whose law is not evaluated over slices, is NaN.
-    pub fn replace(&self, t: f64, rising: bool, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
+    /// Replaces a state `(q, v, z)` by that after the reset or the impact; `None` in the other direction. Returns the factor
+    /// of an impact that is contact; `at` is L with `L_v` and `L_vv` at a velocity and an action.
+    pub fn replace(
+        &self,
+        at: impl Fn(&[f64], f64) -> (f64, DVector<f64>, DMatrix<f64>),
+        t: f64,
+        rising: bool,
+        x: (&mut [f64], &mut [f64], &mut f64),
+    ) -> Option<Option<f64>> {
         match &self.change {
-            _ if !self.direction.includes(rising) => return false,
-            DerivedChange::Assignment(then) => then.replace(t, x),
-            DerivedChange::Impact(_) => x.1.fill(f64::NAN),
+            _ if !self.direction.includes(rising) => None,
+            DerivedChange::Assignment(then) => {
+                then.replace(t, x);
+                Some(None)
+            }
+            DerivedChange::Impact(impact) => {
+                impact.replace(at, t, (x.0, x.1, x.2));
+                Some(impact.factor())
+            }
         }
-        true
     }
 
     /// Replaces a state where resets accumulate; `false` if nothing is stated.

@@ -4,7 +4,7 @@ use crate::derived::Derived;
 use crate::drag::ProvedForce;
 use crate::evaluation::At;
 use crate::{Formula, FormulaError};
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Dual, Scalar, ScalarSystem, Slopes, Structure};
 
 /// A Lagrangian formula with its derivatives in closed form and its proved structure, evaluated at points that are given
@@ -78,11 +78,6 @@ impl FormulaDerivatives {
         self.derived.resets.len()
     }
 
-    /// The number of impacts.
-    pub fn impacts(&self) -> usize {
-        self.derived.resets.iter().filter(|reset| reset.is_impact()).count()
-    }
-
     /// See [`FormulaLagrangian::reset_of`](crate::FormulaLagrangian::reset_of).
     pub fn reset_of(&self, index: usize) -> Option<usize> {
         index.checked_sub(self.derived.kinks.functions.len()).filter(|reset| *reset < self.resets())
@@ -125,11 +120,26 @@ impl FormulaDerivatives {
         }
     }
 
-    /// Replaces a state `(q, v, z)` by that after the reset to which a switching function belongs; `false` if there is none
-    /// in this direction. A new value may be NaN, as all of an impact are.
-    pub fn reset(&self, index: usize, rising: bool, t: f64, x: (&mut [f64], &mut [f64], &mut f64)) -> bool {
-        let reset = self.reset_of(index).and_then(|i| self.derived.resets.get(i));
-        reset.is_some_and(|reset| reset.replace(t, rising, x))
+    /// Replaces a state `(q, v, z)` by that after the reset or the impact to which a switching function belongs; `None` if
+    /// there is none in this direction. A new value may be NaN. Returns the factor by which an impact multiplies the contact
+    /// form, if it is contact.
+    pub fn reset(
+        &self,
+        index: usize,
+        rising: bool,
+        t: f64,
+        (q, v, z): (&mut [f64], &mut [f64], &mut f64),
+    ) -> Option<Option<f64>> {
+        let (n, position) = (q.len(), q.to_vec());
+        let at = |v: &[f64], z: f64| {
+            let (mut l_q, mut l_v, mut l_z) = (vec![0.0; n], DVector::zeros(n), 0.0);
+            let to = Slopes { q: &mut l_q, v: l_v.as_mut_slice(), z: &mut l_z };
+            let l = self.with_gradient::<f64, 0>(t, &position, v, z, to);
+            let mut w = DMatrix::zeros(n, n);
+            self.mass_matrix::<f64, 0>(t, &position, v, z, w.as_mut_slice());
+            (l, l_v, w)
+        };
+        self.derived.resets.get(self.reset_of(index)?)?.replace(at, t, rising, (q, v, z))
     }
 
     /// The same where resets accumulate.

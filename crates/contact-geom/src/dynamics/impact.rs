@@ -5,7 +5,8 @@ use crate::dynamics::law_derivatives::LawDerivatives;
 use crate::number::linear::solve;
 use crate::switching::Control;
 use crate::{ChartVector, Dual, Hints, Lagrangian, Scalar, VelocityPoint};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector, SMatrix, SVector};
 
 /// The largest number of Newton iterations for the state after an impact. The energy is convex along the normal, so
 /// that they converge from the reflected velocity; bisection would need as many.
@@ -120,6 +121,21 @@ impl Impact {
         }
     }
 
+    /// The velocity and the action after an impact, for vectors whose length may be known at run time: `at` is the function
+    /// of a velocity and an action that has L, `L_v` and `L_vv`, at the time and the position of the impact. `None` as for
+    /// [`after`](Self::after).
+    pub fn after_at<T: Scalar, D: Dim>(
+        self,
+        at: impl Fn(&OVector<T, D>, T) -> (T, OVector<T, D>, OMatrix<T, D, D>),
+        before: (&OVector<T, D>, T),
+        normal: (&OVector<T, D>, T),
+    ) -> Option<(OVector<T, D>, T)>
+    where
+        DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    {
+        self.solved(T::from(self.coefficient()), at, before, normal)
+    }
+
     /// The state after an impact with another coefficient, for the derivatives of a Lagrangian.
     pub(super) fn after_with<T: Scalar, const N: usize>(
         self,
@@ -127,8 +143,28 @@ impl Impact {
         lagrangian: &impl LawDerivatives<N, T>,
         t: T,
         x: &VelocityPoint<N, T>,
-        (normal, rate): (&SVector<T, N>, T),
+        normal: (&SVector<T, N>, T),
     ) -> Option<VelocityPoint<N, T>> {
+        let at = |v: &SVector<T, N>, z: T| {
+            let y = VelocityPoint { q: x.q, v: *v, z };
+            let (value, slope) = lagrangian.value_and_gradient(t, &y);
+            (value, slope.y, lagrangian.mass(t, &y))
+        };
+        let (v, z) = self.solved(coefficient, at, (&x.v, x.z), normal)?;
+        Some(VelocityPoint { q: x.q, v, z })
+    }
+
+    /// See [`after_at`](Self::after_at).
+    fn solved<T: Scalar, D: Dim>(
+        self,
+        coefficient: T,
+        at: impl Fn(&OVector<T, D>, T) -> (T, OVector<T, D>, OMatrix<T, D, D>),
+        (v, z): (&OVector<T, D>, T),
+        (normal, rate): (&OVector<T, D>, T),
+    ) -> Option<(OVector<T, D>, T)>
+    where
+        DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    {
         let one = T::one();
         let (factor, restitution) = match self {
             Impact::Elastic => (one, one),
@@ -136,34 +172,33 @@ impl Impact {
             Impact::Conformal(_) => (coefficient, coefficient.sqrt()),
         };
         let by_energy = !matches!(self, Impact::Restitution(_));
-        let (before, slope) = lagrangian.value_and_gradient(t, x);
-        let p = slope.y;
-        let energy = x.v.dot(&p) - before;
-        let approach = normal.dot(&x.v) + rate;
-        let z = x.z * factor;
-        let divided = |w: &SMatrix<T, N, N>, by: &SVector<T, N>| {
-            let (mut w, mut by) = (*w, *by);
+        let (before, p, w) = at(v, z);
+        let energy = v.dot(&p) - before;
+        let approach = normal.dot(v) + rate;
+        let z = z * factor;
+        let divided = |w: &OMatrix<T, D, D>, by: &OVector<T, D>| {
+            let (mut w, mut by) = (w.clone(), by.clone());
             solve(&mut w, &mut by).ok().map(|_| by)
         };
         // The reflected velocity, for the mass matrix before the impact.
-        let across = divided(&lagrangian.mass(t, x), normal)?;
+        let across = divided(&w, normal)?;
         let mut mu = -approach * (restitution + factor) / normal.dot(&across);
-        let mut y = VelocityPoint { q: x.q, v: x.v * factor + across * mu, z };
+        let mut y = v * factor + across * mu;
         let (mut converged, mut last) = (0, f64::INFINITY);
         for _ in 0..MAX_ITERATIONS {
-            let (value, slope) = lagrangian.value_and_gradient(t, &y);
-            let w = lagrangian.mass(t, &y);
-            let residual = slope.y - p * factor - normal * mu;
+            let (value, momentum, w) = at(&y, z);
+            let residual = &momentum - &p * factor - normal * mu;
             let (along, across) = (divided(&w, &residual)?, divided(&w, normal)?);
             let (of_law, direction, of_mu) = if by_energy {
-                (y.v.dot(&slope.y) - value - energy * factor + mu * rate, w * y.v, rate)
+                (y.dot(&momentum) - value - energy * factor + mu * rate, w * &y, rate)
             } else {
-                (normal.dot(&y.v) + rate + approach * restitution, *normal, T::zero())
+                (normal.dot(&y) + rate + approach * restitution, normal.clone(), T::zero())
             };
             let change = (direction.dot(&along) - of_law) / (direction.dot(&across) + of_mu);
             let step = across * change - along;
-            (mu, y.v) = (mu + change, y.v + step);
-            let [size, of] = [&step, &y.v].map(|v| v.iter().fold(0.0, |m: f64, v| m.max(v.pivot_size())));
+            mu += change;
+            y += &step;
+            let [size, of] = [&step, &y].map(|v| v.iter().fold(0.0, |m: f64, v| m.max(v.pivot_size())));
             if !(size.is_finite() && mu.extent().is_finite()) {
                 return None;
             }
@@ -171,8 +206,8 @@ impl Impact {
                 converged += 1;
             }
             if converged == MAX_EXTRA_ITERATIONS {
-                let departure = normal.dot(&y.v) + rate;
-                return (departure.re() * approach.re() <= 0.0).then_some(y);
+                let departure = normal.dot(&y) + rate;
+                return (departure.re() * approach.re() <= 0.0).then_some((y, z));
             }
             last = size;
         }

@@ -1,15 +1,13 @@
 //! Any system, as derivatives of runs see it: evaluated at one stage after another.
 
-use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::integration::{SharedIntegrator, SolvedStages, StepFormula};
 use crate::numbers::instructions::Instructions;
-use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::flows::FlowTangent;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
-use crate::sensitivity::stage_derivatives::{StageDerivatives, stage_values};
+use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
 use crate::{Components, Point, SecondDerivatives, State, StepError, System, SystemProblem, Vector};
@@ -134,11 +132,7 @@ impl WithSimd for EvaluateStages<'_> {
             at.evaluate_stage_of(system, i)?;
         }
         if let (false, Some(actions)) = (step.knows_l, actions) {
-            let without = stage_values::<S>(forward, &at.l, step.start.z);
-            actions.apply::<S>(&without, step.s, &mut at.z, Lanes::<S>::splat(0.0));
-            for i in 0..MAX_STAGES {
-                at.l.0[i] += at.l_z.0[i] * at.z.0[i];
-            }
+            at.set_actions::<S>(forward, step, actions);
         }
         Ok(())
     }

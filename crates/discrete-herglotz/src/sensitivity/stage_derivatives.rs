@@ -5,7 +5,7 @@
 
 use crate::integration::{SolvedStages, depends_on_action};
 use crate::numbers::lanes::Lanes;
-use crate::numbers::registers::{Stages, blocks};
+use crate::numbers::registers::{MAX_STAGES, StageMap, Stages, blocks};
 use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::stage_matrix::{StageMatrix, StageVector, stage_vector};
 use crate::sensitivity::step_maps::StepMaps;
@@ -116,6 +116,17 @@ impl StageDerivatives {
         let (end_p, p0, force) = (&mut self.end_p[..n], &step.start.p[..n], &step.force[..n]);
         for d in 0..n {
             end_p[d] = (p0[d] + end_value::<S>(forward, &force[d])) / self.end_rho;
+        }
+    }
+
+    /// Sets z, and adds `gamma z` to L, at the stages of a step that does not have its values of L: L is then `L_0 + gamma z`
+    /// with constant gamma, and `actions` maps `z0 + A L_0` to z.
+    #[inline(always)]
+    pub fn set_actions<S: Simd>(&mut self, forward: &StepMaps, step: &SolvedStages, actions: &StageMap) {
+        let without = stage_values::<S>(forward, &self.l, step.start.z);
+        actions.apply::<S>(&without, step.s, &mut self.z, Lanes::<S>::splat(0.0));
+        for i in 0..MAX_STAGES {
+            self.l.0[i] += self.l_z.0[i] * self.z.0[i];
         }
     }
 

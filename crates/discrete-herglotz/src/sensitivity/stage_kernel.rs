@@ -5,11 +5,10 @@
 
 use crate::StepError;
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
-use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::integration::SolvedStages;
 use crate::numbers::lanes::{Lanes, branched, forget_branches};
 use crate::numbers::registers::{StageMap, Stages, blocks};
-use crate::sensitivity::stage_derivatives::{StageDerivatives, stage_values};
+use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::system::applied_force::AppliedForce;
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -50,11 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for StageKernel<'_, L, N> {
             }
         }
         if let (false, Some(actions)) = (step.knows_l, actions) {
-            let without = stage_values::<S>(forward, &at.l, step.start.z);
-            actions.apply::<S>(&without, step.s, &mut at.z, Lanes::<S>::splat(0.0));
-            for i in 0..MAX_STAGES {
-                at.l.0[i] += at.l_z.0[i] * at.z.0[i];
-            }
+            at.set_actions::<S>(forward, step, actions);
         }
         if const { L::HINTS.forced } {
             for i in 0..step.s {

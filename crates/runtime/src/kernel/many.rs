@@ -23,7 +23,7 @@ use formula_lagrangian::{Formula, FormulaDerivatives, FormulaError};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// A formula without constraints and impacts, in any number of coordinates: it runs by contact Gauss collocation.
+/// A formula without constraints, in any number of coordinates: it runs by contact Gauss collocation.
 pub(super) struct ManyCoordinates(Arc<FormulaDerivatives>);
 
 /// What a formula with many coordinates has no kernel for.
@@ -34,11 +34,10 @@ fn few(what: &'static str) -> RuntimeError {
 /// The kernel of a formula.
 pub(super) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
     let derivatives = formula.derivatives()?;
-    match () {
-        () if formula.constraints() > 0 => Err(few("constraints")),
-        () if derivatives.impacts() > 0 => Err(few("impacts")),
-        () => Ok(Arc::new(ManyCoordinates(Arc::new(derivatives)))),
+    if formula.constraints() > 0 {
+        return Err(few("constraints"));
     }
+    Ok(Arc::new(ManyCoordinates(Arc::new(derivatives))))
 }
 
 impl System for ManyCoordinates {
@@ -89,10 +88,8 @@ impl System for ManyCoordinates {
     }
     fn at_switch(&self, index: usize, t: f64, x: &Point, rising: bool) -> AtSwitch {
         let mut to = x.clone();
-        match self.0.reset(index, rising, t, (&mut to.q, &mut to.v, &mut to.z)) {
-            true => AtSwitch::Replace { to, factor: None },
-            false => AtSwitch::Continue,
-        }
+        let factor = self.0.reset(index, rising, t, (&mut to.q, &mut to.v, &mut to.z));
+        factor.map_or(AtSwitch::Continue, |factor| AtSwitch::Replace { to, factor })
     }
     fn at_accumulation(&self, index: usize, t: f64, x: &Point) -> AtSwitch {
         let mut to = x.clone();

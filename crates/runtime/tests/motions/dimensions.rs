@@ -1,6 +1,7 @@
 //! Systems of one to sixteen coordinates.
 
 use super::{Seen, accurate, by_steps, members};
+use contact_geom::switching::Impact;
 use discrete_herglotz::{AnyIntegrator, SplittingScheme, Status, Steps};
 use formula_lagrangian::{Direction, Reset};
 use herglotz_runtime::{
@@ -65,40 +66,42 @@ fn more_than_sixteen_coordinates() {
     assert!(error.contains("16") && error.contains("checks"), "{error}");
 }
 
-/// Forces, kinks, jumps and resets in seventeen coordinates, of which sixteen are at rest or move freely, are those of one
+/// Forces, kinks, jumps, resets and impacts in seventeen coordinates, of which sixteen are at rest or move freely, are those of one
 /// coordinate: to 1e-12, the round-off of these runs.
 #[test]
 fn forces_kinks_and_resets_in_many_coordinates() {
     let by = StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(60) };
-    type Case<'c> = (&'c str, &'c [(&'c str, &'c str)], Option<Reset<'c>>);
-    let cases: [Case<'_>; 4] = [
-        ("x'^2/2 - x^2/2 - 0.1*z", &[("x", "-0.2*x'*x'^2 + sin(t)")], None),
-        ("x'^2/2 - x^2/2 + abs(x)/4 - 0.1*z", &[], None),
-        ("x'^2/2*if(x < 0, 2, 1) - x^2/2", &[("x", "-0.1*x'")], None),
-        (
-            "x'^2/2 - 9.81*x",
-            &[],
-            Some(Reset { when: "x", direction: Direction::Falling, then: &[("x'", "-0.8*x'")], rest: None }),
-        ),
+    let forced = |formula: Formula, forces: &[(&str, &str)]| formula.with_forces(forces).unwrap();
+    let bounce = Reset { when: "x", direction: Direction::Falling, then: &[("x'", "-0.8*x'")], rest: None };
+    let struck = |formula: Formula, law: Impact| formula.with_impact("x", law, None).unwrap();
+    type Change<'c> = &'c dyn Fn(Formula) -> Formula;
+    let cases: [(&str, Change<'_>); 8] = [
+        ("x'^2/2 - x^2/2 - 0.1*z", &|f| forced(f, &[("x", "-0.2*x'*x'^2 + sin(t)")])),
+        ("x'^2/2 - x^2/2 + abs(x)/4 - 0.1*z", &|f| f),
+        ("x'^2/2*if(x < 0, 2, 1) - x^2/2", &|f| forced(f, &[("x", "-0.1*x'")])),
+        ("x'^2/2 - x^2/2 + if(t > 1.3, x, 0)", &|f| f),
+        ("x'^2/2 - 9.81*x", &|f| f.with_reset(bounce).unwrap()),
+        ("x'^2/2*(1 + x^2) - 9.81*x - 0.1*z", &|f| struck(f, Impact::Elastic)),
+        ("x'^2/2 - 9.81*x - 0.1*z", &|f| struck(f, Impact::Restitution(0.7))),
+        ("x'^2/2 - 9.81*x - 0.1*z", &|f| struck(f, Impact::Conformal(0.8))),
     ];
-    for (text, forces, reset) in cases {
+    for (text, change) in cases {
         let of = |n: usize| {
             let others: Vec<String> = (1..n).map(|i| format!("y{i}")).collect();
             let names: Vec<&str> = std::iter::once("x").chain(others.iter().map(String::as_str)).collect();
             let free: String = others.iter().map(|y| format!(" + {y}'^2/2")).collect();
-            let mut formula = Formula::parse(&format!("{text}{free}"), &names, &[]).unwrap();
-            if !forces.is_empty() {
-                formula = formula.with_forces(forces).unwrap();
-            }
-            if let Some(reset) = reset {
-                formula = formula.with_reset(reset).unwrap();
-            }
+            let formula = change(Formula::parse(&format!("{text}{free}"), &names, &[]).unwrap());
             let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
             (q[0], v[0]) = (1.0, 0.3);
-            System::new(&formula).unwrap().run(&Motion::new(Start::new(0.0, q, v, 0.0), 3.0, by), &mut ()).unwrap()
+            let motion = Motion { conformal_factor: true, ..Motion::new(Start::new(0.0, q, v, 0.0), 3.0, by) };
+            System::new(&formula).unwrap().run(&motion, &mut ()).unwrap()
         };
         let (one, many) = (of(1), of(17));
         assert_eq!((one.status, many.status, many.q.len()), (Status::Completed, Status::Completed, 17), "{text}");
+        match (one.log_factor, many.log_factor) {
+            (Some(a), Some(b)) => assert!((a - b).abs() <= 1e-12, "{text}: {a} and {b}"),
+            factors => assert_eq!(factors, (None, None), "{text}"),
+        }
         let off =
             (one.q[0] - many.q[0]).abs() + (one.p[0] - many.p[0]).abs() + (one.z.unwrap() - many.z.unwrap()).abs();
         assert!(off <= 1e-12 && many.q[16] == 0.0, "{text}: off by {off:e}");
