@@ -80,8 +80,8 @@ pub mod switching {
 }
 
 pub use dynamics::{
-    AsFunction, AtEnergy, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure, Forced,
-    HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, InTransformedTime, Lagrangian,
+    Arguments, AsFunction, AtEnergy, ContactHamiltonian, Defect, Defects, Derivatives, Energy, Force, ForceStructure,
+    Forced, HamiltonianDerivatives, HamiltonianStructure, HerglotzField, Hessian, Hints, InTransformedTime, Lagrangian,
     LagrangianForm, Legendre, Lifted, LiftedAction, NoMomentum, NoetherMomentum, OfHamiltonian, OneParameterGroup,
     Parametric, ParametricForce, ParametricHamiltonian, Quotient, ScalarSystem, SlicesVisitor, Slopes, Structure,
     Symmetry, TimesRate, UnknownParameter, VectorField, VelocityDrag, WithoutClosedDerivatives,

@@ -57,6 +57,8 @@ pub(crate) struct Derived {
     /// The value and the force for any values of the parameters.
     pub parametric_value: ParametricNodes,
     pub parametric_force: ParametricNodes,
+    /// `L_q`, `L_v`, `L_z` and the value, for any values of the parameters.
+    pub parametric_gradient: ParametricNodes,
     /// The holonomic constraints.
     pub constraints: Tape,
     /// The nodes of these forces.
@@ -140,6 +142,8 @@ impl Derived {
         };
         let parametric_value = ParametricNodes::new(&graph, &[root]);
         let parametric_force = ParametricNodes::new(&graph, &applied_nodes);
+        let of_gradient: Vec<Id> = partials.iter().copied().chain([root]).collect();
+        let parametric_gradient = ParametricNodes::new(&graph, &of_gradient);
         let proved_force = ProvedForce::of(&mut graph, &applied_nodes, n, MOST_NODES_WITH_HESSIAN);
         let constraints = Tape::new(&graph, &formula.constraints, n).ok_or(too_large)?;
         let formula = Formula { graph, ..formula.clone() };
@@ -164,6 +168,7 @@ impl Derived {
             applied,
             parametric_value,
             parametric_force,
+            parametric_gradient,
             constraints,
             applied_nodes,
             proved_force,

@@ -5,7 +5,8 @@ use crate::drag::ProvedForce;
 use crate::evaluation::At;
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Scalar, ScalarSystem, Slopes, Structure};
+use contact_geom::support::KernelDual;
+use contact_geom::{Arguments, Scalar, ScalarSystem, Slopes, Structure};
 
 /// A Lagrangian formula with its derivatives in closed form and its proved structure, evaluated at points that are given
 /// by slices, as a [`ScalarSystem`].
@@ -99,17 +100,6 @@ impl FormulaDerivatives {
         matches!(self.derived.proved_force, ProvedForce::Drag { .. })
     }
 
-    /// The derivative of the applied force along a direction `(dq, dv, dz)`, which is written, with that of each component.
-    pub fn force_along(&self, t: f64, x: (&[f64], &[f64], f64), along: (&[f64], &[f64], f64), to: &mut [f64]) {
-        type Along = Dual<f64, SVector<f64, 1>>;
-        let moving = |re: f64, d: f64| Along { re, d: SVector::<f64, 1>::from_element(d) };
-        let all = |x: &[f64], d: &[f64]| -> Vec<Along> { x.iter().zip(d).map(|(x, d)| moving(*x, *d)).collect() };
-        let (q, v) = (all(x.0, along.0), all(x.1, along.1));
-        let mut force = vec![Along::from(0.0); to.len()];
-        self.applied_force::<Along, 0>(Along::from(t), &q, &v, moving(x.2, along.2), &mut force);
-        to.iter_mut().zip(force).for_each(|(to, f)| *to = f.d[0]);
-    }
-
     /// See [`FormulaLagrangian`](crate::FormulaLagrangian): the functions of kinks, then those of resets.
     pub fn switching_functions(&self, t: f64, q: &[f64], v: &[f64], z: f64, values: &mut Vec<f64>) {
         let (tape, first) = (&self.derived.switching, values.len());
@@ -163,67 +153,9 @@ impl FormulaDerivatives {
         Some(other)
     }
 
-    /// The derivative of L with respect to a parameter, or to the time if none is given, which is returned, with those of
-    /// its gradient `L_q`, `L_v`, `L_z` and that of the force, which are written.
-    pub fn explicit(
-        &self,
-        parameter: Option<usize>,
-        t: f64,
-        (q, v, z): (&[f64], &[f64], f64),
-        [of_q, of_v, of_z, of_force]: [&mut [f64]; 4],
-    ) -> f64 {
-        type Along = Dual<f64, SVector<f64, 1>>;
-        type AlongTwo = Dual<Along, SVector<Along, 1>>;
-        let one = |is: bool| SVector::<f64, 1>::from_element(f64::from(u8::from(is)));
-        let explicit = |re: f64, is: bool| {
-            let d = SVector::<Along, 1>::from_element(Along::from(f64::from(u8::from(is))));
-            AlongTwo { re: Along::from(re), d }
-        };
-        let theta: Vec<AlongTwo> =
-            self.parameters().enumerate().map(|(k, (_, x))| explicit(x, parameter == Some(k))).collect();
-        let time = explicit(t, parameter.is_none());
-        let mut value = AlongTwo::from(0.0);
-        let mut of_l = 0.0;
-        let mut along = |kind: usize, i: usize| {
-            let at = |x: &[f64], is: bool| -> Vec<AlongTwo> {
-                x.iter().enumerate().map(|(j, x)| AlongTwo::constant(Dual { re: *x, d: one(is && i == j) })).collect()
-            };
-            let (q, v) = (at(q, kind == 0), at(v, kind == 1));
-            let z = AlongTwo::constant(Dual { re: z, d: one(kind == 2) });
-            let at = At { q: &q, v: &v, z, t: time };
-            self.derived.parametric_value.evaluate(&theta, at, std::slice::from_mut(&mut value));
-            let Dual { re, d } = value.d[0];
-            of_l = re;
-            d[0]
-        };
-        of_q.iter_mut().enumerate().for_each(|(i, to)| *to = along(0, i));
-        of_v.iter_mut().enumerate().for_each(|(i, to)| *to = along(1, i));
-        of_z.iter_mut().for_each(|to| *to = along(2, 0));
-        of_force.fill(0.0);
-        let forces = self.derived.parametric_force.len();
-        if forces > 0 {
-            let simple = |re: f64, is: bool| Along { re, d: one(is) };
-            let theta: Vec<Along> =
-                self.parameters().enumerate().map(|(k, (_, x))| simple(x, parameter == Some(k))).collect();
-            let still = |x: &[f64]| -> Vec<Along> { x.iter().map(|x| Along::from(*x)).collect() };
-            let (q, v) = (still(q), still(v));
-            let at = At { q: &q, v: &v, z: Along::from(z), t: simple(t, parameter.is_none()) };
-            let mut force = vec![Along::from(0.0); forces];
-            self.derived.parametric_force.evaluate(&theta, at, &mut force);
-            of_force.iter_mut().zip(force).for_each(|(to, f)| *to = f.d[0]);
-        }
-        of_l
-    }
-
     /// The times of kinks and jumps.
     pub fn breaks(&self) -> &[f64] {
         &self.derived.breaks
-    }
-
-    /// Writes the second partial derivatives `L_qq`, `L_qv`, `L_vv`, `L_qz`, `L_vz`, `L_zz`, in this order: matrices of
-    /// n × n entries by columns (in `L_qv` the rows belong to q), vectors of n entries, and one number.
-    pub fn second_partials(&self, t: f64, q: &[f64], v: &[f64], z: f64, mut to: [&mut [f64]; 6]) {
-        self.derived.second.evaluate::<f64, 0>(At { t, q, v, z }, &mut to);
     }
 }
 
@@ -256,6 +188,42 @@ impl ScalarSystem for FormulaDerivatives {
     #[inline(always)]
     fn mass_matrix<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]) {
         self.derived.mass.evaluate::<T, N>(At { t, q, v, z }, &mut [to]);
+    }
+
+    #[inline(always)]
+    fn second_derivatives<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, mut to: [&mut [T]; 6]) {
+        self.derived.second.evaluate::<T, N>(At { t, q, v, z }, &mut to);
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.derived.formula.values.len()
+    }
+
+    /// Where the base of a power is not positive, its derivative with respect to a parameter in the exponent is taken to
+    /// be 0; so are those of jumps.
+    fn explicit<T: Scalar>(&self, of: Option<usize>, at: Arguments<'_, T>, to: Slopes<'_, T>, force: &mut [T]) -> T {
+        type Along<T> = KernelDual<T, SVector<T, 1>>;
+        let moving = |x: T, is: bool| {
+            let mut along = Along::<T>::constant(x);
+            along.d[0] = T::from(f64::from(u8::from(is)));
+            along
+        };
+        let still = |x: &[T]| -> Vec<Along<T>> { x.iter().map(|x| Along::<T>::constant(*x)).collect() };
+        let theta = self.derived.formula.values.iter().enumerate();
+        let theta: Vec<_> = theta.map(|(k, x)| moving(T::from(*x), of == Some(k))).collect();
+        let (q, v) = (still(at.q), still(at.v));
+        let at = At { q: &q, v: &v, z: Along::<T>::constant(at.z), t: moving(at.t, of.is_none()) };
+        let mut found = vec![Along::<T>::constant(T::zero()); 2 * self.n + 2];
+        self.derived.parametric_gradient.evaluate(&theta, at, &mut found);
+        let mut found = found.iter().map(|x| x.d[0]);
+        for to in to.q.iter_mut().chain(to.v).chain([to.z]) {
+            *to = found.next().unwrap_or_else(|| T::from(f64::NAN));
+        }
+        let mut applied = vec![Along::<T>::constant(T::zero()); self.derived.parametric_force.len()];
+        self.derived.parametric_force.evaluate(&theta, at, &mut applied);
+        let mut applied = applied.iter().map(|f| f.d[0]);
+        force.iter_mut().for_each(|to| *to = applied.next().unwrap_or_else(T::zero));
+        found.next().unwrap_or_else(|| T::from(f64::NAN))
     }
 
     #[inline(always)]

@@ -49,6 +49,6 @@ pub use lagrangian_form::LagrangianForm;
 pub use parameters::{Parametric, ParametricForce, UnknownParameter, indexed_names};
 pub use probe::check_closed_derivatives;
 pub use rounding::{gradient_rounding, rounding_at_state};
-pub use scalar_system::{ScalarSystem, SlicesVisitor, Slopes};
+pub use scalar_system::{Arguments, ScalarSystem, SlicesVisitor, Slopes};
 pub use structure::{Defect, Defects, Structure};
 pub use table::{Interpolation, Table, TableError};

@@ -23,6 +23,25 @@ pub trait ScalarSystem {
     /// `W = L_vv`, by columns.
     fn mass_matrix<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]);
 
+    /// Writes the second derivatives `L_qq`, `L_qv`, `L_vv`, `L_qz`, `L_vz`, `L_zz`, in this order: matrices of n × n entries by
+    /// columns (in `L_qv` the rows belong to q), vectors of n entries, and one number.
+    fn second_derivatives<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: [&mut [T]; 6]);
+
+    /// The number of parameters.
+    fn parameter_count(&self) -> usize {
+        0
+    }
+
+    /// The derivative of L in a parameter, or in the time if none is given, which is returned, with those of its gradient and
+    /// of the applied force, which are written. Only for a system with parameters or one that depends on time.
+    fn explicit<T: Scalar>(&self, of: Option<usize>, at: Arguments<'_, T>, to: Slopes<'_, T>, force: &mut [T]) -> T {
+        let _ = (of, at);
+        for slope in to.q.iter_mut().chain(to.v).chain([to.z]).chain(force) {
+            *slope = T::zero();
+        }
+        T::zero()
+    }
+
     /// Whether there is an applied force.
     fn has_force(&self) -> bool {
         false
@@ -33,6 +52,19 @@ pub trait ScalarSystem {
         let _ = (t, q, v, z);
         to.fill(T::zero());
     }
+}
+
+/// A time and a point of TQ x R.
+#[derive(Clone, Copy, Debug)]
+pub struct Arguments<'s, T> {
+    /// The time.
+    pub t: T,
+    /// The position.
+    pub q: &'s [T],
+    /// The velocity.
+    pub v: &'s [T],
+    /// The action.
+    pub z: T,
 }
 
 /// Where the gradient of a Lagrangian is written.

@@ -28,6 +28,7 @@ mod kept_states;
 mod linear_stages;
 mod lyapunov;
 mod of_parametric;
+mod of_slices;
 mod of_system;
 pub(crate) mod parameter_derivatives;
 mod parametric_system;

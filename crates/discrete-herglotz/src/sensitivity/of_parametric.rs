@@ -5,7 +5,7 @@ use crate::integration::{OfTyped, QuantityDerivatives, SharedIntegrator, StepFor
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SensitivityError;
-use crate::sensitivity::flows::{FlowEngine, FlowTangent};
+use crate::sensitivity::flows::{FlowEngine, FlowTangent, Sources};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
@@ -42,8 +42,8 @@ impl<L: Parametric<N>, const N: usize> Quantities for OfParameters<'_, L, N> {
         self.of.at(self.lagrangian, quantity, t, &x.fixed()).into()
     }
 
-    fn of_hamiltonian(&mut self, quantity: Quantity, t: f64, state: &State) -> Vector {
-        self.of.of_hamiltonian(self.lagrangian, quantity, t, &state.fixed()).gradient.y.into()
+    fn of_hamiltonian(&mut self, quantity: Quantity, t: f64, state: &State) -> ExplicitDerivatives {
+        self.of.of_hamiltonian(self.lagrangian, quantity, t, &state.fixed()).into()
     }
 
     fn of_momentum(&mut self, quantity: Quantity, t: f64, (x, p): (&Point, &Vector)) -> Vector {
@@ -132,6 +132,10 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
         step: &SolvedStages,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError> {
+        // Derivatives of a Lagrangian over slices are those of its slices.
+        if const { L::HINTS.over_slices } {
+            return Err(StepError::NonFinite);
+        }
         arch.dispatch(StageKernel { lagrangian: self.0, at, forward, step, actions })
     }
 
@@ -140,7 +144,8 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
         problem: &SystemProblem<'a>,
         formula: StepFormula,
         integrator: &SharedIntegrator<'a>,
+        quantities: Box<dyn Quantities + 'a>,
     ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
-        Ok(Box::new(FlowEngine::new(&problem.of(self.0), formula, integrator)?))
+        Ok(Box::new(FlowEngine::new(&problem.of(self.0), formula, integrator, Sources(quantities))?))
     }
 }

@@ -10,7 +10,7 @@ use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSyste
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
-use crate::{Components, Point, SecondDerivatives, State, StepError, System, SystemProblem, Vector};
+use crate::{Components, Point, SecondDerivatives, StepError, System, SystemProblem, Vector};
 use contact_geom::UnknownParameter;
 use pulp::{Simd, WithSimd};
 use std::rc::Rc;
@@ -64,6 +64,7 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
         _problem: &SystemProblem<'a>,
         _formula: StepFormula,
         integrator: &SharedIntegrator<'a>,
+        _quantities: Box<dyn Quantities + 'a>,
     ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
         Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" })
     }
@@ -82,10 +83,6 @@ impl Quantities for OfQuantities<'_> {
 
     fn at(&mut self, quantity: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
         self.system.in_quantity(quantity, t, x)
-    }
-
-    fn of_hamiltonian(&mut self, _quantity: Quantity, _t: f64, state: &State) -> Vector {
-        Vector::repeat(state.q.len(), f64::NAN)
     }
 
     fn of_momentum(&mut self, quantity: Quantity, t: f64, (x, _): (&Point, &Vector)) -> Vector {
@@ -139,7 +136,8 @@ impl WithSimd for EvaluateStages<'_> {
 }
 
 impl StageDerivatives {
-    fn evaluate_stage_of(&mut self, system: &dyn System, i: usize) -> Result<(), StepError> {
+    /// Evaluates L and the force with their derivatives at one stage.
+    pub(super) fn evaluate_stage_of(&mut self, system: &dyn System, i: usize) -> Result<(), StepError> {
         let ((t, x), n) = (self.point(i), self.q.len());
         let (l, g) = (system.value(t, &x), system.gradient(t, &x));
         let SecondDerivatives { qq, qv, vv, qz, vz, zz } = system.hessian(t, &x);

@@ -8,7 +8,7 @@ use crate::sensitivity::SensitivityError;
 use crate::sensitivity::flows::FlowTangent;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::of_parametric::OfParametric;
-use crate::sensitivity::of_system::OfSystem;
+use crate::sensitivity::of_slices::{BySlices, view_of};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
@@ -26,8 +26,13 @@ pub(crate) trait Quantities {
     /// The derivatives at a point.
     fn at(&mut self, quantity: Quantity, t: f64, x: &Point) -> ExplicitDerivatives;
 
-    /// The derivative `H_ptheta` of a contact Hamiltonian at a state; NaN for a Lagrangian that is not given by one.
-    fn of_hamiltonian(&mut self, quantity: Quantity, t: f64, state: &State) -> Vector;
+    /// The same derivatives of a contact Hamiltonian at a state: `H_theta` in the place of `L_theta`,
+    /// `(H_qtheta, H_ptheta, H_ztheta)`, and the derivative of the force with that of the velocity `H_p`. NaN for a
+    /// Lagrangian that is not given by one.
+    fn of_hamiltonian(&mut self, quantity: Quantity, t: f64, state: &State) -> ExplicitDerivatives {
+        let _ = (quantity, t);
+        ExplicitDerivatives::undefined(state.q.len())
+    }
 
     /// The derivative of the momentum `L_v` of a given velocity, at a state that has this velocity.
     fn of_momentum(&mut self, quantity: Quantity, t: f64, at: (&Point, &Vector)) -> Vector;
@@ -83,7 +88,7 @@ pub(crate) trait ParametricSystem<'a> {
         actions: Option<&StageMap>,
     ) -> Result<(), StepError>;
 
-    /// The tangent of steps that are compositions of sub-flows.
+    /// The tangent of steps that are compositions of sub-flows, with the derivatives of their system in parameters and time.
     ///
     /// # Errors
     /// Those of the steps of the method.
@@ -92,6 +97,7 @@ pub(crate) trait ParametricSystem<'a> {
         problem: &SystemProblem<'a>,
         formula: StepFormula,
         integrator: &SharedIntegrator<'a>,
+        quantities: Box<dyn Quantities + 'a>,
     ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError>;
 }
 
@@ -103,13 +109,20 @@ pub trait DifferentiableProblem<'a> {
 
 impl<'a, L: Parametric<N>, const N: usize> DifferentiableProblem<'a> for Problem<'a, L, N> {
     fn differentiable(&'a self) -> Differentiable<'a> {
-        Differentiable { problem: self.of_system(), of: Rc::new(OfParametric(self.lagrangian)) }
+        let (problem, rest) = (self.of_system(), Rc::new(OfParametric(self.lagrangian)));
+        let by_slices = if const { L::HINTS.over_slices } {
+            let (system, rest) = (problem.system.clone(), rest.clone());
+            self.lagrangian.over_slices(BySlices { system, rest })
+        } else {
+            None
+        };
+        Differentiable { problem, of: by_slices.unwrap_or(rest) }
     }
 }
 
 impl<'a> DifferentiableProblem<'a> for SystemProblem<'a> {
     fn differentiable(&'a self) -> Differentiable<'a> {
-        Differentiable { problem: self.clone(), of: Rc::new(OfSystem(self.system.clone())) }
+        Differentiable { problem: self.clone(), of: view_of(&self.system) }
     }
 }
 

@@ -52,7 +52,12 @@ impl<'a> StepTangent<'a> {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
-            Some(formula) => Ok(StepTangent::Flow(problem.of.flows(&problem.problem, formula, &steps.integrator)?)),
+            Some(formula) => Ok(StepTangent::Flow(problem.of.flows(
+                &problem.problem,
+                formula,
+                &steps.integrator,
+                problem.of.quantities(),
+            )?)),
             None if info.constrained => {
                 Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })
             }

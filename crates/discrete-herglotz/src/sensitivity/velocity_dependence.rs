@@ -34,7 +34,7 @@ impl VelocityDependence {
             let state = State { q: x.q.clone(), p: p.clone(), z: x.z };
             let SecondDerivatives { qv, vv, vz, .. } =
                 system.hamiltonian_hessian(t, &state).ok_or(StepError::NonFinite)?;
-            let mut explicit = |quantity| -of.of_hamiltonian(quantity, t, &state);
+            let mut explicit = |quantity| -of.of_hamiltonian(quantity, t, &state).gradient.y;
             let parameters = quantities.map(&mut explicit).collect();
             let time = explicit(Quantity::Time);
             let inverse = DMatrix::identity(n, n);

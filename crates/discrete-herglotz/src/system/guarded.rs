@@ -100,12 +100,7 @@ impl System for Guarded<'_> {
         let fits = |found: &ExplicitDerivatives| {
             found.gradient.x.len() == n && found.gradient.y.len() == n && found.force.len() == n
         };
-        let none = || {
-            let line = || Vector::repeat(n, f64::NAN);
-            let gradient = Components { x: line(), y: line(), z: f64::NAN };
-            ExplicitDerivatives { l: f64::NAN, gradient, force: line() }
-        };
-        self.checked(|| self.system.in_quantity(of, t, x), fits, none)
+        self.checked(|| self.system.in_quantity(of, t, x), fits, || ExplicitDerivatives::undefined(n))
     }
     fn kernels(&self) -> Option<Kernels> {
         self.checked(|| self.system.kernels(), |_| true, || None)

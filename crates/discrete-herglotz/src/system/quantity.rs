@@ -29,6 +29,13 @@ impl ExplicitDerivatives {
         ExplicitDerivatives { l: 0.0, gradient: Components::zeros(n), force: Vector::zeros(n) }
     }
 
+    /// NaN, for n coordinates.
+    pub(crate) fn undefined(n: usize) -> Self {
+        let none = || Vector::repeat(n, f64::NAN);
+        let gradient = Components { x: none(), y: none(), z: f64::NAN };
+        ExplicitDerivatives { l: f64::NAN, gradient, force: none() }
+    }
+
     /// Adds a multiple of other derivatives.
     pub(crate) fn add(&mut self, factor: f64, other: &Self) {
         self.l += factor * other.l;

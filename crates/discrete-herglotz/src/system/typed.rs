@@ -1,7 +1,7 @@
 //! Mechanical systems with a number of coordinates that is known at compile time.
 
 use super::ForceDerivatives;
-use super::applied_force::AppliedForce;
+use super::applied_force::{AppliedForce, ForceAt};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
@@ -127,6 +127,9 @@ impl<L: Lagrangian<N>, const N: usize> TypedSystem<N> for L {
         Lagrangian::applied_force(self, t, x)
     }
     fn force_derivatives(&self, t: f64, x: &VelocityPoint<N>) -> Option<ForceDerivatives> {
+        if const { L::HINTS.over_slices } {
+            return Lagrangian::over_slices(self, ForceAt { t, x: &x.into() }).flatten();
+        }
         let applied = AppliedForce::of(self, t, x)?;
         let matrix = |m: &SMatrix<f64, N, N>| DMatrix::from_column_slice(N, N, m.as_slice());
         let (q, v) = (matrix(&applied.q), matrix(&applied.v));

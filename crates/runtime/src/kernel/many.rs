@@ -11,7 +11,7 @@ use crate::{
     RunMonitor, RuntimeError, Sensitivity, StepControl,
 };
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{Hints, ScalarSystem, Slopes, Structure};
+use contact_geom::{Arguments, Hints, ScalarSystem, Slopes, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{
@@ -68,20 +68,7 @@ impl System for ManyCoordinates {
         force
     }
     fn force_derivatives(&self, t: f64, x: &Point) -> Option<ForceDerivatives> {
-        if !self.0.has_force() {
-            return None;
-        }
-        let n = x.q.len();
-        let (square, zero) = (|| DMatrix::zeros(n, n), Vector::zeros(n));
-        let mut to = ForceDerivatives { value: self.applied_force(t, x), q: square(), v: square(), z: zero.clone() };
-        let at = (&x.q[..], &x.v[..], x.z);
-        for j in 0..n {
-            let unit = Vector::from_fn(n, |i| f64::from(u8::from(i == j)));
-            self.0.force_along(t, at, (&unit, &zero, 0.0), to.q.column_mut(j).as_mut_slice());
-            self.0.force_along(t, at, (&zero, &unit, 0.0), to.v.column_mut(j).as_mut_slice());
-        }
-        self.0.force_along(t, at, (&zero, &zero, 1.0), &mut to.z);
-        Some(to)
+        ForceDerivatives::of_slices(&*self.0, t, x)
     }
     fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
         self.0.switching_functions(t, &x.q, &x.v, x.z, values);
@@ -117,9 +104,8 @@ impl System for ManyCoordinates {
             Quantity::Time => None,
             Quantity::Parameter(k) => Some(k),
         };
-        let Components { x: q, y: v, z } = &mut to.gradient;
-        let all = [&mut q[..], &mut v[..], std::slice::from_mut(z), &mut to.force[..]];
-        to.l = self.0.explicit(parameter, t, (&x.q, &x.v, x.z), all);
+        let slopes = Slopes { q: &mut to.gradient.x, v: &mut to.gradient.y, z: &mut to.gradient.z };
+        to.l = self.0.explicit(parameter, Arguments { t, q: &x.q, v: &x.v, z: x.z }, slopes, &mut to.force);
         to
     }
     fn kernels(&self) -> Option<Kernels> {
@@ -140,7 +126,7 @@ impl System for ManyCoordinates {
         let mut to = SecondDerivatives { qq: square(), qv: square(), vv: square(), qz: line(), vz: line(), zz: 0.0 };
         let SecondDerivatives { qq, qv, vv, qz, vz, zz } = &mut to;
         let [qq, qv, vv] = [qq, qv, vv].map(|m| m.as_mut_slice());
-        self.0.second_partials(t, &x.q, &x.v, x.z, [qq, qv, vv, qz, vz, std::slice::from_mut(zz)]);
+        self.0.second_derivatives::<f64, 0>(t, &x.q, &x.v, x.z, [qq, qv, vv, qz, vz, std::slice::from_mut(zz)]);
         to
     }
     fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {

@@ -52,14 +52,9 @@ impl SlicesVisitor for KernelsOf {
 }
 
 impl Kernels {
-    /// The kernels of a system.
-    pub fn of<F: ScalarSystem + 'static>(system: Arc<F>) -> Self {
-        Kernels(Rc::new(KernelsOf.visit(system)))
-    }
-
-    /// The kernels as collocation calls them.
+    /// The kernels of collocation.
     pub(crate) fn shared(&self) -> Option<SharedKernels> {
-        self.0.downcast_ref::<SharedKernels>().cloned()
+        self.collocation.downcast_ref::<SharedKernels>().cloned()
     }
 }
 

@@ -1,8 +1,9 @@
 //! The coefficients of a splitting, and their derivatives in the parameters.
 
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use super::sources::Sources;
+use crate::sensitivity::parametric_system::Quantity;
+use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Parametric, VelocityPoint};
 
 /// The bound, relative to the size, on a derivative that vanishes if a hypothesis of a splitting holds for all values of
 /// the parameters.
@@ -32,18 +33,12 @@ impl<const N: usize> CoefficientDerivatives<N> {
         }
     }
 
-    /// The derivatives in each parameter, at a time and a position. They are evaluated at points where the others vanish,
+    /// The derivatives in each parameter, at a time and a position; `forced` states that there may be a force. They are evaluated at points where the others vanish,
     /// as `L_v = M v` and `f(v) - f(0)` are of these forms.
-    pub fn all<L: Parametric<N>>(
-        lagrangian: &L,
-        of: &mut ParameterDerivatives<N>,
-        t: f64,
-        rest: &VelocityPoint<N>,
-    ) -> Vec<Self> {
+    pub fn all(forced: bool, of: &mut Sources<'_>, t: f64, rest: &VelocityPoint<N>) -> Vec<Self> {
         (0..of.count())
             .map(|k| {
-                let mut at =
-                    |v: SVector<f64, N>| of.at(lagrangian, Quantity::Parameter(k), t, &VelocityPoint { v, ..*rest });
+                let mut at = |v: SVector<f64, N>| of.at(Quantity::Parameter(k), t, &VelocityPoint { v, ..*rest });
                 let still = at(SVector::zeros());
                 let mut mass = SMatrix::<f64, N, N>::zeros();
                 for i in 0..N {
@@ -51,7 +46,7 @@ impl<const N: usize> CoefficientDerivatives<N> {
                     mass.set_column(i, &(at(unit).gradient.y - still.gradient.y));
                 }
                 let (mut linear, mut quadratic) = (SVector::<f64, N>::zeros(), 0.0);
-                if const { L::HINTS.forced } {
+                if forced {
                     // With |v| = u sqrt(n) for the velocity u (1, ..., 1), u = 1 and u = 2.
                     let ones = SVector::<f64, N>::from_element(1.0);
                     let [once, twice] = [1.0, 2.0].map(|u| at(ones * u).force - still.force);
@@ -60,7 +55,7 @@ impl<const N: usize> CoefficientDerivatives<N> {
                     linear = -once - bend;
                 }
                 let above = VelocityPoint { z: rest.z + 1.0, ..*rest };
-                let bend = of.at(lagrangian, Quantity::Parameter(k), t, &above).gradient.z - still.gradient.z;
+                let bend = of.at(Quantity::Parameter(k), t, &above).gradient.z - still.gradient.z;
                 CoefficientDerivatives { mass, gamma: still.gradient.z, bend, linear, quadratic }
             })
             .collect()

@@ -1,12 +1,13 @@
 //! Steps of contact Gauss collocation on a contact Hamiltonian.
 
 use super::SubFlows;
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::StepError;
 use crate::gauss::routes::hamiltonian::{StepDerivatives, step_derivatives};
 use crate::integration::StepEnds;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use contact_geom::{Parametric, PhasePoint};
 
 /// Steps on the contact Hamiltonian by which a Lagrangian is given, whatever the rank of `H_pp`.
@@ -19,7 +20,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for HamiltonianSteps<'_, L> {
     fn linearise(
         &self,
         step: &StepEnds,
-        of: Option<&mut ParameterDerivatives<N>>,
+        of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let (t, h, start) = (step.t, step.h, step.start.fixed::<N>());
@@ -29,7 +30,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for HamiltonianSteps<'_, L> {
             Some(of) => {
                 let quantities = (0..of.count()).map(Quantity::Parameter).chain([Quantity::Time]);
                 at(Some(&mut |t, x: &PhasePoint<N>| {
-                    quantities.clone().map(|quantity| of.of_hamiltonian(self.lagrangian, quantity, t, x)).collect()
+                    quantities.clone().map(|quantity| of.of_hamiltonian(quantity, t, x)).collect()
                 }))?
             }
         };

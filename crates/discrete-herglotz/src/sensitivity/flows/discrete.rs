@@ -1,10 +1,11 @@
 //! Steps of a custom discrete Lagrangian, and steps under constraints.
 
 use super::SubFlows;
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::integration::{QuantityDerivatives, SharedIntegrator, StepEnds, SystemProblem};
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use crate::{Components, Point, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Derivatives, Parametric, VelocityPoint};
@@ -22,11 +23,7 @@ pub(super) struct DiscreteSteps<'a, L> {
 
 impl<L> DiscreteSteps<'_, L> {
     /// The derivatives of a step in each parameter, in its time and in its length.
-    fn sources<const N: usize>(
-        &self,
-        step: &StepEnds,
-        of: &mut ParameterDerivatives<N>,
-    ) -> Result<Vec<ChartVector<N>>, StepError>
+    fn sources<const N: usize>(&self, step: &StepEnds, of: &mut Sources<'_>) -> Result<Vec<ChartVector<N>>, StepError>
     where
         L: Parametric<N>,
     {
@@ -41,8 +38,8 @@ impl<L> DiscreteSteps<'_, L> {
             source.map(|source| source.fixed::<N>()).ok_or(StepError::NonFinite)
         };
         // The value with the gradient, which contains the force.
-        let varied = |of: &mut ParameterDerivatives<N>, quantity: Quantity, s: f64, x: &VelocityPoint<N>| {
-            let QuantityDerivatives { l, mut gradient, force } = of.at(lagrangian, quantity, s, x);
+        let varied = |of: &mut Sources<'_>, quantity: Quantity, s: f64, x: &VelocityPoint<N>| {
+            let QuantityDerivatives { l, mut gradient, force } = of.at(quantity, s, x);
             gradient.x += force;
             (l, gradient)
         };
@@ -69,7 +66,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for DiscreteSteps<'_, L> {
     fn linearise(
         &self,
         step: &StepEnds,
-        of: Option<&mut ParameterDerivatives<N>>,
+        of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let StepEnds { t, h, start, end } = step;

@@ -2,11 +2,12 @@
 
 use super::coefficients::CoefficientDerivatives;
 use super::exponential_integrals::{length, moment};
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::array::from_fn;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use crate::splitting::drag::{Drag, QUADRATURE_NODES};
 use crate::splitting::separable::SeparableForm;
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -33,7 +34,7 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
     /// Applies the drift to a state, with its derivatives.
     pub fn linearise(
         &self,
-        of: Option<(&mut ParameterDerivatives<N>, &[CoefficientDerivatives<N>])>,
+        of: Option<(&mut Sources<'_>, &[CoefficientDerivatives<N>])>,
         state: &mut PhasePoint<N>,
     ) -> SubFlow<N> {
         let coefficients = of.as_ref().map_or(&[][..], |(_, coefficients)| *coefficients);
@@ -68,7 +69,7 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
         SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 }
     }
 
-    fn integrals(&self, of: Option<(&mut ParameterDerivatives<N>, &[CoefficientDerivatives<N>])>) -> Integrals {
+    fn integrals(&self, of: Option<(&mut Sources<'_>, &[CoefficientDerivatives<N>])>) -> Integrals {
         let s = self.s;
         let (q, z) = match self.drag {
             Some(Drag::Timed { q, z }) => (*q, *z),
@@ -104,11 +105,10 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
                 [s * whole(slopes), s * whole(&changes)]
             };
             for quantity in (0..of.count()).map(Quantity::Parameter) {
-                let slopes = from_fn(|j| of.at(lagrangian, quantity, time(j), &rest).gradient.z);
+                let slopes = from_fn(|j| of.at(quantity, time(j), &rest).gradient.z);
                 derivatives.push(moved(&slopes));
             }
-            let slopes: [f64; QUADRATURE_NODES] =
-                from_fn(|j| of.at(lagrangian, Quantity::Time, time(j), &rest).gradient.z);
+            let slopes: [f64; QUADRATURE_NODES] = from_fn(|j| of.at(Quantity::Time, time(j), &rest).gradient.z);
             derivatives.push(moved(&slopes));
             // The rates at the nodes move with the duration, and the integrals are multiples of it.
             let [by_rates, by_factors] = moved(&from_fn(|j| table.c[j].0 * slopes[j]));

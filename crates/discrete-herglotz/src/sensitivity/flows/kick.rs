@@ -1,8 +1,9 @@
 //! The derivative of a kick.
 
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{ChartVector, Derivatives, Dual, Hessian, Parametric, PhasePoint, VelocityPoint};
 
@@ -21,7 +22,7 @@ impl Kick {
     pub fn linearise<L: Parametric<N>, const N: usize>(
         &self,
         lagrangian: &L,
-        of: Option<&mut ParameterDerivatives<N>>,
+        of: Option<&mut Sources<'_>>,
         constants: &[f64],
         state: &mut PhasePoint<N>,
     ) -> SubFlow<N> {
@@ -46,7 +47,7 @@ impl Kick {
                     sources.push(ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
                     continue;
                 }
-                let at = of.at(lagrangian, quantity, t, &rest);
+                let at = of.at(quantity, t, &rest);
                 let moved = constants.get(k).copied().filter(|_| quantity != Quantity::Time).unwrap_or(0.0);
                 sources.push(ChartVector {
                     x: SVector::zeros(),

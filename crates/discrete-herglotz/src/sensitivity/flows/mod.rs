@@ -14,6 +14,7 @@ mod exponential_integrals;
 mod kick;
 mod rule_step;
 mod rules;
+mod sources;
 mod splittings;
 mod sub_flow;
 mod tangent_matrix;
@@ -22,13 +23,13 @@ mod velocity_drag;
 use crate::integration::{SharedIntegrator, StepEnds, StepFormula};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
-use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::{Problem, StepError};
 use collocation::HamiltonianSteps;
 use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
 use discrete::DiscreteSteps;
 use rules::Rules;
+pub(crate) use sources::Sources;
 use splittings::{ActionFlows, DragFlows, LinearDragFlows};
 use sub_flow::SubFlow;
 
@@ -41,7 +42,7 @@ trait SubFlows<const N: usize> {
     fn linearise(
         &self,
         step: &StepEnds,
-        of: Option<&mut ParameterDerivatives<N>>,
+        of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError>;
 
@@ -80,7 +81,7 @@ pub(crate) trait FlowTangent {
 /// The sub-flows of a method, with their workspace.
 pub(crate) struct FlowEngine<'a, const N: usize> {
     method: Box<dyn SubFlows<N> + 'a>,
-    of_parameters: ParameterDerivatives<N>,
+    of_parameters: Sources<'a>,
     flows: Vec<SubFlow<N>>,
     /// Why the steps are not differentiable in each parameter, if they are not.
     obstacles: Vec<Option<&'static str>>,
@@ -93,9 +94,10 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
         problem: &Problem<'a, L, N>,
         formula: StepFormula,
         integrator: &SharedIntegrator<'a>,
+        sources: Sources<'a>,
     ) -> Result<Self, SensitivityError> {
         let lagrangian = problem.lagrangian;
-        let mut of_parameters = ParameterDerivatives::new(lagrangian);
+        let mut of_parameters = sources;
         let of = &mut of_parameters;
         let discrete = |varies| {
             let (problem, integrator) = (problem.of_system(), integrator.clone());

@@ -1,11 +1,12 @@
 //! The derivative of a step of a quadrature rule.
 
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::StepError;
 use crate::integration::QuantityDerivatives;
 use crate::rules::Node;
-use crate::sensitivity::parameter_derivatives::{ParameterDerivatives, Quantity};
+use crate::sensitivity::parametric_system::Quantity;
 use crate::solve::ITERATION_LIMIT;
 use contact_geom::nalgebra::{DMatrix, DVector, Dyn, LU, SMatrix, SVector};
 use contact_geom::numbers::max_or_nan;
@@ -163,7 +164,7 @@ impl<L> RuleStep<'_, L> {
     /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::NotConverged`].
     pub fn linearise<const N: usize>(
         &self,
-        of: Option<&mut ParameterDerivatives<N>>,
+        of: Option<&mut Sources<'_>>,
         guess: (SVector<f64, N>, f64),
         state: &mut PhasePoint<N>,
     ) -> Result<SubFlow<N>, StepError>
@@ -185,7 +186,7 @@ impl<L> RuleStep<'_, L> {
             let quantities = (0..of.count()).map(Quantity::Parameter).chain([Quantity::Time]);
             for quantity in quantities {
                 explicit.clear();
-                explicit.extend(solved.at.iter().map(|at| of.at(self.lagrangian, quantity, at.t, &at.x)));
+                explicit.extend(solved.at.iter().map(|at| of.at(quantity, at.t, &at.x)));
                 sources.push(solved.end_along(&factors, Change { explicit: &explicit, ..Change::ZERO }, &zero)?);
             }
             // The derivatives in the time are still those of the nodes.

@@ -2,11 +2,11 @@
 
 use super::SubFlows;
 use super::rule_step::RuleStep;
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use crate::StepError;
 use crate::integration::StepEnds;
 use crate::rules::Node;
-use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use contact_geom::{Parametric, PhasePoint};
 
 /// Steps of the quadrature rule with these nodes, over these fractions of a step. A step over a negative fraction is that
@@ -21,7 +21,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for Rules<'_, L> {
     fn linearise(
         &self,
         step: &StepEnds,
-        mut of: Option<&mut ParameterDerivatives<N>>,
+        mut of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let StepEnds { t, h, .. } = *step;

@@ -3,11 +3,11 @@
 use super::coefficients::CoefficientDerivatives;
 use super::drift::Drift;
 use super::kick::Kick;
+use super::sources::Sources;
 use super::sub_flow::SubFlow;
 use super::velocity_drag::has_equal_coefficients;
 use super::{SubFlows, action_map, velocity_drag};
 use crate::integration::StepEnds;
-use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::splitting::Riccati;
 use crate::splitting::drag::Drag;
 use crate::splitting::separable::SeparableForm;
@@ -67,11 +67,11 @@ impl<'a, L: Parametric<N>, const N: usize> LinearDragFlows<'a, L, N> {
     pub fn new(
         problem: &Problem<'a, L, N>,
         scheme: &SplittingScheme,
-        of: &mut ParameterDerivatives<N>,
+        of: &mut Sources<'_>,
     ) -> Result<Self, InputError> {
         let form = form_of(problem)?;
         let drag = Drag::of(&form, problem.t0, &problem.state)?;
-        let coefficients = CoefficientDerivatives::all(problem.lagrangian, of, problem.t0, &rest_of(problem));
+        let coefficients = CoefficientDerivatives::all(L::HINTS.forced, of, problem.t0, &rest_of(problem));
         Ok(LinearDragFlows { form, drag, coefficients, parts: parts(scheme) })
     }
 }
@@ -80,7 +80,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for LinearDragFlows<'_, L, N>
     fn linearise(
         &self,
         step: &StepEnds,
-        mut of: Option<&mut ParameterDerivatives<N>>,
+        mut of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let mut state = step.start.fixed();
@@ -121,7 +121,7 @@ pub(super) struct DragFlows<'a, L, const N: usize> {
 impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
     /// Whether the drag of a problem is that of the velocity: if there is one, or if a parameter changes it, where the flow
     /// allows it.
-    pub fn applies(problem: &Problem<'a, L, N>, of: &mut ParameterDerivatives<N>) -> bool {
+    pub fn applies(problem: &Problem<'a, L, N>, of: &mut Sources<'_>) -> bool {
         if const { !L::HINTS.forced } {
             return false;
         }
@@ -129,7 +129,7 @@ impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
             return true;
         }
         let rest = rest_of(problem);
-        let coefficients = CoefficientDerivatives::all(problem.lagrangian, of, problem.t0, &rest);
+        let coefficients = CoefficientDerivatives::all(L::HINTS.forced, of, problem.t0, &rest);
         let law = form_of(problem).and_then(|form| DragLaw::of(&form, problem.t0, &rest));
         let allowed = problem.lagrangian.structure().has_constant_rate() && law.is_ok();
         allowed && coefficients.iter().any(CoefficientDerivatives::has_drag)
@@ -140,11 +140,11 @@ impl<'a, L: Parametric<N>, const N: usize> DragFlows<'a, L, N> {
     pub fn new(
         problem: &Problem<'a, L, N>,
         scheme: &SplittingScheme,
-        of: &mut ParameterDerivatives<N>,
+        of: &mut Sources<'_>,
     ) -> Result<Self, InputError> {
         let (form, rest) = (form_of(problem)?, rest_of(problem));
         let law = DragLaw::of(&form, problem.t0, &rest)?;
-        let coefficients = CoefficientDerivatives::all(problem.lagrangian, of, problem.t0, &rest);
+        let coefficients = CoefficientDerivatives::all(L::HINTS.forced, of, problem.t0, &rest);
         Ok(DragFlows { form, law, nystrom: scheme.is_nystrom(), coefficients, parts: parts(scheme) })
     }
 }
@@ -153,7 +153,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for DragFlows<'_, L, N> {
     fn linearise(
         &self,
         step: &StepEnds,
-        mut of: Option<&mut ParameterDerivatives<N>>,
+        mut of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let mut state = step.start.fixed();
@@ -198,12 +198,12 @@ impl<'a, L: Parametric<N>, const N: usize> ActionFlows<'a, L, N> {
     pub fn new(
         problem: &Problem<'a, L, N>,
         scheme: &SplittingScheme,
-        of: &mut ParameterDerivatives<N>,
+        of: &mut Sources<'_>,
     ) -> Result<Self, InputError> {
         let (lagrangian, t) = (problem.lagrangian, problem.t0);
         let (form, rest) = (form_of(problem)?, rest_of(problem));
         let flow = Riccati::of(lagrangian, t, &problem.state)?;
-        let coefficients = CoefficientDerivatives::all(lagrangian, of, t, &rest);
+        let coefficients = CoefficientDerivatives::all(L::HINTS.forced, of, t, &rest);
         // The rate is L_z = b + 2 c z.
         let of_flow = coefficients.iter().map(|of| [of.gamma - of.bend * rest.z, 0.5 * of.bend]);
         let of_flow = of_flow.collect();
@@ -221,7 +221,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for ActionFlows<'_, L, N> {
     fn linearise(
         &self,
         step: &StepEnds,
-        mut of: Option<&mut ParameterDerivatives<N>>,
+        mut of: Option<&mut Sources<'_>>,
         flows: &mut Vec<SubFlow<N>>,
     ) -> Result<(), StepError> {
         let mut state: PhasePoint<N> = step.start.fixed();
@@ -235,7 +235,7 @@ impl<L: Parametric<N>, const N: usize> SubFlows<N> for ActionFlows<'_, L, N> {
                 let of_flow = with_sources.then_some(&self.of_flow[..]);
                 SubFlow { start, duration: half, ..action_map::linearise(self.flow, half * step.h, of_flow, state) }
             };
-            let kick = |start: f64, of: Option<&mut ParameterDerivatives<N>>, state: &mut PhasePoint<N>| {
+            let kick = |start: f64, of: Option<&mut Sources<'_>>, state: &mut PhasePoint<N>| {
                 let kick = Kick { t: step.t + start * step.h, s: half * step.h, z: self.z, constant };
                 SubFlow { start, duration: half, ..kick.linearise(self.form.lagrangian, of, &constants, state) }
             };

@@ -1,0 +1,357 @@
+//! A system over slices, as derivatives of runs see it: evaluated at all stages of a step at once, whatever its number of
+//! coordinates.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
+use crate::gauss::system::{Coordinates, KernelsOf, zeros};
+use crate::integration::{SharedIntegrator, SolvedStages, StepFormula};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::registers::{StageMap, Stages, blocks};
+use crate::sensitivity::SensitivityError;
+use crate::sensitivity::flows::FlowTangent;
+use crate::sensitivity::linear_stages::StageTangent;
+use crate::sensitivity::of_system::OfSystem;
+use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
+use crate::sensitivity::stage_derivatives::StageDerivatives;
+use crate::sensitivity::step_maps::StepMaps;
+use crate::sensitivity::switch::Argument;
+use crate::{Components, Kernels, Point, StepError, System, SystemProblem, Vector};
+use contact_geom::nalgebra::{DMatrixViewMut, DVectorViewMut, SVector};
+use contact_geom::support::{KernelDual, linear};
+use contact_geom::{Arguments, Scalar, ScalarSystem, SlicesVisitor, Slopes, UnknownParameter};
+use pulp::{Simd, WithSimd};
+use smallvec::SmallVec;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// Takes the derivatives at stages and those in parameters and time from a system over slices, and all else from another view
+/// of the same system.
+pub(crate) struct BySlices<'a> {
+    pub system: Rc<dyn System + 'a>,
+    pub rest: Rc<dyn ParametricSystem<'a> + 'a>,
+}
+
+impl<'a> SlicesVisitor for BySlices<'a> {
+    type Output = Rc<dyn ParametricSystem<'a> + 'a>;
+
+    fn visit<F: ScalarSystem + 'static>(self, slices: Arc<F>) -> Self::Output {
+        Rc::new(OfSlices { slices, system: self.system, rest: self.rest })
+    }
+}
+
+/// A system over slices without its type.
+trait Slices {
+    /// See [`BySlices`].
+    fn view<'a>(&self, by: BySlices<'a>) -> Rc<dyn ParametricSystem<'a> + 'a>;
+}
+
+impl<F: ScalarSystem + 'static> Slices for Arc<F> {
+    fn view<'a>(&self, by: BySlices<'a>) -> Rc<dyn ParametricSystem<'a> + 'a> {
+        by.visit(self.clone())
+    }
+}
+
+impl Kernels {
+    /// The kernels of a system.
+    pub fn of<F: ScalarSystem + 'static>(system: Arc<F>) -> Self {
+        let collocation = Rc::new(KernelsOf.visit(system.clone()));
+        let derivatives: Box<dyn Slices> = Box::new(system);
+        Kernels { collocation, derivatives: Rc::new(derivatives) }
+    }
+}
+
+/// The view of a system for derivatives: by its kernels, or at one stage after another.
+pub(crate) fn view_of<'a>(system: &Rc<dyn System + 'a>) -> Rc<dyn ParametricSystem<'a> + 'a> {
+    let rest = Rc::new(OfSystem(system.clone()));
+    let kernels = system.kernels();
+    match kernels.as_ref().and_then(|kernels| kernels.derivatives.downcast_ref::<Box<dyn Slices>>()) {
+        Some(slices) => slices.view(BySlices { system: system.clone(), rest }),
+        None => rest,
+    }
+}
+
+struct OfSlices<'a, F> {
+    slices: Arc<F>,
+    system: Rc<dyn System + 'a>,
+    rest: Rc<dyn ParametricSystem<'a> + 'a>,
+}
+
+impl<'a, F: ScalarSystem + 'static> ParametricSystem<'a> for OfSlices<'a, F> {
+    fn parameter_names(&self) -> Vec<String> {
+        self.rest.parameter_names()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        self.rest.parameters()
+    }
+
+    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
+        self.rest.parameter_index(name)
+    }
+
+    fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
+        self.rest.with_parameters(theta, f)
+    }
+
+    fn switching_function_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<f64> {
+        self.rest.switching_function_along(along, index, t, x)
+    }
+
+    fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components> {
+        self.rest.state_after_switch_along(along, index, t, x)
+    }
+
+    fn quantities(&self) -> Box<dyn Quantities + 'a> {
+        Box::new(SliceQuantities { slices: self.slices.clone() })
+    }
+
+    fn evaluate_stages(
+        &self,
+        arch: Instructions,
+        at: &mut StageDerivatives,
+        forward: &StepMaps,
+        step: &SolvedStages,
+        actions: Option<&StageMap>,
+    ) -> Result<(), StepError> {
+        arch.dispatch(EvaluateStages { slices: &*self.slices, system: &*self.system, at, forward, step, actions })
+    }
+
+    fn flows(
+        &self,
+        problem: &SystemProblem<'a>,
+        formula: StepFormula,
+        integrator: &SharedIntegrator<'a>,
+        quantities: Box<dyn Quantities + 'a>,
+    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
+        self.rest.flows(problem, formula, integrator, quantities)
+    }
+}
+
+/// The derivatives in parameters and time.
+struct SliceQuantities<F> {
+    slices: Arc<F>,
+}
+
+fn parameter(of: Quantity) -> Option<usize> {
+    match of {
+        Quantity::Parameter(k) => Some(k),
+        Quantity::Time => None,
+    }
+}
+
+impl<F: ScalarSystem> Quantities for SliceQuantities<F> {
+    fn count(&self) -> usize {
+        self.slices.parameter_count()
+    }
+
+    fn at(&mut self, quantity: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
+        let mut to = ExplicitDerivatives::zeros(x.q.len());
+        let slopes = Slopes { q: &mut to.gradient.x, v: &mut to.gradient.y, z: &mut to.gradient.z };
+        let at = Arguments { t, q: &x.q, v: &x.v, z: x.z };
+        to.l = self.slices.explicit(parameter(quantity), at, slopes, &mut to.force);
+        to
+    }
+
+    fn of_momentum(&mut self, quantity: Quantity, t: f64, (x, _): (&Point, &Vector)) -> Vector {
+        self.at(quantity, t, x).gradient.y
+    }
+
+    fn along(
+        &mut self,
+        arch: Instructions,
+        quantity: Quantity,
+        at: &StageDerivatives,
+        (w, weights): (&StageTangent, &Stages),
+    ) -> f64 {
+        arch.dispatch(QuantityAlong { slices: &*self.slices, quantity, at, w, weights })
+    }
+}
+
+/// See [`Quantities::along`].
+struct QuantityAlong<'e, F> {
+    slices: &'e F,
+    quantity: Quantity,
+    at: &'e StageDerivatives,
+    w: &'e StageTangent,
+    weights: &'e Stages,
+}
+
+impl<F: ScalarSystem> WithSimd for QuantityAlong<'_, F> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> f64 {
+        let QuantityAlong { slices, quantity, at, w, weights } = self;
+        let n = at.q.len();
+        let mut sum = Lanes::<S>::splat(0.0);
+        for r in 0..blocks::<S>(at.s) {
+            let (q, v) = point::<S>(at, r);
+            let (mut l_q, mut l_v, mut force) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n));
+            let mut l_z = Lanes::<S>::splat(0.0);
+            let to = Slopes { q: &mut l_q, v: &mut l_v, z: &mut l_z };
+            let arguments = Arguments { t: at.times.block(r), q: &q, v: &v, z: at.z.block(r) };
+            let l = slices.explicit(parameter(quantity), arguments, to, &mut force);
+            let mut along = l_z * w.z.block(r);
+            for d in 0..n {
+                along = (l_q[d] + force[d]).mul_add(w.q[d].block(r), along);
+                along = l_v[d].mul_add(w.v[d].block(r), along);
+            }
+            let along = w.r.block::<S>(r).mul_add(l, at.rho.block::<S>(r) * along);
+            sum = weights.block::<S>(r).mul_add(along, sum);
+        }
+        sum.sum()
+    }
+}
+
+/// The position and the velocity at a block of stages.
+#[inline(always)]
+fn point<S: Simd>(at: &StageDerivatives, r: usize) -> (Coordinates<Lanes<S>>, Coordinates<Lanes<S>>) {
+    let (mut q, mut v) = (Coordinates::new(), Coordinates::new());
+    for d in 0..at.q.len() {
+        q.push(at.q[d].block(r));
+        v.push(at.v[d].block(r));
+    }
+    (q, v)
+}
+
+/// See [`ParametricSystem::evaluate_stages`].
+struct EvaluateStages<'e, F> {
+    slices: &'e F,
+    system: &'e dyn System,
+    at: &'e mut StageDerivatives,
+    forward: &'e StepMaps,
+    step: &'e SolvedStages,
+    actions: Option<&'e StageMap>,
+}
+
+impl<F: ScalarSystem> WithSimd for EvaluateStages<'_, F> {
+    type Output = Result<(), StepError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let EvaluateStages { slices, system, at, forward, step, actions } = self;
+        at.set_points::<S>(forward, step);
+        let mut regular = at.q.len() <= MAX_DIMENSION_IN_LANES || at.form.inverse_mass.is_some();
+        for r in 0..blocks::<S>(step.s) {
+            regular = regular && at.take::<S>(slices, r);
+        }
+        if !regular {
+            // W is inverted at one stage after another, which finds where it is singular.
+            for i in 0..step.s {
+                at.evaluate_stage_of(system, i)?;
+            }
+        }
+        if let (false, Some(actions)) = (step.knows_l, actions) {
+            at.set_actions::<S>(forward, step, actions);
+        }
+        if slices.has_force() {
+            for r in 0..blocks::<S>(step.s) {
+                at.take_force::<S>(slices, r);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Numbers for each pair of coordinates, without memory on the heap for up to eight.
+type Pairs<T> = SmallVec<[T; 64]>;
+
+#[inline(always)]
+fn pairs<T: Scalar>(n: usize) -> Pairs<T> {
+    let mut all = Pairs::new();
+    for _ in 0..n * n {
+        all.push(T::zero());
+    }
+    all
+}
+
+impl StageDerivatives {
+    /// Evaluates L with its derivatives at a block of stages; `false` where W is singular.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, slices: &impl ScalarSystem, r: usize) -> bool {
+        let n = self.q.len();
+        let (t, (q, v), z) = (self.times.block::<S>(r), point::<S>(self, r), self.z.block::<S>(r));
+        let (mut l_q, mut l_v, mut l_z) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), Lanes::<S>::splat(0.0));
+        let l = slices.with_gradient::<_, 0>(t, &q, &v, z, Slopes { q: &mut l_q, v: &mut l_v, z: &mut l_z });
+        let (mut qq, mut qv, mut vv) = (pairs::<Lanes<S>>(n), pairs::<Lanes<S>>(n), pairs::<Lanes<S>>(n));
+        let (mut qz, mut vz, mut zz) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), [Lanes::<S>::splat(0.0)]);
+        slices.second_derivatives::<_, 0>(t, &q, &v, z, [&mut qq, &mut qv, &mut vv, &mut qz, &mut vz, &mut zz]);
+        self.l.set(r, l);
+        self.l_z.set(r, l_z);
+        self.zz.set(r, zz[0]);
+        for i in 0..n {
+            self.l_q[i].set(r, l_q[i]);
+            self.l_v[i].set(r, l_v[i]);
+            self.qz[i].set(r, qz[i]);
+            self.vz[i].set(r, vz[i]);
+            for j in 0..n {
+                self.qq[(i, j)].set(r, qq[i + n * j]);
+                self.qv[(i, j)].set(r, qv[i + n * j]);
+            }
+        }
+        let rho = self.rho.block::<S>(r);
+        if let Some(inverse) = &self.form.inverse_mass {
+            let scale = Lanes::<S>::splat(1.0) / rho;
+            for i in 0..n {
+                for j in 0..n {
+                    self.inverse_mass[(i, j)].set(r, scale * inverse[(i, j)]);
+                }
+            }
+            return true;
+        }
+        for w in vv.iter_mut() {
+            *w *= rho;
+        }
+        for j in 0..n {
+            let mut copy = vv.clone();
+            let mut column = zeros::<Lanes<S>>(n);
+            column[j] = Lanes::splat(1.0);
+            let mut w = DMatrixViewMut::from_slice(&mut copy, n, n);
+            if linear::solve_in_kernel(&mut w, &mut DVectorViewMut::from_slice(&mut column, n)).is_err() {
+                return false;
+            }
+            for i in 0..n {
+                self.inverse_mass[(i, j)].set(r, column[i]);
+            }
+        }
+        true
+    }
+
+    /// Evaluates the applied force with its derivatives at a block of stages.
+    #[inline(always)]
+    fn take_force<S: Simd>(&mut self, slices: &impl ScalarSystem, r: usize) {
+        type Along<S> = KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>;
+        let n = self.q.len();
+        let (t, (q, v), z) = (self.times.block::<S>(r), point::<S>(self, r), self.z.block::<S>(r));
+        let Some(forces) = &mut self.force else { return };
+        for j in 0..=2 * n {
+            let (mut at_q, mut at_v) = (Coordinates::<Along<S>>::new(), Coordinates::<Along<S>>::new());
+            for d in 0..n {
+                at_q.push(Along::<S>::constant(q[d]));
+                at_v.push(Along::<S>::constant(v[d]));
+            }
+            let mut at_z = Along::<S>::constant(z);
+            let seeded = match j {
+                j if j < n => &mut at_q[j],
+                j if j < 2 * n => &mut at_v[j - n],
+                _ => &mut at_z,
+            };
+            seeded.d[0] = Lanes::splat(1.0);
+            let mut force = zeros::<Along<S>>(n);
+            slices.applied_force::<_, 0>(Along::<S>::constant(t), &at_q, &at_v, at_z, &mut force);
+            for i in 0..n {
+                match j {
+                    j if j < n => forces.q[(i, j)].set(r, force[i].d[0]),
+                    j if j < 2 * n => forces.v[(i, j - n)].set(r, force[i].d[0]),
+                    _ => {
+                        forces.z[i].set(r, force[i].d[0]);
+                        forces.value[i].set(r, force[i].re);
+                    }
+                }
+            }
+        }
+    }
+}
