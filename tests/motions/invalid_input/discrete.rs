@@ -106,6 +106,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("ExplicitDerivatives::zeros", "takes no number"),
     ("Components::*", "arithmetic: a result that is not finite follows from input that is not"),
     ("Kernels::of", "takes no number"),
+    ("ForceDerivatives::of_slices", "arithmetic: a result that is not finite follows from input that is not"),
     ("MotionState::differentiate", "arithmetic: a derivative that is not finite follows from input that is not"),
     ("Loss::value", "the implementor's"),
     ("Run::tangent", "tests/derivatives/gradients/invalid_input; the second derivatives here include it"),
