@@ -10,7 +10,6 @@ pub(crate) mod lanes;
 pub(crate) mod order;
 pub(crate) mod pair;
 pub(crate) mod registers;
-pub(crate) mod ridders;
 pub(crate) mod simd_batch;
 pub(crate) mod sine;
 pub(crate) mod state_words;

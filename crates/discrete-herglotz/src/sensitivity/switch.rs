@@ -1,13 +1,13 @@
 //! The derivatives of a switching function and of a reset at its zero.
 
 use crate::integration::{PartPoint, Passage};
-use crate::numbers::ridders;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::corner_derivatives::CornerDerivatives;
 use crate::sensitivity::parametric_system::{Differentiable, Quantity};
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, SensitivityError};
 use crate::system::products::times;
+use crate::system::ridders;
 use crate::{AtSwitch, Components, Point, SecondDerivatives, StepError, System, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_or_nan;

@@ -1,8 +1,8 @@
 //! What a [`System`] computes from its value and its derivatives, unless it provides it.
 
+use super::ridders;
 use super::{AtState, Components, ExplicitDerivatives, Point, Quantity, State, System, Vector};
 use crate::StepError;
-use crate::numbers::ridders;
 use crate::solve::{ITERATION_LIMIT, last_correction};
 use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::support::linear;

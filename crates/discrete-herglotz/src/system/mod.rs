@@ -9,6 +9,7 @@ pub(crate) mod mass_matrix;
 mod points;
 pub(crate) mod products;
 mod quantity;
+pub(crate) mod ridders;
 mod typed;
 mod vector;
 
