@@ -6,8 +6,6 @@ use crate::resets::{Change, Direction, FormulaReset, Variable};
 use crate::tape::Tape;
 use crate::{Graph, Id};
 use contact_geom::nalgebra::{DMatrix, DVector};
-use contact_geom::switching::Control;
-use contact_geom::{Lagrangian, VelocityPoint};
 
 /// New values of variables as a tape.
 #[derive(Clone, Debug)]
@@ -21,13 +19,6 @@ impl Assignment {
     fn new(graph: &Graph, assigned: &[(Variable, Id)], n: usize) -> Option<Self> {
         let (variables, values): (Vec<Variable>, Vec<Id>) = assigned.iter().copied().unzip();
         Some(Assignment { variables, values: Tape::new(graph, &values, n)? })
-    }
-
-    /// A state with the new values.
-    fn after<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> VelocityPoint<N> {
-        let mut after = *x;
-        self.replace(t, (after.q.as_mut_slice(), after.v.as_mut_slice(), &mut after.z));
-        after
     }
 
     /// Replaces a state `(q, v, z)` by that with the new values.
@@ -84,26 +75,6 @@ impl DerivedReset {
         if let Some(rest) = &mut self.rest {
             rest.values.set_constants(constants);
         }
-    }
-
-    /// What happens where the function crosses 0; nothing in the other direction.
-    pub fn at_switch<const N: usize>(
-        &self,
-        lagrangian: &impl Lagrangian<N>,
-        t: f64,
-        x: &VelocityPoint<N>,
-        rising: bool,
-    ) -> Control<N> {
-        match &self.change {
-            _ if !self.direction.includes(rising) => Control::Continue,
-            DerivedChange::Assignment(then) => Control::Replace(then.after(t, x)),
-            DerivedChange::Impact(impact) => impact.control(lagrangian, t, x),
-        }
-    }
-
-    /// What happens where resets accumulate.
-    pub fn at_accumulation<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> Control<N> {
-        self.rest.as_ref().map_or(Control::Continue, |rest| Control::Replace(rest.after(t, x)))
     }
 
     /// Replaces a state `(q, v, z)` by that after the reset or the impact; `None` in the other direction. Returns the factor

@@ -138,11 +138,6 @@ impl FormulaDerivatives {
         reset.is_some_and(|reset| reset.replace_by_rest(t, x))
     }
 
-    /// The names and the values of the parameters.
-    pub fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.derived.formula.parameters()
-    }
-
     /// The same formula with these values of all parameters; `None` where their number is wrong or one is not finite.
     pub fn with_parameters(&self, theta: &[f64]) -> Option<Self> {
         if theta.len() != self.derived.formula.values.len() || !theta.iter().all(|x| x.is_finite()) {
@@ -195,8 +190,8 @@ impl ScalarSystem for FormulaDerivatives {
         self.derived.second.evaluate::<T, N>(At { t, q, v, z }, &mut to);
     }
 
-    fn parameter_count(&self) -> usize {
-        self.derived.formula.values.len()
+    fn parameters(&self) -> Option<usize> {
+        Some(self.derived.formula.values.len())
     }
 
     /// Where the base of a power is not positive, its derivative with respect to a parameter in the exponent is taken to

@@ -3,9 +3,8 @@
 use crate::evaluation::At;
 use crate::tape::Tape;
 use crate::{Graph, Id};
-use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::switching::{Control, Impact};
-use contact_geom::{Lagrangian, VelocityPoint};
+use contact_geom::nalgebra::{DMatrix, DVector};
+use contact_geom::switching::Impact;
 
 /// An impact with the normal of its surface as a tape.
 #[derive(Clone, Debug)]
@@ -22,20 +21,6 @@ impl DerivedImpact {
         variables.push(graph.time());
         let slopes = graph.gradient(surface, &variables, limit)?;
         Some(DerivedImpact { law, normal: Tape::new(graph, &slopes, n)? })
-    }
-
-    /// The state after the impact.
-    pub fn control<const N: usize>(&self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> Control<N> {
-        let (mut normal, mut rate) = (SVector::<f64, N>::zeros(), 0.0);
-        let results = &mut [normal.as_mut_slice(), std::slice::from_mut(&mut rate)];
-        self.normal.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), results);
-        // A state that does not exist is refused as one that is not finite.
-        let to = self.law.after(lagrangian, t, x, (&normal, rate));
-        let to = to.unwrap_or(VelocityPoint { v: SVector::repeat(f64::NAN), ..*x });
-        match self.law.factor() {
-            Some(factor) => Control::Conformal { to, factor },
-            None => Control::Replace(to),
-        }
     }
 
     /// Replaces the velocity and the action of a state `(q, v, z)` by those after the impact; `at` is L with `L_v` and `L_vv`

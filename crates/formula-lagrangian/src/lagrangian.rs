@@ -128,7 +128,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// The number of the reset to which a [switching function](Lagrangian::switching_functions) belongs; `None` for the
     /// functions of kinks and jumps, which come first.
     pub fn reset_of(&self, index: usize) -> Option<usize> {
-        index.checked_sub(self.derived().kinks.functions.len()).filter(|reset| *reset < self.resets())
+        self.derivatives.reset_of(index)
     }
 
     /// `L_z` if it is proved to be constant, so that the conformal factor over a time T is `e^(L_z T)`.
@@ -299,25 +299,28 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     /// forces; those that are affine functions of time are [breaks](Lagrangian::breaks) instead. Then those of the
     /// resets.
     fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
-        let (tape, first) = (&self.derived().switching, values.len());
-        if !tape.results.is_empty() {
-            values.resize(first + tape.results.len(), 0.0);
-            let results = values.get_mut(first..).unwrap_or(&mut []);
-            tape.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [results]);
-        }
+        self.derivatives.switching_functions(t, x.q.as_slice(), x.v.as_slice(), x.z, values);
     }
 
     /// The state after the reset or the impact to which the function belongs, if it has this direction. A new value may
     /// be NaN.
     fn at_switch(&self, index: usize, t: f64, x: &VelocityPoint<N>, rising: bool) -> Control<N> {
-        let reset = self.reset_of(index).and_then(|i| self.derived().resets.get(i));
-        reset.map_or(Control::Continue, |reset| reset.at_switch(self, t, x, rising))
+        let mut to = *x;
+        let state = (to.q.as_mut_slice(), to.v.as_mut_slice(), &mut to.z);
+        match self.derivatives.reset(index, rising, t, state) {
+            None => Control::Continue,
+            Some(None) => Control::Replace(to),
+            Some(Some(factor)) => Control::Conformal { to, factor },
+        }
     }
 
     /// The state at which the motion continues where resets accumulate, if the reset states one.
     fn at_accumulation(&self, index: usize, t: f64, x: &VelocityPoint<N>) -> Control<N> {
-        let reset = self.reset_of(index).and_then(|i| self.derived().resets.get(i));
-        reset.map_or(Control::Continue, |reset| reset.at_accumulation(t, x))
+        let mut to = *x;
+        match self.derivatives.rest(index, t, (to.q.as_mut_slice(), to.v.as_mut_slice(), &mut to.z)) {
+            true => Control::Replace(to),
+            false => Control::Continue,
+        }
     }
 
     /// The zeros of switching functions that are affine functions of time with coefficients from the parameters, as of

@@ -12,6 +12,7 @@ mod hamiltonians;
 mod impacts;
 mod invalid_input;
 mod language;
+mod own_systems;
 mod parametric;
 mod random;
 mod random_formulas;

@@ -105,7 +105,6 @@ pub const EXCEPTIONS: Exceptions = &[
     ("DifferentiableProblem::differentiable", "takes no number"),
     ("ExplicitDerivatives::zeros", "takes no number"),
     ("Components::*", "arithmetic: a result that is not finite follows from input that is not"),
-    ("Kernels::of", "takes no number"),
     ("ForceDerivatives::of_slices", "arithmetic: a result that is not finite follows from input that is not"),
     ("MotionState::differentiate", "arithmetic: a derivative that is not finite follows from input that is not"),
     ("Loss::value", "the implementor's"),

@@ -239,8 +239,8 @@ pub trait Lagrangian<const N: usize> {
         None
     }
 
-    /// Visits the same Lagrangian as a [`ScalarSystem`](crate::ScalarSystem), for which integrators are compiled once, whatever its number of
-    /// coordinates; see [`Hints::over_slices`]. `None`, the default, for a Lagrangian that is not one.
+    /// Visits the same Lagrangian as a [`ScalarSystem`](crate::ScalarSystem), for which integrators are compiled once,
+    /// whatever its number of coordinates; see [`Hints::over_slices`]. `None`, the default, for a Lagrangian that is not one.
     fn over_slices<V: SlicesVisitor>(&self, _visitor: V) -> Option<V::Output> {
         None
     }

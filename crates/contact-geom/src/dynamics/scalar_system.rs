@@ -27,19 +27,21 @@ pub trait ScalarSystem {
     /// columns (in `L_qv` the rows belong to q), vectors of n entries, and one number.
     fn second_derivatives<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: [&mut [T]; 6]);
 
-    /// The number of parameters.
-    fn parameter_count(&self) -> usize {
-        0
+    /// The number of parameters, where [`explicit`](Self::explicit) has the derivatives in them and in time. `None`, the
+    /// default: these are found by differences.
+    fn parameters(&self) -> Option<usize> {
+        None
     }
 
     /// The derivative of L in a parameter, or in the time if none is given, which is returned, with those of its gradient and
-    /// of the applied force, which are written. Only for a system with parameters or one that depends on time.
+    /// of the applied force, which are written. NaN where [`parameters`](Self::parameters) is `None`.
     fn explicit<T: Scalar>(&self, of: Option<usize>, at: Arguments<'_, T>, to: Slopes<'_, T>, force: &mut [T]) -> T {
         let _ = (of, at);
+        let none = T::from(f64::NAN);
         for slope in to.q.iter_mut().chain(to.v).chain([to.z]).chain(force) {
-            *slope = T::zero();
+            *slope = none;
         }
-        T::zero()
+        none
     }
 
     /// Whether there is an applied force.

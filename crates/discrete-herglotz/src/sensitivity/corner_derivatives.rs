@@ -52,7 +52,7 @@ impl Switch<'_, '_> {
     /// Those of [`legendre_inverse`](System::legendre_inverse).
     fn one_sided(&self, p: &Vector, guess: &Vector, toward: &Vector) -> Result<OneSided, StepError> {
         let system = self.problem.system();
-        let mut of = self.problem.of.quantities();
+        let mut of = self.problem.stages.quantities();
         let State { q, z, .. } = &self.at.state;
         let zero = Components::zeros(q.len());
         let mut sum = OneSided { v: zero.x.clone(), gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };

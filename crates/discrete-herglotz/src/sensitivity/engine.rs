@@ -11,12 +11,13 @@ use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
-use crate::sensitivity::parametric_system::{Differentiable, ExplicitDerivatives, Quantities, Quantity};
+use crate::sensitivity::parametric_system::{Differentiable, Quantities, Quantity};
 use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::{Point, StepError};
 use contact_geom::numbers::max_or_nan;
 use pulp::{Simd, WithSimd};
+use std::array::from_fn;
 
 /// The tangent of steps of one length in one direction, with its workspace.
 pub(crate) struct Engine<'a> {
@@ -50,7 +51,7 @@ impl<'a> Engine<'a> {
             actions: None,
             at,
             given: Inhomogeneity::zeros(n),
-            of_parameters: problem.of.quantities(),
+            of_parameters: problem.stages.quantities(),
             timed: !structure.autonomous,
             arch: Instructions::new(),
             problem: problem.clone(),
@@ -105,7 +106,7 @@ impl<'a> Engine<'a> {
             let x = Point { q: step.start.q.clone(), v: step.v.iter().map(|v| v.0[0]).collect(), z: 0.0 };
             self.actions = self.forward.resolvent(-self.problem.system().gradient(step.t, &x).z);
         }
-        self.problem.of.evaluate_stages(self.arch, &mut self.at, &self.forward, step, self.actions.as_ref())?;
+        self.problem.stages.evaluate_stages(self.arch, &mut self.at, &self.forward, step, self.actions.as_ref())?;
         if self.condenses
             && !self.linear.is_condensed()
             && let Some(inverse) = &self.at.form.inverse_mass
@@ -169,41 +170,27 @@ impl<'a> Engine<'a> {
         let moves = self.timed && (start != 0.0 || column.dh != 0.0);
         let given = &mut self.given;
         given.has_r = column.parameter.is_some() || moves;
+        given.forget_sources();
         if given.has_r {
             self.evaluate_sources(step, column, moves.then_some(start));
-            return;
         }
-        given.v_source.fill(Stages::ZERO);
-        given.p_source.fill(Stages::ZERO);
-        given.z_source = Stages::ZERO;
-        given.r_source = Stages::ZERO;
     }
 
-    /// Sets the sources that do not vanish; `start` is the derivative of the time at the start of the step, unless the
-    /// sources do not depend on the time. Not inlined, since it evaluates the system stage by stage.
+    /// Adds the sources that do not vanish; `start` is the derivative of the time at the start of the step, unless the
+    /// sources do not depend on the time. Not inlined, since it evaluates the system.
     #[inline(never)]
     fn evaluate_sources(&mut self, step: &SolvedStages, column: &Column, start: Option<f64>) {
-        let (n, given, of_parameters) = (self.at.q.len(), &mut self.given, &mut self.of_parameters);
-        let c = &Coefficients::of(step.s).c;
-        let (_, mut x) = self.at.point(0);
-        for i in 0..step.s {
-            let t = self.at.move_point(i, &mut x);
-            let mut of = match column.parameter {
-                Some(k) => of_parameters.at(Quantity::Parameter(k), t, &x),
-                None => ExplicitDerivatives::zeros(n),
-            };
-            if let Some(start) = start {
-                let factor = start + c[i].0 * column.dh;
-                of.add(factor, &of_parameters.at(Quantity::Time, t, &x));
-            }
-            let (rho, of_q, of_v, force) = (self.at.rho.0[i], &of.gradient.x[..n], &of.gradient.y[..n], &of.force[..n]);
-            for d in 0..n {
-                given.v_source[d].0[i] = rho * of_v[d];
-                given.p_source[d].0[i] = rho * (of_q[d] + force[d]);
-            }
-            given.z_source.0[i] = of.l;
-            given.r_source.0[i] = rho * of.gradient.z;
+        let (arch, at, given, quantities) = (self.arch, &self.at, &mut self.given, &mut self.of_parameters);
+        if let Some(k) = column.parameter {
+            quantities.add_at_stages(arch, Quantity::Parameter(k), at, &Stages([1.0; MAX_STAGES]), given);
         }
+        if let Some(start) = start {
+            let c = &Coefficients::of(step.s).c;
+            let factors = from_fn(|i| start + c[i.min(step.s - 1)].0 * column.dh);
+            quantities.add_at_stages(arch, Quantity::Time, at, &Stages(factors), given);
+        }
+        let sources = given.v_source.iter_mut().chain(&mut given.p_source).chain([&mut given.r_source]);
+        sources.for_each(|source| *source = product(&at.rho, source));
     }
 
     #[inline(always)]

@@ -423,7 +423,7 @@ fn gradient(of: &Differentiable<'_>, covector: &Covector, explicit: f64, steps: 
         gradient.q += &times(&qv, p);
         gradient.rate = times(&vv, p);
         gradient.z += vz.dot(p);
-        let (mut quantities, at) = (of.of.quantities(), (&problem.start, &problem.state.p));
+        let (mut quantities, at) = (of.stages.quantities(), (&problem.start, &problem.state.p));
         for (k, sum) in gradient.parameters.iter_mut().enumerate() {
             *sum += quantities.of_momentum(Quantity::Parameter(k), t0, at).dot(p);
         }

@@ -8,14 +8,14 @@ use crate::sensitivity::SensitivityError;
 use crate::sensitivity::flows::{FlowEngine, FlowTangent, Sources};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
-use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
+use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity, StageSystem};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::stage_kernel::StageKernel;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::{Argument, moving_point};
 use crate::{Components, Point, State, StepError, System, SystemProblem, Vector};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Parametric, UnknownParameter};
+use contact_geom::{ChartVector, Parametric};
 use pulp::{Simd, WithSimd};
 
 /// A Lagrangian with parameters, seen without its type.
@@ -92,6 +92,23 @@ impl<L: Parametric<N>, const N: usize> WithSimd for QuantityAlong<'_, L, N> {
     }
 }
 
+impl<'a, L: Parametric<N>, const N: usize> StageSystem<'a> for OfParametric<'a, L, N> {
+    fn quantities(&self) -> Box<dyn Quantities + 'a> {
+        Box::new(OfParameters { lagrangian: self.0, of: ParameterDerivatives::new(self.0) })
+    }
+
+    fn evaluate_stages(
+        &self,
+        arch: Instructions,
+        at: &mut StageDerivatives,
+        forward: &StepMaps,
+        step: &SolvedStages,
+        actions: Option<&StageMap>,
+    ) -> Result<(), StepError> {
+        arch.dispatch(StageKernel { lagrangian: self.0, at, forward, step, actions })
+    }
+}
+
 impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric<'a, L, N> {
     fn parameter_names(&self) -> Vec<String> {
         self.0.parameter_names()
@@ -99,10 +116,6 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
 
     fn parameters(&self) -> Vec<f64> {
         self.0.parameters()
-    }
-
-    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
-        self.0.parameter_index(name)
     }
 
     fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
@@ -118,25 +131,6 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
         let (theta, t, x) = moving_point(along, &self.0.parameters(), t, x);
         let to = self.0.state_after_switch_at(&theta, index, t, &x)?;
         Some(Components { x: to.q.map(|x| x.d[0]).into(), y: to.v.map(|x| x.d[0]).into(), z: to.z.d[0] })
-    }
-
-    fn quantities(&self) -> Box<dyn Quantities + 'a> {
-        Box::new(OfParameters { lagrangian: self.0, of: ParameterDerivatives::new(self.0) })
-    }
-
-    fn evaluate_stages(
-        &self,
-        arch: Instructions,
-        at: &mut StageDerivatives,
-        forward: &StepMaps,
-        step: &SolvedStages,
-        actions: Option<&StageMap>,
-    ) -> Result<(), StepError> {
-        // Derivatives of a Lagrangian over slices are those of its slices.
-        if const { L::HINTS.over_slices } {
-            return Err(StepError::NonFinite);
-        }
-        arch.dispatch(StageKernel { lagrangian: self.0, at, forward, step, actions })
     }
 
     fn flows(

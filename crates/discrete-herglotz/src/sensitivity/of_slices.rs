@@ -6,50 +6,44 @@
 
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
 use crate::gauss::system::{Coordinates, KernelsOf, zeros};
-use crate::integration::{SharedIntegrator, SolvedStages, StepFormula};
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
-use crate::numbers::registers::{StageMap, Stages, blocks};
-use crate::sensitivity::SensitivityError;
-use crate::sensitivity::flows::FlowTangent;
-use crate::sensitivity::linear_stages::StageTangent;
-use crate::sensitivity::of_system::OfSystem;
-use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
+use crate::numbers::registers::{MAX_STAGES, StageMap, Stages, blocks};
+use crate::sensitivity::linear_stages::{Inhomogeneity, StageTangent};
+use crate::sensitivity::of_system::{OfQuantities, OfSystem};
+use crate::sensitivity::parametric_system::{ExplicitDerivatives, Quantities, Quantity, StageSystem};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
-use crate::sensitivity::switch::Argument;
-use crate::{Components, Kernels, Point, StepError, System, SystemProblem, Vector};
+use crate::system::caught;
+use crate::{Kernels, Point, StepError, System, Vector};
 use contact_geom::nalgebra::{DMatrixViewMut, DVectorViewMut, SVector};
 use contact_geom::support::{KernelDual, linear};
-use contact_geom::{Arguments, Scalar, ScalarSystem, SlicesVisitor, Slopes, UnknownParameter};
+use contact_geom::{Arguments, Scalar, ScalarSystem, SlicesVisitor, Slopes};
 use pulp::{Simd, WithSimd};
 use smallvec::SmallVec;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Takes the derivatives at stages and those in parameters and time from a system over slices, and all else from another view
-/// of the same system.
-pub(crate) struct BySlices<'a> {
-    pub system: Rc<dyn System + 'a>,
-    pub rest: Rc<dyn ParametricSystem<'a> + 'a>,
-}
+/// Makes the stages of a system over slices, which is also given as a system.
+pub(crate) struct BySlices<'a>(pub Rc<dyn System + 'a>);
 
 impl<'a> SlicesVisitor for BySlices<'a> {
-    type Output = Rc<dyn ParametricSystem<'a> + 'a>;
+    type Output = Rc<dyn StageSystem<'a> + 'a>;
 
     fn visit<F: ScalarSystem + 'static>(self, slices: Arc<F>) -> Self::Output {
-        Rc::new(OfSlices { slices, system: self.system, rest: self.rest })
+        Rc::new(OfSlices { slices, system: self.0 })
     }
 }
 
 /// A system over slices without its type.
 trait Slices {
-    /// See [`BySlices`].
-    fn view<'a>(&self, by: BySlices<'a>) -> Rc<dyn ParametricSystem<'a> + 'a>;
+    /// Its stages.
+    fn stages<'a>(&self, by: BySlices<'a>) -> Rc<dyn StageSystem<'a> + 'a>;
 }
 
 impl<F: ScalarSystem + 'static> Slices for Arc<F> {
-    fn view<'a>(&self, by: BySlices<'a>) -> Rc<dyn ParametricSystem<'a> + 'a> {
+    fn stages<'a>(&self, by: BySlices<'a>) -> Rc<dyn StageSystem<'a> + 'a> {
         by.visit(self.clone())
     }
 }
@@ -63,49 +57,26 @@ impl Kernels {
     }
 }
 
-/// The view of a system for derivatives: by its kernels, or at one stage after another.
-pub(crate) fn view_of<'a>(system: &Rc<dyn System + 'a>) -> Rc<dyn ParametricSystem<'a> + 'a> {
-    let rest = Rc::new(OfSystem(system.clone()));
+/// The stages of a system: by its kernels, or one after another.
+pub(crate) fn stages_of<'a>(system: &Rc<dyn System + 'a>) -> Rc<dyn StageSystem<'a> + 'a> {
     let kernels = system.kernels();
     match kernels.as_ref().and_then(|kernels| kernels.derivatives.downcast_ref::<Box<dyn Slices>>()) {
-        Some(slices) => slices.view(BySlices { system: system.clone(), rest }),
-        None => rest,
+        Some(slices) => slices.stages(BySlices(system.clone())),
+        None => Rc::new(OfSystem(system.clone())),
     }
 }
 
 struct OfSlices<'a, F> {
     slices: Arc<F>,
     system: Rc<dyn System + 'a>,
-    rest: Rc<dyn ParametricSystem<'a> + 'a>,
 }
 
-impl<'a, F: ScalarSystem + 'static> ParametricSystem<'a> for OfSlices<'a, F> {
-    fn parameter_names(&self) -> Vec<String> {
-        self.rest.parameter_names()
-    }
-
-    fn parameters(&self) -> Vec<f64> {
-        self.rest.parameters()
-    }
-
-    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
-        self.rest.parameter_index(name)
-    }
-
-    fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
-        self.rest.with_parameters(theta, f)
-    }
-
-    fn switching_function_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<f64> {
-        self.rest.switching_function_along(along, index, t, x)
-    }
-
-    fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components> {
-        self.rest.state_after_switch_along(along, index, t, x)
-    }
-
+impl<'a, F: ScalarSystem + 'static> StageSystem<'a> for OfSlices<'a, F> {
     fn quantities(&self) -> Box<dyn Quantities + 'a> {
-        Box::new(SliceQuantities { slices: self.slices.clone() })
+        match self.slices.parameters() {
+            Some(count) => Box::new(SliceQuantities { slices: self.slices.clone(), count }),
+            None => Box::new(OfQuantities::new(self.system.clone())),
+        }
     }
 
     fn evaluate_stages(
@@ -116,23 +87,15 @@ impl<'a, F: ScalarSystem + 'static> ParametricSystem<'a> for OfSlices<'a, F> {
         step: &SolvedStages,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError> {
-        arch.dispatch(EvaluateStages { slices: &*self.slices, system: &*self.system, at, forward, step, actions })
-    }
-
-    fn flows(
-        &self,
-        problem: &SystemProblem<'a>,
-        formula: StepFormula,
-        integrator: &SharedIntegrator<'a>,
-        quantities: Box<dyn Quantities + 'a>,
-    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
-        self.rest.flows(problem, formula, integrator, quantities)
+        let kernel = EvaluateStages { slices: &*self.slices, system: &*self.system, at, forward, step, actions };
+        caught(|| arch.dispatch(kernel), || Err(StepError::NonFinite))
     }
 }
 
 /// The derivatives in parameters and time.
 struct SliceQuantities<F> {
     slices: Arc<F>,
+    count: usize,
 }
 
 fn parameter(of: Quantity) -> Option<usize> {
@@ -144,19 +107,43 @@ fn parameter(of: Quantity) -> Option<usize> {
 
 impl<F: ScalarSystem> Quantities for SliceQuantities<F> {
     fn count(&self) -> usize {
-        self.slices.parameter_count()
+        self.count
     }
 
     fn at(&mut self, quantity: Quantity, t: f64, x: &Point) -> ExplicitDerivatives {
-        let mut to = ExplicitDerivatives::zeros(x.q.len());
-        let slopes = Slopes { q: &mut to.gradient.x, v: &mut to.gradient.y, z: &mut to.gradient.z };
-        let at = Arguments { t, q: &x.q, v: &x.v, z: x.z };
-        to.l = self.slices.explicit(parameter(quantity), at, slopes, &mut to.force);
-        to
+        let n = x.q.len();
+        let found = || {
+            let mut to = ExplicitDerivatives::zeros(n);
+            let slopes = Slopes { q: &mut to.gradient.x, v: &mut to.gradient.y, z: &mut to.gradient.z };
+            let at = Arguments { t, q: &x.q, v: &x.v, z: x.z };
+            to.l = self.slices.explicit(parameter(quantity), at, slopes, &mut to.force);
+            to
+        };
+        caught(found, || ExplicitDerivatives::undefined(n))
     }
 
     fn of_momentum(&mut self, quantity: Quantity, t: f64, (x, _): (&Point, &Vector)) -> Vector {
         self.at(quantity, t, x).gradient.y
+    }
+
+    fn add_at_stages(
+        &mut self,
+        arch: Instructions,
+        quantity: Quantity,
+        at: &StageDerivatives,
+        factors: &Stages,
+        to: &mut Inhomogeneity,
+    ) {
+        let undefined = caught(
+            || {
+                arch.dispatch(AddAtStages { slices: &*self.slices, quantity, at, factors, to: &mut *to });
+                false
+            },
+            || true,
+        );
+        if undefined {
+            to.z_source = Stages([f64::NAN; MAX_STAGES]);
+        }
     }
 
     fn along(
@@ -166,7 +153,60 @@ impl<F: ScalarSystem> Quantities for SliceQuantities<F> {
         at: &StageDerivatives,
         (w, weights): (&StageTangent, &Stages),
     ) -> f64 {
-        arch.dispatch(QuantityAlong { slices: &*self.slices, quantity, at, w, weights })
+        caught(|| arch.dispatch(QuantityAlong { slices: &*self.slices, quantity, at, w, weights }), || f64::NAN)
+    }
+}
+
+/// The derivatives in a quantity at a block of stages: of L, `L_q + f`, `L_v` and `L_z`.
+struct InQuantity<S: Simd> {
+    l: Lanes<S>,
+    q: Coordinates<Lanes<S>>,
+    v: Coordinates<Lanes<S>>,
+    z: Lanes<S>,
+}
+
+impl<S: Simd> InQuantity<S> {
+    #[inline(always)]
+    fn of(slices: &impl ScalarSystem, quantity: Quantity, at: &StageDerivatives, r: usize) -> Self {
+        let (n, (q, v)) = (at.q.len(), point::<S>(at, r));
+        let (mut of_q, mut of_v, mut force) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n));
+        let mut of_z = Lanes::<S>::splat(0.0);
+        let to = Slopes { q: &mut of_q, v: &mut of_v, z: &mut of_z };
+        let arguments = Arguments { t: at.times.block(r), q: &q, v: &v, z: at.z.block(r) };
+        let l = slices.explicit(parameter(quantity), arguments, to, &mut force);
+        for d in 0..n {
+            of_q[d] += force[d];
+        }
+        InQuantity { l, q: of_q, v: of_v, z: of_z }
+    }
+}
+
+/// See [`Quantities::add_at_stages`].
+struct AddAtStages<'e, F> {
+    slices: &'e F,
+    quantity: Quantity,
+    at: &'e StageDerivatives,
+    factors: &'e Stages,
+    to: &'e mut Inhomogeneity,
+}
+
+impl<F: ScalarSystem> WithSimd for AddAtStages<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let AddAtStages { slices, quantity, at, factors, to } = self;
+        for r in 0..blocks::<S>(at.s) {
+            let of = InQuantity::<S>::of(slices, quantity, at, r);
+            let factor = factors.block::<S>(r);
+            for d in 0..at.q.len() {
+                let (v, p) = (&mut to.v_source[d], &mut to.p_source[d]);
+                v.set(r, factor.mul_add(of.v[d], v.block(r)));
+                p.set(r, factor.mul_add(of.q[d], p.block(r)));
+            }
+            to.z_source.set(r, factor.mul_add(of.l, to.z_source.block(r)));
+            to.r_source.set(r, factor.mul_add(of.z, to.r_source.block(r)));
+        }
     }
 }
 
@@ -185,21 +225,15 @@ impl<F: ScalarSystem> WithSimd for QuantityAlong<'_, F> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> f64 {
         let QuantityAlong { slices, quantity, at, w, weights } = self;
-        let n = at.q.len();
         let mut sum = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(at.s) {
-            let (q, v) = point::<S>(at, r);
-            let (mut l_q, mut l_v, mut force) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n));
-            let mut l_z = Lanes::<S>::splat(0.0);
-            let to = Slopes { q: &mut l_q, v: &mut l_v, z: &mut l_z };
-            let arguments = Arguments { t: at.times.block(r), q: &q, v: &v, z: at.z.block(r) };
-            let l = slices.explicit(parameter(quantity), arguments, to, &mut force);
-            let mut along = l_z * w.z.block(r);
-            for d in 0..n {
-                along = (l_q[d] + force[d]).mul_add(w.q[d].block(r), along);
-                along = l_v[d].mul_add(w.v[d].block(r), along);
+            let of = InQuantity::<S>::of(slices, quantity, at, r);
+            let mut along = of.z * w.z.block(r);
+            for d in 0..at.q.len() {
+                along = of.q[d].mul_add(w.q[d].block(r), along);
+                along = of.v[d].mul_add(w.v[d].block(r), along);
             }
-            let along = w.r.block::<S>(r).mul_add(l, at.rho.block::<S>(r) * along);
+            let along = w.r.block::<S>(r).mul_add(of.l, at.rho.block::<S>(r) * along);
             sum = weights.block::<S>(r).mul_add(along, sum);
         }
         sum.sum()

@@ -6,17 +6,33 @@ use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::flows::FlowTangent;
 use crate::sensitivity::linear_stages::StageTangent;
-use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity};
+use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity, StageSystem};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
 use crate::{Components, Point, SecondDerivatives, StepError, System, SystemProblem, Vector};
-use contact_geom::UnknownParameter;
 use pulp::{Simd, WithSimd};
 use std::rc::Rc;
 
 /// A [`System`] of any number of coordinates. Its switching functions and resets are differentiated by differences.
 pub(crate) struct OfSystem<'a>(pub Rc<dyn System + 'a>);
+
+impl<'a> StageSystem<'a> for OfSystem<'a> {
+    fn quantities(&self) -> Box<dyn Quantities + 'a> {
+        Box::new(OfQuantities::new(self.0.clone()))
+    }
+
+    fn evaluate_stages(
+        &self,
+        arch: Instructions,
+        at: &mut StageDerivatives,
+        forward: &StepMaps,
+        step: &SolvedStages,
+        actions: Option<&StageMap>,
+    ) -> Result<(), StepError> {
+        arch.dispatch(EvaluateStages { system: &*self.0, at, forward, step, actions })
+    }
+}
 
 impl<'a> ParametricSystem<'a> for OfSystem<'a> {
     fn parameter_names(&self) -> Vec<String> {
@@ -25,11 +41,6 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
 
     fn parameters(&self) -> Vec<f64> {
         self.0.parameters()
-    }
-
-    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
-        let names = self.0.parameter_names();
-        names.iter().position(|known| known == name).ok_or_else(|| UnknownParameter::new(name, names))
     }
 
     fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
@@ -44,21 +55,6 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
         None
     }
 
-    fn quantities(&self) -> Box<dyn Quantities + 'a> {
-        Box::new(OfQuantities { system: self.0.clone(), count: self.0.parameter_names().len() })
-    }
-
-    fn evaluate_stages(
-        &self,
-        arch: Instructions,
-        at: &mut StageDerivatives,
-        forward: &StepMaps,
-        step: &SolvedStages,
-        actions: Option<&StageMap>,
-    ) -> Result<(), StepError> {
-        arch.dispatch(EvaluateStages { system: &*self.0, at, forward, step, actions })
-    }
-
     fn flows(
         &self,
         _problem: &SystemProblem<'a>,
@@ -71,9 +67,16 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
 }
 
 /// The derivatives in parameters and time.
-struct OfQuantities<'a> {
+pub(super) struct OfQuantities<'a> {
     system: Rc<dyn System + 'a>,
     count: usize,
+}
+
+impl<'a> OfQuantities<'a> {
+    pub fn new(system: Rc<dyn System + 'a>) -> Self {
+        let count = system.parameter_names().len();
+        OfQuantities { system, count }
+    }
 }
 
 impl Quantities for OfQuantities<'_> {
@@ -164,7 +167,8 @@ impl StageDerivatives {
             }
         }
         let Some(forces) = &mut self.force else { return Ok(()) };
-        let applied = system.force_derivatives(t, &x).ok_or(StepError::NonFinite)?;
+        // A system that may have a force need not have one.
+        let Some(applied) = system.force_derivatives(t, &x) else { return Ok(()) };
         for d in 0..n {
             forces.value[d].0[i] = applied.value[d];
             forces.z[d].0[i] = applied.z[d];

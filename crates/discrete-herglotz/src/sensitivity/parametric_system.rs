@@ -6,9 +6,10 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::flows::FlowTangent;
-use crate::sensitivity::linear_stages::StageTangent;
+use crate::sensitivity::linear_stages::{Inhomogeneity, StageTangent};
 use crate::sensitivity::of_parametric::OfParametric;
-use crate::sensitivity::of_slices::{BySlices, view_of};
+use crate::sensitivity::of_slices::{BySlices, stages_of};
+use crate::sensitivity::of_system::OfSystem;
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
@@ -37,6 +38,30 @@ pub(crate) trait Quantities {
     /// The derivative of the momentum `L_v` of a given velocity, at a state that has this velocity.
     fn of_momentum(&mut self, quantity: Quantity, t: f64, at: (&Point, &Vector)) -> Vector;
 
+    /// Adds the derivatives at the stages of a step to sources, times a factor for each stage: those of `L_v`, of `L_q + f`, of L
+    /// and of `L_z`, without the factor rho.
+    fn add_at_stages(
+        &mut self,
+        _arch: Instructions,
+        quantity: Quantity,
+        at: &StageDerivatives,
+        factors: &Stages,
+        to: &mut Inhomogeneity,
+    ) {
+        let (n, (_, mut x)) = (at.q.len(), at.point(0));
+        for i in 0..at.s {
+            let t = at.move_point(i, &mut x);
+            let (of, factor) = (self.at(quantity, t, &x), factors.0[i]);
+            let (of_q, of_v, force) = (&of.gradient.x[..n], &of.gradient.y[..n], &of.force[..n]);
+            for d in 0..n {
+                to.v_source[d].0[i] += factor * of_v[d];
+                to.p_source[d].0[i] += factor * (of_q[d] + force[d]);
+            }
+            to.z_source.0[i] += factor * of.l;
+            to.r_source.0[i] += factor * of.gradient.z;
+        }
+    }
+
     /// `d(rho L_theta)[w] + rho f_theta . w_q` at the stages of a step, multiplied by the weights and summed.
     fn along(
         &mut self,
@@ -47,30 +72,9 @@ pub(crate) trait Quantities {
     ) -> f64;
 }
 
-/// A [`System`] with parameters, of which runs are differentiated. The linear algebra of the derivatives stands above it,
-/// and is compiled once for all systems.
-pub(crate) trait ParametricSystem<'a> {
-    /// The names of the parameters.
-    fn parameter_names(&self) -> Vec<String>;
-
-    /// Their values, in the order of the names.
-    fn parameters(&self) -> Vec<f64>;
-
-    /// The index of a parameter.
-    ///
-    /// # Errors
-    /// [`UnknownParameter`] if there is none of this name.
-    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter>;
-
-    /// A function of the system for other values of the parameters; `None` where there is no such system.
-    fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>>;
-
-    /// The derivative of a switching function along an argument; `None` where it is not known.
-    fn switching_function_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<f64>;
-
-    /// The derivative of the `(q, v, z)` after a reset along an argument; `None` where it is not known.
-    fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components>;
-
+/// The derivatives of a [`System`] at the stages of steps, and in parameters and time. The linear algebra of the derivatives
+/// of runs stands above it, and is compiled once for all systems.
+pub(crate) trait StageSystem<'a> {
     /// The derivatives with respect to parameters and time.
     fn quantities(&self) -> Box<dyn Quantities + 'a>;
 
@@ -87,6 +91,33 @@ pub(crate) trait ParametricSystem<'a> {
         step: &SolvedStages,
         actions: Option<&StageMap>,
     ) -> Result<(), StepError>;
+}
+
+/// What derivatives of runs need of a [`System`] beside its [stages](StageSystem).
+pub(crate) trait ParametricSystem<'a> {
+    /// The names of the parameters.
+    fn parameter_names(&self) -> Vec<String>;
+
+    /// Their values, in the order of the names.
+    fn parameters(&self) -> Vec<f64>;
+
+    /// The index of a parameter.
+    ///
+    /// # Errors
+    /// [`UnknownParameter`] if there is none of this name.
+    fn parameter_index(&self, name: &str) -> Result<usize, UnknownParameter> {
+        let names = self.parameter_names();
+        names.iter().position(|known| known == name).ok_or_else(|| UnknownParameter::new(name, names))
+    }
+
+    /// A function of the system for other values of the parameters; `None` where there is no such system.
+    fn with_parameters(&self, theta: &[f64], f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>) -> Option<Vec<f64>>;
+
+    /// The derivative of a switching function along an argument; `None` where it is not known.
+    fn switching_function_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<f64>;
+
+    /// The derivative of the `(q, v, z)` after a reset along an argument; `None` where it is not known.
+    fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components>;
 
     /// The tangent of steps that are compositions of sub-flows, with the derivatives of their system in parameters and time.
     ///
@@ -109,20 +140,21 @@ pub trait DifferentiableProblem<'a> {
 
 impl<'a, L: Parametric<N>, const N: usize> DifferentiableProblem<'a> for Problem<'a, L, N> {
     fn differentiable(&'a self) -> Differentiable<'a> {
-        let (problem, rest) = (self.of_system(), Rc::new(OfParametric(self.lagrangian)));
-        let by_slices = if const { L::HINTS.over_slices } {
-            let (system, rest) = (problem.system.clone(), rest.clone());
-            self.lagrangian.over_slices(BySlices { system, rest })
+        let problem = self.of_system();
+        let stages = if const { L::HINTS.over_slices } {
+            let by_slices = self.lagrangian.over_slices(BySlices(problem.system.clone()));
+            by_slices.unwrap_or_else(|| stages_of(&problem.system))
         } else {
-            None
+            Rc::new(OfParametric(self.lagrangian))
         };
-        Differentiable { problem, of: by_slices.unwrap_or(rest) }
+        Differentiable { problem, of: Rc::new(OfParametric(self.lagrangian)), stages }
     }
 }
 
 impl<'a> DifferentiableProblem<'a> for SystemProblem<'a> {
     fn differentiable(&'a self) -> Differentiable<'a> {
-        Differentiable { problem: self.clone(), of: view_of(&self.system) }
+        let of = Rc::new(OfSystem(self.system.clone()));
+        Differentiable { problem: self.clone(), of, stages: stages_of(&self.system) }
     }
 }
 
@@ -131,6 +163,7 @@ impl<'a> DifferentiableProblem<'a> for SystemProblem<'a> {
 pub struct Differentiable<'a> {
     pub(crate) problem: SystemProblem<'a>,
     pub(crate) of: Rc<dyn ParametricSystem<'a> + 'a>,
+    pub(crate) stages: Rc<dyn StageSystem<'a> + 'a>,
 }
 
 impl<'a> Differentiable<'a> {

@@ -56,7 +56,7 @@ impl<'a> StepTangent<'a> {
                 &problem.problem,
                 formula,
                 &steps.integrator,
-                problem.of.quantities(),
+                problem.stages.quantities(),
             )?)),
             None if info.constrained => {
                 Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })

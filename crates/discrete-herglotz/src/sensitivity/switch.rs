@@ -200,7 +200,7 @@ impl Switch<'_, '_> {
         let before = self.velocity_dependence()?;
         let to = replaced(problem.system().at_switch(self.index, t, &self.point(), self.rising));
         let to = to.ok_or_else(|| self.unknown("the state is not replaced there"))?;
-        let mut of = problem.of.quantities();
+        let mut of = problem.stages.quantities();
         let parameters = (0..of.count()).map(|k| of.at(Quantity::Parameter(k), t, &to).gradient.y).collect();
         let time = of.at(Quantity::Time, t, &to).gradient.y;
         Ok(ResetDerivatives { images, before, hessian: problem.system().hessian(t, &to), parameters, time })

@@ -81,7 +81,7 @@ impl Variable {
             if from_momentum {
                 return zero();
             }
-            problem.of.quantities().of_momentum(quantity, t0, (x, &state.p))
+            problem.stages.quantities().of_momentum(quantity, t0, (x, &state.p))
         };
         let [velocity, momentum] = ["velocity", "momentum"];
         Ok(match self {

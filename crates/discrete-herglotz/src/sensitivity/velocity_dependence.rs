@@ -28,7 +28,7 @@ impl VelocityDependence {
     /// [`StepError::Singular`] where `L_vv` is singular; [`StepError::NonFinite`] for a Hamiltonian that is not defined there.
     pub fn at(problem: &Differentiable<'_>, t: f64, x: &Point, p: &Vector) -> Result<Self, StepError> {
         let (system, n) = (problem.system(), problem.dimension());
-        let mut of = problem.of.quantities();
+        let mut of = problem.stages.quantities();
         let quantities = (0..of.count()).map(Quantity::Parameter);
         if problem.is_hamiltonian() {
             let state = State { q: x.q.clone(), p: p.clone(), z: x.z };

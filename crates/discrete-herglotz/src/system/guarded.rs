@@ -10,6 +10,11 @@ use contact_geom::{Hints, Structure};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
+/// The result of a user's code, or `none` where it panics.
+pub(crate) fn caught<R>(of: impl FnOnce() -> R, none: impl FnOnce() -> R) -> R {
+    catch_unwind(AssertUnwindSafe(of)).unwrap_or_else(|_| none())
+}
+
 /// A system of a user, by its value and its derivatives: where they have the wrong length, or the code panics, they are
 /// NaN, so that a run ends with a status.
 pub(crate) struct Guarded<'a> {
@@ -19,12 +24,12 @@ pub(crate) struct Guarded<'a> {
 
 impl<'a> Guarded<'a> {
     pub fn new(system: &'a (dyn System + 'a)) -> Self {
-        Guarded { system, n: catch_unwind(AssertUnwindSafe(|| system.dimension())).unwrap_or(0) }
+        Guarded { system, n: caught(|| system.dimension(), || 0) }
     }
 
     /// The result of the system's code, or `none` where it panics or the result is not of the system's size.
     fn checked<R>(&self, of: impl FnOnce() -> R, fits: impl FnOnce(&R) -> bool, none: impl FnOnce() -> R) -> R {
-        catch_unwind(AssertUnwindSafe(of)).ok().filter(fits).unwrap_or_else(none)
+        caught(|| Some(of()), || None).filter(fits).unwrap_or_else(none)
     }
 }
 
@@ -107,7 +112,11 @@ impl System for Guarded<'_> {
     }
     fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
         let first = values.len();
-        let filled = catch_unwind(AssertUnwindSafe(|| self.system.switching_functions(t, x, values))).is_ok();
+        let fill = |values: &mut Vec<f64>| {
+            self.system.switching_functions(t, x, values);
+            true
+        };
+        let filled = caught(|| fill(&mut *values), || false);
         if !filled || values.len() < first {
             values.resize(values.len().max(first), f64::NAN);
             values[first..].fill(f64::NAN);

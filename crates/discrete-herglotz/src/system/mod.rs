@@ -13,7 +13,7 @@ pub(crate) mod ridders;
 mod typed;
 mod vector;
 
-pub(crate) use guarded::Guarded;
+pub(crate) use guarded::{Guarded, caught};
 pub use kernels::Kernels;
 pub use points::{Components, Point, SecondDerivatives, State};
 

@@ -35,13 +35,4 @@ impl ExplicitDerivatives {
         let gradient = Components { x: none(), y: none(), z: f64::NAN };
         ExplicitDerivatives { l: f64::NAN, gradient, force: none() }
     }
-
-    /// Adds a multiple of other derivatives.
-    pub(crate) fn add(&mut self, factor: f64, other: &Self) {
-        self.l += factor * other.l;
-        self.gradient.x += &(&other.gradient.x * factor);
-        self.gradient.y += &(&other.gradient.y * factor);
-        self.gradient.z += factor * other.gradient.z;
-        self.force += &(&other.force * factor);
-    }
 }

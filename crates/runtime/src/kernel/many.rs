@@ -89,10 +89,10 @@ impl System for ManyCoordinates {
         self.0.breaks()
     }
     fn parameter_names(&self) -> Vec<String> {
-        self.0.parameters().map(|(name, _)| name.to_owned()).collect()
+        self.0.formula().parameters().map(|(name, _)| name.to_owned()).collect()
     }
     fn parameters(&self) -> Vec<f64> {
-        self.0.parameters().map(|(_, value)| value).collect()
+        self.0.formula().parameters().map(|(_, value)| value).collect()
     }
     fn with_parameters(&self, theta: &[f64]) -> Option<Rc<dyn System>> {
         Some(Rc::new(ManyCoordinates(Arc::new(self.0.with_parameters(theta)?))))
@@ -181,6 +181,18 @@ impl ManyCoordinates {
         let scales = motion.scales.as_ref().map(|scales| checked(self.0.formula(), "scales", scales)).transpose()?;
         Ok(requested(run, motion, scales))
     }
+
+    /// Calls a function with the run of a motion and its observer.
+    fn observed<R>(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+        work: impl FnOnce(Run<'_, '_>) -> Result<R, RuntimeError>,
+    ) -> Result<R, RuntimeError> {
+        let problem = self.problem(motion)?;
+        let mut recorder = Recorder::new(self, motion, monitor)?;
+        work(self.with_problem(&problem, motion)?.observe(&mut recorder))
+    }
 }
 
 /// Contact Gauss collocation.
@@ -233,11 +245,7 @@ impl Kernel for ManyCoordinates {
     }
 
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
-        let problem = self.problem(motion)?;
-        let mut no_monitor = ();
-        let mut recorder = Recorder::new(self, motion, &mut no_monitor)?;
-        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        plan_of(&run, motion, self.0.formula(), self.0.has_force())
+        self.observed(motion, &mut (), |run| plan_of(&run, motion, self.0.formula(), self.0.has_force()))
     }
 
     fn run(
@@ -246,10 +254,7 @@ impl Kernel for ManyCoordinates {
         monitor: &mut dyn RunMonitor,
         from: Option<ResumeState>,
     ) -> Result<Outcome, RuntimeError> {
-        let problem = self.problem(motion)?;
-        let mut recorder = Recorder::new(self, motion, monitor)?;
-        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        outcome_of(run, motion, from, self.0.formula().dimension())
+        self.observed(motion, monitor, |run| outcome_of(run, motion, from, self.0.formula().dimension()))
     }
 
     fn sensitivity(
@@ -259,11 +264,10 @@ impl Kernel for ManyCoordinates {
         times: &[f64],
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        let motion = &unobserved(motion);
-        let problem = self.problem(motion)?;
-        let mut recorder = Recorder::new(self, motion, monitor)?;
-        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        Ok(sensitivity_of(&run.tangent_at(variables, times, Until::Time(motion.end))?, self.dimension()))
+        let until = Until::Time(motion.end);
+        self.observed(&unobserved(motion), monitor, |run| {
+            Ok(sensitivity_of(&run.tangent_at(variables, times, until)?, self.dimension()))
+        })
     }
 
     fn gradient(
@@ -273,11 +277,10 @@ impl Kernel for ManyCoordinates {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
-        let motion = &unobserved(motion);
-        let problem = self.problem(motion)?;
-        let mut recorder = Recorder::new(self, motion, monitor)?;
-        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        Ok(loss_gradient(run.gradient_at(times, |states| loss(states), Until::Time(motion.end))?, self.dimension()))
+        let until = Until::Time(motion.end);
+        self.observed(&unobserved(motion), monitor, |run| {
+            Ok(loss_gradient(run.gradient_at(times, |states| loss(states), until)?, self.dimension()))
+        })
     }
 
     fn lyapunov_exponents(
@@ -285,12 +288,10 @@ impl Kernel for ManyCoordinates {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
-        let motion = &unobserved(motion);
-        let problem = self.problem(motion)?;
-        let mut recorder = Recorder::new(self, motion, monitor)?;
-        let run = self.with_problem(&problem, motion)?.observe(&mut recorder);
-        let found = run.lyapunov_exponents(Until::Time(motion.end))?;
-        Ok(exponents_of(found, self.0.proved(), self.0.has_force()))
+        let until = Until::Time(motion.end);
+        self.observed(&unobserved(motion), monitor, |run| {
+            Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), self.0.has_force()))
+        })
     }
 
     fn ensemble(&self, _ensemble: &Ensemble<'_>, _monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {

@@ -75,7 +75,7 @@ fn forces_kinks_and_resets_in_many_coordinates() {
     let bounce = Reset { when: "x", direction: Direction::Falling, then: &[("x'", "-0.8*x'")], rest: None };
     let struck = |formula: Formula, law: Impact| formula.with_impact("x", law, None).unwrap();
     type Change<'c> = &'c dyn Fn(Formula) -> Formula;
-    let cases: [(&str, Change<'_>); 7] = [
+    let cases: [(&str, Change<'_>); 8] = [
         ("x'^2/2 - x^2/2 - 0.1*z", &|f| forced(f, &[("x", "-0.2*x'*x'^2 + sin(t)")])),
         ("x'^2/2 - x^2/2 + abs(x)/4 - 0.1*z", &|f| f),
         ("x'^2/2*if(x < 0, 2, 1) - x^2/2", &|f| forced(f, &[("x", "-0.1*x'")])),
@@ -83,6 +83,7 @@ fn forces_kinks_and_resets_in_many_coordinates() {
         ("x'^2/2 - 9.81*x", &|f| f.with_reset(bounce).unwrap()),
         ("x'^2/2*(1 + x^2) - 9.81*x - 0.1*z", &|f| struck(f, Impact::Elastic)),
         ("x'^2/2 - 9.81*x - 0.1*z", &|f| struck(f, Impact::Restitution(0.9))),
+        ("x'^2/2 - 9.81*x - 0.1*z", &|f| struck(f, Impact::Conformal(0.8))),
     ];
     for (text, change) in cases {
         let of = |n: usize| {
@@ -107,44 +108,46 @@ fn forces_kinks_and_resets_in_many_coordinates() {
     }
 }
 
-/// The derivatives of a motion of seventeen coordinates, in starts and parameters, are differences of motions: to 1e-7,
-/// the round-off of the motions divided by the distance 1e-5, and its square times their third derivatives. The exponents
-/// have the sum that they have for any formula.
+/// The derivatives of motions of ten and of seventeen coordinates, with and without a force, in starts and parameters, are
+/// differences of motions: to 1e-7, the round-off of the motions divided by the distance 1e-5, and its square times their
+/// third derivatives. The exponents have the sum that they have for any formula.
 #[test]
 fn derivatives_in_many_coordinates() {
-    let text = "sum(i, 0, n-1, v[i]^2*(1 + q[i]^2/10) - k*q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 - z*k/5";
-    let formula =
-        Formula::parse(text, &["x[17]"], &[("k", 1.0)]).unwrap().with_forces(&[("x[3]", "-k*v[3] + t")]).unwrap();
-    let system = System::new(&formula).unwrap();
     let by = StepControl::Steps { by: AnyIntegrator::Gauss { stages: 4 }, steps: Steps::Count(20) };
-    let motion = |q2: f64| {
-        let (mut q, v) = (vec![0.5; 17], (0..17).map(|i| 0.1 * f64::from(i)).collect::<Vec<_>>());
+    let motion = |n: usize, q2: f64| {
+        let (mut q, v) = (vec![0.5; n], (0..n).map(|i| 0.1 * i as f64).collect::<Vec<_>>());
         q[2] += q2;
         Motion::new(Start::new(0.0, q, v, 0.0), 2.0, by)
     };
-    let found = system.sensitivity(&motion(0.0), &["x[2]", "k", "t0"], &[2.0], &mut ()).unwrap();
-    let loss = formula.expression("x[1]*x[3] + v[3]^2 + z*k").unwrap();
-    let gradient = system.end_gradient(&motion(0.0), &loss, &mut ()).unwrap().loss.unwrap().1;
-    let h = 1e-5;
-    let at = |q2: f64, k: f64| system.with_parameters(&[("k", k)]).unwrap().run(&motion(q2), &mut ()).unwrap();
-    let value = |end: &herglotz_runtime::Outcome, k: f64| {
-        let v = end.v.as_ref().unwrap();
-        end.q[1] * end.q[3] + v[3] * v[3] + end.z.unwrap() * k
-    };
-    for (column, slope, [before, after]) in
-        [(0, gradient.q[2], [(-h, 1.0), (h, 1.0)]), (1, gradient.parameters[0], [(0.0, 1.0 - h), (0.0, 1.0 + h)])]
-    {
-        let [a, b] = [before, after].map(|(q2, k)| (at(q2, k), k));
-        let of = &found.rows[0][column];
-        for i in 0..17 {
-            let expected = (b.0.q[i] - a.0.q[i]) / (2.0 * h);
-            assert!((of.q[i] - expected).abs() <= 1e-7 * (1.0 + expected.abs()), "{i}: {} and {expected}", of.q[i]);
+    let text = "sum(i, 0, n-1, v[i]^2*(1 + q[i]^2/10) - k*q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 - z*k/5";
+    for (n, forces) in [(10, &[][..]), (10, &[("x[3]", "-k*v[3] + t")]), (17, &[]), (17, &[("x[3]", "-k*v[3] + t")])] {
+        let formula = Formula::parse(text, &[&format!("x[{n}]")], &[("k", 1.0)]).unwrap();
+        let formula = if forces.is_empty() { formula } else { formula.with_forces(forces).unwrap() };
+        let system = System::new(&formula).unwrap();
+        let found = system.sensitivity(&motion(n, 0.0), &["x[2]", "k", "t0"], &[2.0], &mut ()).unwrap();
+        let loss = formula.expression("x[1]*x[3] + v[3]^2 + z*k").unwrap();
+        let gradient = system.end_gradient(&motion(n, 0.0), &loss, &mut ()).unwrap().loss.unwrap().1;
+        let h = 1e-5;
+        let at = |q2: f64, k: f64| system.with_parameters(&[("k", k)]).unwrap().run(&motion(n, q2), &mut ()).unwrap();
+        let value = |end: &herglotz_runtime::Outcome, k: f64| {
+            let v = end.v.as_ref().unwrap();
+            end.q[1] * end.q[3] + v[3] * v[3] + end.z.unwrap() * k
+        };
+        for (column, slope, [before, after]) in
+            [(0, gradient.q[2], [(-h, 1.0), (h, 1.0)]), (1, gradient.parameters[0], [(0.0, 1.0 - h), (0.0, 1.0 + h)])]
+        {
+            let [a, b] = [before, after].map(|(q2, k)| (at(q2, k), k));
+            let of = &found.rows[0][column];
+            for i in 0..n {
+                let expected = (b.0.q[i] - a.0.q[i]) / (2.0 * h);
+                assert!((of.q[i] - expected).abs() <= 1e-7 * (1.0 + expected.abs()), "{n}, {i}: {expected}");
+            }
+            let expected = (value(&b.0, b.1) - value(&a.0, a.1)) / (2.0 * h);
+            assert!((slope - expected).abs() <= 1e-7 * (1.0 + expected.abs()), "{n}: {slope} and {expected}");
         }
-        let expected = (value(&b.0, b.1) - value(&a.0, a.1)) / (2.0 * h);
-        assert!((slope - expected).abs() <= 1e-7 * (1.0 + expected.abs()), "{slope} and {expected}");
     }
     let free = System::parse("sum(i, 0, n-1, v[i]^2/2 + cos(q[i])) - z/5", &["x[17]"], &[]).unwrap();
-    let exponents = free.lyapunov_exponents(&motion(0.0), &mut ()).unwrap();
+    let exponents = free.lyapunov_exponents(&motion(17, 0.0), &mut ()).unwrap();
     assert_eq!(exponents.exponents.len(), 35);
     assert!(exponents.pairing_defect.unwrap() < 1e-11 && exponents.volume_defect.unwrap() < 1e-10, "{exponents:?}");
 }

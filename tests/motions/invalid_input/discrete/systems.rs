@@ -2,17 +2,20 @@
 
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
-use contact_geom::GeometryError;
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::{GeometryError, Scalar, ScalarSystem, Slopes};
+use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{
-    Components, GaussCollocation, InitialState, InputError, Outcome, Point, SecondDerivatives, State, Status, Steps,
-    System, SystemProblem, Until, Vector,
+    Components, GaussCollocation, InitialState, InputError, Kernels, Outcome, Point, SecondDerivatives, State, Status,
+    Steps, System, SystemProblem, Until, Vector,
 };
+use std::sync::Arc;
 
 pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["SystemProblem::new"], run: starts },
     InputTest { entries: &["SystemProblem::by", "SystemProblem::steps", "SystemProblem::accuracy"], run: runs },
     InputTest { entries: &["System::value", "System::gradient", "System::hessian"], run: faults },
+    InputTest { entries: &["Kernels::of"], run: kernels },
     InputTest { entries: &["State::check", "$name::new", "$name::fixed", "$name::is_finite"], run: states },
     InputTest { entries: &["Vector::dot", "Vector::component_div", "Vector::fixed"], run: vectors },
 ];
@@ -72,6 +75,61 @@ impl System for Pendulum {
             vz: line,
             zz: 0.0,
         }
+    }
+}
+
+/// The same pendulum without a fault, with kernels that have one from the start.
+struct WithKernels(Fault);
+
+impl System for WithKernels {
+    fn dimension(&self) -> usize {
+        1
+    }
+    fn value(&self, t: f64, x: &Point) -> f64 {
+        Pendulum(Fault::None, 0.0).value(t, x)
+    }
+    fn gradient(&self, t: f64, x: &Point) -> Components {
+        Pendulum(Fault::None, 0.0).gradient(t, x)
+    }
+    fn hessian(&self, t: f64, x: &Point) -> SecondDerivatives {
+        Pendulum(Fault::None, 0.0).hessian(t, x)
+    }
+    fn kernels(&self) -> Option<Kernels> {
+        Some(Kernels::of(Arc::new(FaultyKernels(self.0))))
+    }
+}
+
+struct FaultyKernels(Fault);
+
+impl FaultyKernels {
+    fn number<T: Scalar>(&self, x: T) -> T {
+        assert!(self.0 != Fault::Panics, "this panic is part of a test");
+        if self.0 == Fault::Nan { T::from(f64::NAN) } else { x }
+    }
+}
+
+impl ScalarSystem for FaultyKernels {
+    fn dimension(&self) -> usize {
+        if self.0 == Fault::Longer { 2 } else { 1 }
+    }
+    fn value<T: Scalar, const N: usize>(&self, _t: T, q: &[T], v: &[T], z: T) -> T {
+        self.number(v[0] * v[0] * 0.5 + q[0].cos() - z * 0.1)
+    }
+    fn with_gradient<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: Slopes<'_, T>) -> T {
+        (to.q[0], to.v[0], *to.z) = (self.number(-q[0].sin()), v[0], T::from(-0.1));
+        self.value::<T, N>(t, q, v, z)
+    }
+    fn force<T: Scalar, const N: usize>(&self, _t: T, q: &[T], to: &mut [T]) {
+        to[0] = self.number(-q[0].sin());
+    }
+    fn mass_matrix<T: Scalar, const N: usize>(&self, _t: T, _q: &[T], _v: &[T], _z: T, to: &mut [T]) {
+        to[0] = self.number(T::one());
+    }
+    fn second_derivatives<T: Scalar, const N: usize>(&self, _t: T, q: &[T], _v: &[T], _z: T, to: [&mut [T]; 6]) {
+        let [qq, qv, vv, qz, vz, zz] = to;
+        let zero = T::zero();
+        (qq[0], qv[0], vv[0]) = (self.number(-q[0].cos()), zero, T::one());
+        (qz[0], vz[0], zz[0]) = (zero, zero, zero);
     }
 }
 
@@ -178,6 +236,33 @@ fn faults(report: &mut Report) {
         let outcome = problem.accuracy(1e-6).run(Until::Time(2.0));
         report.check(outcome.is_err(), || format!("{fault:?} to an accuracy: {outcome:?}"));
     }
+}
+
+/// Kernels that panic, are undefined, or have another number of coordinates fail the first step; sound ones take the steps
+/// and have the derivatives of the same system without kernels, to round-off.
+fn kernels(report: &mut Report) {
+    let start = Point::new([0.3], [0.7], 0.2);
+    let (by, steps, until) = (GaussCollocation { stages: 3 }, Steps::Size(0.1), Until::Steps(5));
+    for fault in [Fault::Nan, Fault::Panics] {
+        let system = WithKernels(fault);
+        let problem = SystemProblem::new(&system, 0.0, start.clone()).unwrap();
+        let outcome = problem.by(by).steps(steps).run(until).unwrap();
+        let kept = matches!(outcome.status, Status::Failed { step: 0, .. }) && finite(&outcome);
+        report.check(kept, || format!("kernels, {fault:?}: {outcome:?}"));
+        let tangent = problem.by(by).steps(steps).tangent(&[Variable::Position(0)], until);
+        let failed = tangent.as_ref().map_or(true, |tangent| tangent.outcome.status != Status::Completed);
+        report.check(failed, || format!("derivatives of kernels, {fault:?}: {tangent:?}"));
+    }
+    let (sound, plain) = (WithKernels(Fault::None), Pendulum(Fault::None, 0.0));
+    let variables = [Variable::Position(0), Variable::Velocity(0), Variable::Action, Variable::StartTime];
+    let of = |system: &dyn System| {
+        let problem = SystemProblem::new(system, 0.0, start.clone()).unwrap();
+        problem.by(by).steps(steps).tangent(&variables, until).unwrap()
+    };
+    let (one, other) = (of(&sound), of(&plain));
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-13;
+    let same = one.columns.iter().zip(&other.columns).all(|(a, b)| near(a.q[0], b.q[0]) && near(a.z, b.z));
+    report.check(same && near(one.outcome.q[0], other.outcome.q[0]), || format!("{one:?} and {other:?}"));
 }
 
 fn states(report: &mut Report) {

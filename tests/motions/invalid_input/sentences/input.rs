@@ -303,7 +303,7 @@ fn selection_failures() {
             other => panic!("{other:?}"),
         }
     };
-    every!(SelectionFailure, "discrete-herglotz/src/error/mod.rs" {
+    every!(SelectionFailure, "discrete-herglotz/src/error/selection.rs" {
         SelectionFailure::RoundOff => failure(Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
         SelectionFailure::Chaos { .. } => failure(Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
         SelectionFailure::Order { .. } => failure(Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];

@@ -12,10 +12,12 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{MAX_STAGES, Stages, blocks};
+use crate::system::caught;
 use crate::{Point, System};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, vector};
-use contact_geom::{ScalarSystem, Slopes};
+use contact_geom::{
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, ScalarSystem, Slopes, VelocityPoint, vector,
+};
 use pulp::{Simd, WithSimd};
 
 /// The part of a defect sample that evaluates L.
@@ -35,7 +37,9 @@ impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
 impl SampleKernel for ByPoints<'_> {
     fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
         if let Some(kernels) = &self.kernels {
-            return kernels.sample_defect(arch, curve, transformed, set);
+            // An infinite defect is that of values that are not finite.
+            let undefined = || DefectSample { defect: f64::INFINITY, ..DefectSample::default() };
+            return caught(|| kernels.sample_defect(arch, curve, transformed, set), undefined);
         }
         let mut sample = Sample::of(arch, curve, set);
         sample.evaluate(&*self.system, curve);

@@ -5,8 +5,8 @@ use crate::gauss::routes::separable::{Iterated, IterationStart, Separable, Separ
 use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::{PointDerivatives, PointGradient, PointRef, SharedKernels, SystemAtPoints};
 use crate::numbers::instructions::Instructions;
-use crate::numbers::registers::Stages;
-use crate::system::AtState;
+use crate::numbers::registers::{MAX_STAGES, Stages};
+use crate::system::{AtState, caught};
 use crate::{Components, Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::DMatrix;
 use std::rc::Rc;
@@ -172,13 +172,14 @@ impl SystemAtPoints for ByPoints<'_> {
 impl SeparableKernel for ByPoints<'_> {
     fn iterate(&self, arch: Instructions, run: &mut Separable, start: IterationStart) -> Iterated {
         match &self.kernels {
-            Some(kernels) => kernels.iterate(arch, run, start),
+            Some(kernels) => caught(|| kernels.iterate(arch, &mut *run, start), Iterated::failed),
             None => Iterated::failed(),
         }
     }
 
     fn stage_values(&self, arch: Instructions, solved: CondensedStages<'_>) -> Stages {
-        self.kernels.as_ref().map_or(Stages::ZERO, |kernels| kernels.stage_values(arch, solved))
+        let undefined = || Stages([f64::NAN; MAX_STAGES]);
+        self.kernels.as_ref().map_or(Stages::ZERO, |kernels| caught(|| kernels.stage_values(arch, solved), undefined))
     }
 }
 

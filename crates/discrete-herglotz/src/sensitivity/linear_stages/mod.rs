@@ -170,6 +170,15 @@ impl Inhomogeneity {
             has_r: false,
         }
     }
+
+    /// Sets the sources to 0.
+    #[inline(always)]
+    pub fn forget_sources(&mut self) {
+        self.v_source.fill(Stages::ZERO);
+        self.p_source.fill(Stages::ZERO);
+        self.z_source = Stages::ZERO;
+        self.r_source = Stages::ZERO;
+    }
 }
 
 impl LinearStages {

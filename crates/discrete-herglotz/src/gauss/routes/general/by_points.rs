@@ -17,9 +17,9 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{StageMap, Stages, blocks};
+use crate::system::caught;
 use crate::{Point, System};
-use contact_geom::Scalar;
-use contact_geom::{ScalarSystem, Slopes};
+use contact_geom::{Scalar, ScalarSystem, Slopes};
 use pulp::{Simd, WithSimd};
 
 impl GeneralKernel for ByPoints<'_> {
@@ -31,7 +31,10 @@ impl GeneralKernel for ByPoints<'_> {
         general: &mut General,
     ) -> (IterationOutcome, FixedPointIteration) {
         match &self.kernels {
-            Some(kernels) => kernels.solve_general_stages(arch, t, given, general),
+            Some(kernels) => caught(
+                || kernels.solve_general_stages(arch, t, given, &mut *general),
+                || (IterationOutcome::NonFinite, FixedPointIteration::default()),
+            ),
             None => arch.dispatch(SolveStages { system: &*self.system, t, given, general }),
         }
     }
