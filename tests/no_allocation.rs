@@ -23,6 +23,7 @@ use contact_geom::{
     legendre,
 };
 use counting_allocator::{allocations, peak};
+use discrete_herglotz::ensemble::Lagrangians;
 use discrete_herglotz::{
     DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, StepperOptions, Steps, Until,
     boundary::{BoundaryPath, End},
@@ -228,7 +229,7 @@ fn corrections_of_paths() {
 fn steps_of_ensembles() {
     let pendulum = One::from(Pendulum { gamma: -0.01 });
     let start = |i: usize| VelocityPoint::new([0.01 * i as f64], [0.5], 0.0);
-    let of = |ensemble: Ensemble<'_, One, 1>, steps: usize| {
+    let of = |ensemble: Ensemble<'_, Lagrangians<'_, One, 1>>, steps: usize| {
         let ensemble = ensemble.steps(Steps::Count(steps)).threads(1);
         let mut completed = 0;
         let count =

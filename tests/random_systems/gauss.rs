@@ -10,7 +10,8 @@ use contact_geom::{
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, Event, Events, Start, Status, StepFailure, Stepper, Steps, Until, gauss::Gauss,
+    AnyIntegrator, Event, Events, RunSupport, Start, Status, StepDetails, StepFailure, Stepper, Steps, Until,
+    gauss::Gauss,
 };
 
 pub fn gauss<const N: usize>(problem: &Problem<N>, random: &mut RandomNumbers) -> Checked {

@@ -5,7 +5,7 @@ use super::random_numbers::RandomNumbers;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{ChartVector, PhasePoint, legendre};
 use discrete_herglotz::{
-    InputError, SplittingScheme, StepFailure, Stepper,
+    InputError, RunSupport, SplittingScheme, StepFailure,
     splitting::{ActionSplitting, Splitting},
 };
 
@@ -43,7 +43,7 @@ pub fn splitting<const N: usize>(problem: &Problem<N>, random: &mut RandomNumber
 
 /// Compares four steppers from one start: the first in one piece, the second in chunks, the third with compensated
 /// sums, the last without the action where the scheme has it.
-fn judge<S: Stepper, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
+fn judge<S: RunSupport, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
     let start = four[0].state().fixed::<N>();
     let all = four[0].advance(steps);
     let (mut taken, mut halted) = (0, Ok(()));

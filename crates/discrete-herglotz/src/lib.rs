@@ -73,7 +73,7 @@ pub use error::{InputError, SelectionFailure, StepError};
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
     DenseStep, INTERRUPTION, InitialState, Integrator, Interrupt, MethodInfo, Piece, PlanEntry, Problem, Reset,
-    SplittingScheme, Start, StepFailure, Stepper, StepperOptions, SystemProblem,
+    RunSupport, SplittingScheme, Start, StepDetails, StepFailure, Stepper, StepperOptions, SystemProblem,
 };
 pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]

@@ -1,7 +1,7 @@
 //! Runs one ensemble on all ranks of a communicator.
 
 use contact_geom::Lagrangian;
-use discrete_herglotz::ensemble::{EnsembleError, Member, Merge, ShardedEnsemble, Tally};
+use discrete_herglotz::ensemble::{EnsembleError, Lagrangians, Member, Merge, ShardedEnsemble, Tally};
 use discrete_herglotz::{Ensemble, Until};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
@@ -83,10 +83,10 @@ pub enum MpiError {
 /// A panic on a rank, in the fold or in a Lagrangian, ends all ranks.
 pub fn run<L: Lagrangian<N> + Sync, const N: usize>(
     world: &SimpleCommunicator,
-    ensemble: &Ensemble<'_, L, N>,
+    ensemble: &Ensemble<'_, Lagrangians<'_, L, N>>,
     until: Until,
     patience: Option<Duration>,
-    mut fold: impl FnMut(&Member<N>),
+    mut fold: impl FnMut(&Member),
 ) -> Result<Option<Merged>, MpiError> {
     let _guard = AbortOnPanic(world);
     let own = ensemble.in_shards(until);
@@ -112,10 +112,10 @@ pub fn run<L: Lagrangian<N> + Sync, const N: usize>(
 }
 
 /// Hands out and merges the shards that are missing, on rank 0. Worker 0 is a thread of it that computes.
-fn distribute<L: Lagrangian<N> + Sync, const N: usize>(
+fn distribute(
     world: &SimpleCommunicator,
-    sharded: &ShardedEnsemble<'_, '_, L, N>,
-    merge: Result<Merge<'_, '_, '_, L, N>, EnsembleError>,
+    sharded: &ShardedEnsemble<'_>,
+    merge: Result<Merge<'_, '_, '_>, EnsembleError>,
     patience: Option<Duration>,
 ) -> Result<Merged, MpiError> {
     let ranks = world.size() as usize;

@@ -208,7 +208,7 @@ impl Derived {
         let matrix = SMatrix::<T, N, N>::from_element(at.z);
         let vector = SVector::<T, N>::from_element(at.z);
         let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: vector, vz: vector, zz: at.z };
-        let [qq, qv, vv] = [&mut h.qq, &mut h.qv, &mut h.vv].map(|m| m.as_mut_slice());
+        let (qq, qv, vv) = (h.qq.as_mut_slice(), h.qv.as_mut_slice(), h.vv.as_mut_slice());
         let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
         self.second.evaluate::<T, N>(at, results);
         h

@@ -95,9 +95,11 @@ impl FormulaDerivatives {
         }
     }
 
-    /// Whether the forces are functions of time and positions with a [drag](contact_geom::ForceStructure::Drag).
-    pub fn force_is_drag(&self) -> bool {
-        matches!(self.derived.proved_force, ProvedForce::Drag { .. })
+    /// The coefficients, linear and quadratic, of the [drag](contact_geom::ForceStructure::Drag) of the velocity, if the
+    /// forces are functions of time and positions with such a drag.
+    pub fn force_drag(&self) -> Option<(Vec<f64>, f64)> {
+        let ProvedForce::Drag { linear, quadratic } = &self.derived.proved_force else { return None };
+        Some((linear.iter().map(|c| c.value).collect(), quadratic.value))
     }
 
     /// See [`FormulaLagrangian`](crate::FormulaLagrangian): the functions of kinks, then those of resets.

@@ -27,7 +27,7 @@ fn a_member_that_fails_has_its_error_and_the_others_continue() {
         };
         let ((tally, mixed), (_, plain)) = (all(&start), all(&good));
         assert_eq!((tally.completed, tally.failed, tally.first_failed), (37, 3, Some(3)), "{by:?}");
-        let Ok(failed) = mixed[3].ending else { unreachable!("{by:?}: {:?}", mixed[3]) };
+        let Ok(failed) = &mixed[3].ending else { unreachable!("{by:?}: {:?}", mixed[3]) };
         assert!(matches!(failed.status, Status::Failed { .. }), "{by:?}: {failed:?}");
         assert!(failed.t < 2.0 && failed.state.q[0].is_finite(), "{by:?}: {failed:?}");
         assert_eq!(mixed[20].ending, Err(InputError::Undefined), "{by:?}");
@@ -43,7 +43,7 @@ fn bad_input_is_refused_before_work_begins() {
     let pendulum = pendulum(-0.1);
     let by = SplittingScheme::STRANG;
     let of = |count: usize| Ensemble::new(&pendulum, 0.0, count, pendulum_start).by(by).steps(Steps::Count(4));
-    let fold = |_: &Member<1>| unreachable!("nothing is computed");
+    let fold = |_: &Member| unreachable!("nothing is computed");
     let until = Until::Time(1.0);
     assert!(matches!(of(0).run(until, fold), Err(EnsembleError::Empty)));
     assert!(matches!(of(1).threads(0).run(until, fold), Err(EnsembleError::Threads)));

@@ -10,7 +10,8 @@ use contact_geom::{
     numbers::{MaxAbsOrNan, MaxOrNan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, Crossing, Event, Events, InputError, Outcome, Problem, Status, StepError, Stepper, Steps, Until,
+    AnyIntegrator, Crossing, Event, Events, InputError, Outcome, Problem, Status, StepDetails, StepError, Stepper,
+    Steps, Until,
     gauss::{Gauss, GaussRoute},
 };
 

@@ -15,7 +15,7 @@ use contact_geom::{
     numbers::{MaxAbsOrNan, MaxOrNan},
 };
 use discrete_herglotz::{
-    DiscreteLagrangian, InputError, StepError, StepFailure, Stepper,
+    DiscreteLagrangian, InputError, StepDetails, StepError, StepFailure, Stepper,
     gauss::{Gauss, GaussRoute},
 };
 

@@ -9,7 +9,7 @@ use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Statement, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},
 };
-use discrete_herglotz::{DiscreteLagrangian, Stepper, gauss::Gauss, statements, theory::derived_jet};
+use discrete_herglotz::{DiscreteLagrangian, StepDetails, Stepper, gauss::Gauss, statements, theory::derived_jet};
 
 /// The stepper agrees with Newton's steps at random points of each system, and so does its `sigma_d`: to 1e-12, which
 /// is round-off times its growth in five steps of these motions.

@@ -7,7 +7,7 @@ use crate::lagrangians::{One, Two, one};
 use contact_examples::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{InputError, StepError, Stepper, gauss::Gauss};
+use discrete_herglotz::{InputError, RunSupport, StepError, Stepper, gauss::Gauss};
 
 /// Four particles in a line, every second bond stiff and all of them nonlinear.
 #[derive(Clone, Copy)]
@@ -188,7 +188,7 @@ fn unresolved_steps_are_flagged() {
         let (refused, unresolved) = flagged(1e-4, s);
         assert!(!refused && unresolved.is_none(), "s = {s}: {unresolved:?}");
     }
-    let unflagged = |mut stepper: Box<dyn Stepper + '_>, steps: usize| {
+    let unflagged = |mut stepper: Box<dyn RunSupport + '_>, steps: usize| {
         stepper.advance(steps).unwrap();
         assert_eq!(stepper.unresolved(), None);
     };

@@ -8,7 +8,7 @@ use contact_geom::{
     ContactHamiltonian, DiscretePoint, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityPoint,
 };
 use discrete_herglotz::{
-    AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, Stepper, StepperOptions, Steps, Until,
+    AnyIntegrator, Event, Events, Problem, SplittingScheme, Status, StepDetails, Stepper, StepperOptions, Steps, Until,
     gauss::{Gauss, GaussStepper},
     rules::{Composition, Flow, Method, Rule},
 };

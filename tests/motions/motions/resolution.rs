@@ -5,7 +5,7 @@ use contact_examples::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kep
 use contact_geom::nalgebra::SVector;
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
 use discrete_herglotz::{
-    DiscreteLagrangian, InputError, SplittingScheme, Stepper,
+    DiscreteLagrangian, InputError, RunSupport, SplittingScheme, Stepper,
     rules::{Composition, Flow, Rule},
     splitting::{ActionSplitting, Splitting, Strang},
 };
@@ -13,7 +13,7 @@ use discrete_herglotz::{
 type Outcome = Result<(), InputError>;
 
 /// Whether a run reports, by its status or as unresolved, that it is not reliable.
-fn is_reported(mut motion: impl Stepper, steps: usize) -> bool {
+fn is_reported(mut motion: impl RunSupport, steps: usize) -> bool {
     motion.advance(steps).is_err() || motion.unresolved().is_some()
 }
 
@@ -110,7 +110,7 @@ fn the_edge_of_stability_is_flagged() -> Outcome {
 }
 
 /// Runs a motion to its end, and asserts that no step is flagged.
-fn assert_not_flagged(name: &str, mut motion: impl Stepper, steps: usize) {
+fn assert_not_flagged(name: &str, mut motion: impl RunSupport, steps: usize) {
     assert_eq!(motion.advance(steps), Ok(()), "{name}");
     assert_eq!(motion.unresolved(), None, "{name}, until t = {}", motion.time());
 }

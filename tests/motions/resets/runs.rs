@@ -216,11 +216,11 @@ fn ensembles_have_impacts() {
         let ensemble = Problem::new(&ball, 0.0, starts[0]).unwrap().ensemble(starts.len(), |index| starts[index]);
         let mut ends = Vec::new();
         let members = ensemble.by(integrator).steps(Steps::Size(0.2));
-        members.run(Until::Time(6.0), |member| ends.push(member.ending.as_ref().unwrap().state)).unwrap();
+        members.run(Until::Time(6.0), |member| ends.push(member.ending.as_ref().unwrap().state.clone())).unwrap();
         for (start, end) in starts.iter().zip(ends) {
             let problem = Problem::new(&ball, 0.0, *start).unwrap();
             let single = problem.by(integrator).steps(Steps::Size(0.2)).run(Until::Time(6.0)).unwrap();
-            assert_eq!((end.q, end.p), (single.q.fixed(), single.p.fixed()), "{name}");
+            assert_eq!((end.q, end.p), (single.q, single.p), "{name}");
         }
     }
 }

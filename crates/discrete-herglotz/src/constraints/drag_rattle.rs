@@ -6,7 +6,7 @@ use super::{ConstrainedStart, Corrections, Progress};
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, SplittingScheme, State, StepError, StepFailure, Stepper};
+use crate::{InputError, RunSupport, SplittingScheme, State, StepError, StepFailure, Stepper};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
@@ -315,6 +315,16 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
         self.evaluations
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> RunSupport for DragRattle<L, C, N, M> {
     fn has_constant_rate(&self) -> bool {
         true
     }

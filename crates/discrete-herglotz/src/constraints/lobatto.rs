@@ -7,7 +7,7 @@ use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_s
 use crate::integration::check_unforced;
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
-use crate::{InputError, State, StepError, StepFailure, Stepper, Vector};
+use crate::{InputError, RunSupport, State, StepDetails, StepError, StepFailure, Stepper, Vector};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::MaxAbsOrNan;
@@ -457,10 +457,26 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
         self.evaluations
     }
 
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> StepDetails for ContactLobatto<L, C, N, M> {
     fn last_velocity(&self) -> Option<Vector> {
         Some(self.velocity.into())
     }
+}
 
+impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> RunSupport for ContactLobatto<L, C, N, M> {
     fn save(&self) -> Option<Vec<u64>> {
         Some(words_of(self))
     }

@@ -6,7 +6,10 @@ use super::start::{inverse_mass, round_off, tangent_velocity};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
 use crate::integration::check_unforced;
 use crate::numbers::state_words::{restored_from, saved, words_of};
-use crate::{DiscreteLagrangian, InputError, SplittingScheme, State, StepError, StepFailure, Stepper, Vector};
+use crate::{
+    DiscreteLagrangian, InputError, RunSupport, SplittingScheme, State, StepDetails, StepError, StepFailure, Stepper,
+    Vector,
+};
 use contact_geom::constraints::{Distribution, DistributionDerivatives};
 use contact_geom::nalgebra::SVector;
 use contact_geom::support::independent_rows;
@@ -288,10 +291,36 @@ where
         self.evaluations
     }
 
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L, W, D, const N: usize, const M: usize> StepDetails for Nonholonomic<L, W, D, N, M>
+where
+    L: Lagrangian<N>,
+    W: Distribution<N, M>,
+    D: DiscreteLagrangian<N>,
+{
     fn last_velocity(&self) -> Option<Vector> {
         Some(self.current.velocity.into())
     }
+}
 
+impl<L, W, D, const N: usize, const M: usize> RunSupport for Nonholonomic<L, W, D, N, M>
+where
+    L: Lagrangian<N>,
+    W: Distribution<N, M>,
+    D: DiscreteLagrangian<N>,
+{
     fn save(&self) -> Option<Vec<u64>> {
         Some(words_of(self))
     }

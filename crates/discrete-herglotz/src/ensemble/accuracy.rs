@@ -2,7 +2,8 @@
 
 use crate::GaussCollocation;
 use crate::ensemble::builder::Ensemble;
-use crate::ensemble::step_control::{MemberRun, StepControl};
+use crate::ensemble::members::Lagrangians;
+use crate::ensemble::step_control::{StepControl, TypedRun};
 use contact_geom::Lagrangian;
 
 /// The number of stages if no integrator is given.
@@ -14,7 +15,7 @@ const STAGES_FOR_SMALL_ERRORS: usize = 12;
 /// See [`STAGES_FOR_SMALL_ERRORS`].
 const SMALL_ERROR: f64 = 1e-10;
 
-impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+impl<L: Lagrangian<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'_, L, N>> {
     /// Requests an error of (q, p) at the end, relative to its size there. If no integrator is given, contact Gauss
     /// collocation is used, with 8 stages, or with 12 for errors below 1e-10.
     ///
@@ -26,13 +27,13 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// right. The cost is three times that of given steps.
     pub fn accuracy(self, wanted: f64) -> Self {
         fn within<'p, 'o, L: Lagrangian<N>, const N: usize>(
-            run: MemberRun<'p, 'o, L, N>,
+            run: TypedRun<'p, 'o, L, N>,
             wanted: f64,
-        ) -> MemberRun<'p, 'o, L, N> {
+        ) -> TypedRun<'p, 'o, L, N> {
             run.accuracy(wanted)
         }
         let stages = if wanted < SMALL_ERROR { STAGES_FOR_SMALL_ERRORS } else { DEFAULT_STAGES };
-        let of = if self.integrator.is_some() { self } else { self.by(GaussCollocation { stages }) };
-        Ensemble { length: Some(StepControl::Accuracy(wanted, within)), ..of }
+        let of = if self.members.integrator.is_some() { self } else { self.by(GaussCollocation { stages }) };
+        of.with_length(StepControl::Accuracy(wanted, within))
     }
 }

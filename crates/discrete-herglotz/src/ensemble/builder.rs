@@ -2,28 +2,16 @@
 
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
-use crate::ensemble::shards;
-use crate::ensemble::single::Common;
+use crate::ensemble::members::{Lagrangians, Members};
+use crate::ensemble::settings::Settings;
+use crate::ensemble::sharded::merge_in_order;
 use crate::ensemble::step_control::StepControl;
-use crate::ensemble::task::{MEMBERS_PER_SHARD, Task};
+use crate::ensemble::task::Task;
+#[cfg(test)]
 use crate::numbers::instructions::Instructions;
-use crate::run::rows;
-use crate::{InputError, Integrator, Interrupt, Problem, Rows, Start, Steps, Until};
+use crate::{Integrator, Interrupt, Problem, Start, Steps, Until};
 use contact_geom::Lagrangian;
-use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-
-/// The number of steps for which one is added to the largest number of the checked members: an eighth, since other
-/// members may need more. The few that need still more have a run of their own.
-const STEPS_PER_EXTRA_STEP: usize = 8;
-
-/// The largest number of members of an ensemble that get all checks of a run before it starts: errors that all members
-/// share, or that depend on the index, show in them, and the checks of all members would cost as much as their steps.
-const MAX_CHECKED_MEMBERS: usize = 4;
-
-/// The Lagrangian and the start of a member, as a function of its index.
-type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
 
 /// Many motions with one integrator and the same steps.
 ///
@@ -58,30 +46,16 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// let ensemble = Ensemble::new(&pendulum, 0.0, 1000, start).by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
 /// let mut farthest = 0.0f64;
 /// let tally = ensemble.run(Until::Time(10.0), |member| {
-///     if let Ok(ending) = member.ending {
+///     if let Ok(ending) = &member.ending {
 ///         farthest = farthest.max(ending.state.q[0]);
 ///     }
 /// })?;
 /// println!("{} of {} completed, farthest {farthest}", tally.completed, tally.members);
 /// # Ok::<(), discrete_herglotz::ensemble::EnsembleError>(())
 /// ```
-pub struct Ensemble<'a, L, const N: usize> {
-    pub(crate) members: MemberOf<'a, L, N>,
-    /// Whether all members have one Lagrangian.
-    pub(crate) shared: bool,
-    pub(crate) count: usize,
-    pub(crate) t0: f64,
-    pub(crate) integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
-    pub(crate) length: Option<StepControl<L, N>>,
-    pub(crate) action: bool,
-    /// The number of steps from one recorded row to the next.
-    pub(crate) rows: Option<usize>,
-    pub(crate) check_resolution: bool,
-    pub(crate) threads: Option<usize>,
-    pub(crate) instructions: Instructions,
-    pub(crate) checkpoint: Option<PathBuf>,
-    pub(crate) interrupt: Option<Interrupt<'a>>,
-    pub(crate) progress: Option<Box<dyn Fn(f64) + 'a>>,
+pub struct Ensemble<'a, M> {
+    pub(crate) members: M,
+    pub(crate) settings: Settings<'a>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
@@ -91,7 +65,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         &self,
         count: usize,
         start: impl Fn(usize) -> X + Sync + 'a,
-    ) -> Ensemble<'a, L, N>
+    ) -> Ensemble<'a, Lagrangians<'a, L, N>>
     where
         L: Sync,
     {
@@ -99,99 +73,94 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     }
 }
 
-impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+impl<'m, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'m, L, N>> {
     /// An ensemble of motions of one Lagrangian from the time `t0`; the start of each is a function of its index.
     pub fn new<X: Into<Start<N>>>(
-        lagrangian: &'a L,
+        lagrangian: &'m L,
         t0: f64,
         count: usize,
-        start: impl Fn(usize) -> X + Sync + 'a,
+        start: impl Fn(usize) -> X + Sync + 'm,
     ) -> Self {
         let members = move |index: usize| (lagrangian, start(index).into());
-        Ensemble { shared: true, ..Self::of(t0, count, members) }
+        let all = Self::of(t0, count, members);
+        Ensemble { settings: Settings { shared: true, ..all.settings }, ..all }
     }
 
     /// An ensemble of motions from the time `t0`: the Lagrangian and the start of each are functions of its index, as
     /// in a parameter study. Consecutive members with the same Lagrangian share registers.
-    pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'a L, X) + Sync + 'a) -> Self {
+    pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'m L, X) + Sync + 'm) -> Self {
         let members = move |index: usize| {
             let (lagrangian, start) = member(index);
             (lagrangian, start.into())
         };
-        Ensemble {
-            members: Box::new(members),
-            shared: false,
-            count,
-            t0,
-            integrator: None,
-            length: None,
-            action: true,
-            rows: None,
-            check_resolution: true,
-            threads: None,
-            instructions: Instructions::new(),
-            checkpoint: None,
-            interrupt: None,
-            progress: None,
-        }
+        let of = Box::new(members);
+        let members = Lagrangians { of, t0, integrator: None, length: None };
+        Ensemble { members, settings: Settings::new(count) }
     }
 
     /// Sets the integrator.
-    pub fn by(self, integrator: impl Integrator<'a, L, N> + Sync + 'a) -> Self {
-        Ensemble { integrator: Some(Box::new(integrator)), ..self }
+    pub fn by(self, integrator: impl Integrator<'m, L, N> + Sync + 'm) -> Self {
+        let members = Lagrangians { integrator: Some(Box::new(integrator)), ..self.members };
+        Ensemble { members, ..self }
     }
 
     /// Sets the size or the number of the steps.
     pub fn steps(self, steps: Steps) -> Self {
-        Ensemble { length: Some(StepControl::Given(steps)), ..self }
+        self.with_length(StepControl::Given(steps))
     }
 
+    pub(crate) fn with_length(self, length: StepControl<L, N>) -> Self {
+        Ensemble { members: Lagrangians { length: Some(length), ..self.members }, ..self }
+    }
+}
+
+impl<'a, M: Members> Ensemble<'a, M> {
     /// Sets the number of threads; the default is the number of processors.
     pub fn threads(self, threads: usize) -> Self {
-        Ensemble { threads: Some(threads), ..self }
+        Ensemble { settings: Settings { threads: Some(threads), ..self.settings }, ..self }
     }
 
     /// Omits the action: it is not computed if z does not act back on the motion.
     pub fn without_action(self) -> Self {
-        Ensemble { action: false, ..self }
+        Ensemble { settings: Settings { action: false, ..self.settings }, ..self }
     }
 
     /// Omits the check in lanes whether the steps resolve the motion. For steps that are known not to resolve it, each
     /// member would otherwise have a run of its own.
     pub fn without_resolution_check(self) -> Self {
-        Ensemble { check_resolution: false, ..self }
+        Ensemble { settings: Settings { check_resolution: false, ..self.settings }, ..self }
     }
 
     /// Records states of each member in its [rows](Member::rows): the start, the state after every `steps` steps, and
     /// the end, as [`Rows::every`] does. They are recorded in lanes too. Only the rows of members in progress are kept
     /// in memory: of eight shards of 384 members for each thread.
     pub fn rows_every(self, steps: usize) -> Self {
-        Ensemble { rows: Some(steps), ..self }
+        Ensemble { settings: Settings { rows: Some(steps), ..self.settings }, ..self }
     }
 
     /// Keeps a file of the completed shards. If the file exists, the ensemble is resumed: the fold is called again with
     /// the members of these shards, bitwise the same, and the others are computed. A process that is killed loses the
     /// shards in progress. Members that failed are run again to find the cause.
     pub fn checkpoint(self, path: impl Into<PathBuf>) -> Self {
-        Ensemble { checkpoint: Some(path.into()), ..self }
+        Ensemble { settings: Settings { checkpoint: Some(path.into()), ..self.settings }, ..self }
     }
 
     /// Sets a function that is called on the calling thread with the completed fraction of the members.
     pub fn progress(self, report: impl Fn(f64) + 'a) -> Self {
-        Ensemble { progress: Some(Box::new(report)), ..self }
+        Ensemble { settings: Settings { progress: Some(Box::new(report)), ..self.settings }, ..self }
     }
 
     /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
     /// that follow end at their current state, with [`Status::Stopped`](crate::Status::Stopped) by an [`INTERRUPTION`](crate::INTERRUPTION), or
     /// with [`InputError::Interrupted`] if they have not started.
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
-        Ensemble { interrupt: Some(interrupt), ..self }
+        Ensemble { settings: Settings { interrupt: Some(interrupt), ..self.settings }, ..self }
     }
 
     /// Restricts the run to these instructions.
     #[cfg(test)]
     pub(crate) fn only(self, instructions: Instructions) -> Self {
-        Ensemble { instructions, ..self }
+        Ensemble { settings: Settings { instructions, ..self.settings }, ..self }
     }
 
     /// Runs the ensemble, and calls the fold with each completed member, in the order of the index, on this thread.
@@ -201,105 +170,18 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// claim of structure that was found at some of them; a checkpoint of another ensemble, a damaged one, or one that
     /// cannot be written. If a single member cannot start, or its motion fails, the fold is called with the cause, and
     /// the other members continue.
-    pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
+    pub fn run(&self, until: Until, mut fold: impl FnMut(&Member)) -> Result<Tally, EnsembleError> {
         let sharded = self.in_shards(until)?;
-        let threads = self.some_threads()?;
-        let mut merge = self.merge(&sharded, &mut fold)?;
-        // Several processes may have left gaps in a checkpoint.
-        let missing = merge.missing();
-        let mut error = None;
-        shards::in_order(
-            threads,
-            missing.len(),
-            |i| (missing[i], sharded.task.shard(missing[i])),
-            |(index, shard)| match merge.add_shard(index, shard) {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(cause) => {
-                    error = Some(cause);
-                    ControlFlow::Break(())
-                }
-            },
-        );
-        error.map_or(Ok(merge.tally()), Err)
-    }
-
-    /// Reports how many of the shards are completed.
-    pub(crate) fn report_progress(&self, done: usize, shards: usize) {
-        if let Some(report) = &self.progress {
-            report(done as f64 / shards as f64);
-        }
-    }
-
-    /// The number of threads; at least one.
-    pub(crate) fn some_threads(&self) -> Result<usize, EnsembleError> {
-        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        match self.threads.unwrap_or_else(processors) {
-            0 => Err(EnsembleError::Threads),
-            threads => Ok(threads),
-        }
-    }
-
-    /// Members distributed over the ensemble, among them the first and the last.
-    pub(crate) fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
-        let (count, sample) = (self.count, self.count.min(MAX_CHECKED_MEMBERS));
-        (0..sample).map(move |i| i * (count - 1) / (sample - 1).max(1))
+        let threads = self.settings.some_threads()?;
+        merge_in_order(&mut self.merge(&sharded, &mut fold)?, &sharded, threads)
     }
 
     /// Checks the common input of all members, and all input of some of them.
-    pub(crate) fn task(&self, until: Until) -> Result<Task<'_, 'a, L, N>, EnsembleError> {
-        if self.count == 0 {
+    pub(crate) fn task(&self, until: Until) -> Result<Task<'_>, EnsembleError> {
+        if self.settings.count == 0 {
             return Err(EnsembleError::Empty);
         }
-        let refused = |cause| EnsembleError::Member { index: 0, cause };
-        let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
-        let Some(length) = self.length else { return Err(refused(InputError::NoSteps)) };
-        let common = Common { t0: self.t0, length, until, action: self.action, rows: self.rows };
-        if let Some(stride) = self.rows {
-            Rows::every(stride).map_err(refused)?;
-        }
-        let (mut planned, mut refused) = (None, None);
-        for index in self.sample() {
-            let (lagrangian, start) = (self.members)(index);
-            match common.plan(integrator, lagrangian, start, self.interrupt) {
-                Ok(plan) if planned.is_some_and(|(_, largest): (usize, (f64, usize))| plan.1 <= largest.1) => {}
-                Ok(plan) => planned = Some((index, plan)),
-                Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)) => {
-                    return Err(EnsembleError::Member { index, cause });
-                }
-                Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
-            }
-        }
-        let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
-        let refused = |cause| EnsembleError::Member { index, cause };
-        if length.requested_error().is_some() && integrator.batch_kernel().is_some() {
-            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(STEPS_PER_EXTRA_STEP)));
-            let (lagrangian, start) = (self.members)(index);
-            plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
-        }
-        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(MEMBERS_PER_SHARD))).map_err(refused)?;
-        let (members, count, instructions, check_resolution) = (
-            &*self.members,
-            self.count,
-            self.instructions,
-            self.check_resolution && length.requested_error().is_none(),
-        );
-        let mut task = Task {
-            members,
-            count,
-            instructions,
-            check_resolution,
-            integrator,
-            common,
-            plan,
-            interrupt: self.interrupt,
-            kernels: None,
-            fingerprint: 0,
-        };
-        task.fingerprint = task.fingerprint_of(self.sample());
-        if self.shared {
-            let (lagrangian, start) = members(index);
-            task.kernels = Some(task.kernels_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
-        }
-        Ok(task)
+        self.members.is_complete().map_err(|cause| EnsembleError::Member { index: 0, cause })?;
+        Task::checked(&self.members, &self.settings, until)
     }
 }

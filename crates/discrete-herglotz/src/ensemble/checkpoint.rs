@@ -5,9 +5,7 @@ use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard};
 use crate::numbers::state_words::digest;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep, Vector};
-use contact_geom::PhasePoint;
-use contact_geom::nalgebra::SVector;
+use crate::{CheckpointError, InputError, Row, State, Status, UnresolvedStep, Vector};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -112,15 +110,15 @@ impl Shards {
         Ok(())
     }
 
-    /// Reads a shard with this number of members, if the file has it.
-    pub fn read<const N: usize>(&mut self, shard: usize, members: usize) -> Result<Option<Shard<N>>, EnsembleError> {
+    /// Reads a shard with this number of members, in n coordinates, if the file has it.
+    pub fn read(&mut self, shard: usize, (members, n): (usize, usize)) -> Result<Option<Shard>, EnsembleError> {
         let Some((place, count)) = self.places.get(&shard).copied() else { return Ok(None) };
         let words = match self.file.seek(SeekFrom::Start(place)) {
             Ok(_) => self.words(count),
             Err(cause) => Err(cause.into()),
         };
         let words = words.map_err(|cause| self.error(cause))?;
-        match shard_of(&words) {
+        match shard_of(&words, n) {
             Some((found, of)) if found == shard && of.members.len() == members => Ok(Some(of)),
             _ => Err(self.error(CheckpointError::Damaged)),
         }
@@ -146,7 +144,7 @@ impl Shards {
     }
 
     /// Appends a shard.
-    pub fn write<const N: usize>(&mut self, shard: usize, of: &Shard<N>) -> Result<(), EnsembleError> {
+    pub fn write(&mut self, shard: usize, of: &Shard) -> Result<(), EnsembleError> {
         let mut words = words_of(shard, of);
         let (place, count) = (self.whole + 8, words.len());
         words.insert(0, count as u64);
@@ -157,26 +155,28 @@ impl Shards {
 }
 
 /// Encodes a shard as words, its number first. For a member that has not completed only this fact is encoded.
-pub(crate) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
+pub(crate) fn words_of(shard: usize, of: &Shard) -> Vec<u64> {
     let mut words = vec![shard as u64];
     of.batch_kernel.save(&mut words);
     of.members.len().save(&mut words);
     for member in &of.members {
-        let completed = member.ending.ok().filter(|ending| ending.status == Status::Completed);
+        let completed = member.ending.as_ref().ok().filter(|ending| ending.status == Status::Completed);
         completed.is_some().save(&mut words);
         if let Some(Ending { unresolved, steps, t, state, .. }) = completed {
             save_option(unresolved.as_ref(), &mut words);
             steps.save(&mut words);
             t.save(&mut words);
-            state.save(&mut words);
+            state.q.save(&mut words);
+            state.p.save(&mut words);
+            state.z.save(&mut words);
             save_rows(&member.rows, &mut words);
         }
     }
     words
 }
 
-/// Decodes a shard and its number from words; members that have not completed are run again by [`Task`](super::Task).
-pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
+/// Decodes a shard in n coordinates and its number from words; members that have not completed are run again by [`Task`](super::Task).
+pub(crate) fn shard_of(mut from: &[u64], n: usize) -> Option<(usize, Shard)> {
     let from = &mut from;
     let (mut shard, mut batch_kernel, mut count) = (0usize, 0, 0);
     shard.load(from)?;
@@ -193,11 +193,13 @@ pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard
         let ending = if completed {
             let unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
             let (mut steps, mut t) = (0, 0.0);
-            let mut state = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
+            let mut state = State { q: Vector::zeros(n), p: Vector::zeros(n), z: 0.0 };
             steps.load(from)?;
             t.load(from)?;
-            state.load(from)?;
-            rows = load_rows::<N>(from)?;
+            state.q.load(from)?;
+            state.p.load(from)?;
+            state.z.load(from)?;
+            rows = load_rows(from, n)?;
             Ok(Ending { status: Status::Completed, unresolved, steps, t, state })
         } else {
             Err(InputError::NoSteps)
@@ -217,13 +219,13 @@ fn save_rows(rows: &[Row], to: &mut Vec<u64>) {
     }
 }
 
-fn load_rows<const N: usize>(from: &mut &[u64]) -> Option<Vec<Row>> {
+fn load_rows(from: &mut &[u64], n: usize) -> Option<Vec<Row>> {
     let mut count = 0;
     count.load(from)?;
     // A row has at least one word.
     let mut rows = Vec::with_capacity(from.len().min(count));
     for _ in 0..count {
-        let (mut t, mut q, mut p) = (0.0, Vector::zeros(N), Vector::zeros(N));
+        let (mut t, mut q, mut p) = (0.0, Vector::zeros(n), Vector::zeros(n));
         t.load(from)?;
         q.load(from)?;
         p.load(from)?;

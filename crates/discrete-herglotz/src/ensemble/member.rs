@@ -1,22 +1,21 @@
 //! The result of a member of an ensemble.
 
-use crate::{InputError, Outcome, Row, Status, UnresolvedStep};
-use contact_geom::PhasePoint;
+use crate::{InputError, Outcome, Row, State, Status, UnresolvedStep};
 
 /// One motion of an ensemble, with its result.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Member<const N: usize> {
+pub struct Member {
     /// The index of the member, counted from 0.
     pub index: usize,
     /// The result of the motion; an error if it could not start, as in a single run.
-    pub ending: Result<Ending<N>, InputError>,
+    pub ending: Result<Ending, InputError>,
     /// The recorded states, if [rows](crate::Ensemble::rows_every) are requested.
     pub rows: Vec<Row>,
 }
 
 /// The result of the motion of a member: the final state, or the last state that was computed if the run ended early.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ending<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
     /// How the run ended.
     pub status: Status,
     /// The first unresolved step that was detected, if steps were monitored.
@@ -26,13 +25,13 @@ pub struct Ending<const N: usize> {
     /// The final time.
     pub t: f64,
     /// The state `(q, p, z)`; z is the initial action if the action was not requested.
-    pub state: PhasePoint<N>,
+    pub state: State,
 }
 
-impl<const N: usize> From<Outcome> for Ending<N> {
+impl From<Outcome> for Ending {
     fn from(outcome: Outcome) -> Self {
         let Outcome { status, unresolved, steps, t, .. } = outcome;
-        Ending { status, unresolved, steps, t, state: outcome.state().fixed() }
+        Ending { status, unresolved, steps, t, state: outcome.state() }
     }
 }
 
@@ -56,10 +55,10 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub(crate) fn add<const N: usize>(&mut self, member: &Member<N>) {
+    pub(crate) fn add(&mut self, member: &Member) {
         self.members += 1;
-        self.unresolved += usize::from(member.ending.is_ok_and(|ending| ending.unresolved.is_some()));
-        match member.ending.map(|ending| ending.status) {
+        self.unresolved += usize::from(member.ending.as_ref().is_ok_and(|ending| ending.unresolved.is_some()));
+        match member.ending.as_ref().map(|ending| ending.status) {
             Ok(Status::Completed) => self.completed += 1,
             Ok(Status::Stopped { .. }) => self.stopped += 1,
             _ => {

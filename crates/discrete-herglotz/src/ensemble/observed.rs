@@ -3,9 +3,9 @@
 use crate::ensemble::builder::Ensemble;
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
+use crate::ensemble::members::Members;
 use crate::ensemble::shards;
 use crate::{InputError, Observer, Until};
-use contact_geom::Lagrangian;
 use std::ops::ControlFlow;
 
 /// The number of members that are computed and handed on together: fewer than in lanes, since a member with an observer
@@ -29,20 +29,20 @@ const MEMBERS_PER_OBSERVED_SHARD: usize = 16;
 /// ensemble.observe(downward, times).run(Until::Time(10.0), |member, times| println!("{}: {times:?}", member.index))?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct ObservedEnsemble<'a, L, F, T, const N: usize> {
-    of: Ensemble<'a, L, N>,
+pub struct ObservedEnsemble<'a, M, F, T> {
+    of: Ensemble<'a, M>,
     observer: F,
     extract: T,
 }
 
-impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+impl<'a, M: Members> Ensemble<'a, M> {
     /// Adds an [`Observer`] for each member, a function of its index. `extract` returns a result from the observer at
     /// the end of the run, which is passed to the fold; the observer itself stays on the thread of the run.
     ///
     /// Each member has a run of its own, distributed over the threads, since observers may request quantities of a run
     /// (the velocity, the energy, the last step with dense output) that lanes do not have. To record states after a
     /// number of steps in lanes, use [`rows_every`](Self::rows_every).
-    pub fn observe<O: Observer, S: Send, F, T>(self, observer: F, extract: T) -> ObservedEnsemble<'a, L, F, T, N>
+    pub fn observe<O: Observer, S: Send, F, T>(self, observer: F, extract: T) -> ObservedEnsemble<'a, M, F, T>
     where
         F: Fn(usize) -> Result<O, InputError> + Sync,
         T: Fn(O) -> S + Sync,
@@ -51,7 +51,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     }
 }
 
-impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T, N> {
+impl<M: Members, F, T> ObservedEnsemble<'_, M, F, T> {
     /// Runs the ensemble, and calls the fold with each completed member and the result of its observer, in the order of
     /// the index, on this thread. The result is `None` if the member could not start.
     ///
@@ -61,21 +61,21 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
     pub fn run<O: Observer, S: Send>(
         &self,
         until: Until,
-        mut fold: impl FnMut(&Member<N>, Option<S>),
+        mut fold: impl FnMut(&Member, Option<S>),
     ) -> Result<Tally, EnsembleError>
     where
         F: Fn(usize) -> Result<O, InputError> + Sync,
         T: Fn(O) -> S + Sync,
     {
-        if self.of.checkpoint.is_some() {
+        if self.of.settings.checkpoint.is_some() {
             return Err(EnsembleError::Observed);
         }
-        let threads = self.of.some_threads()?;
+        let threads = self.of.settings.some_threads()?;
         let task = self.of.task(until)?;
-        let count = self.of.count;
+        let count = self.of.settings.count;
         let shards = count.div_ceil(MEMBERS_PER_OBSERVED_SHARD);
         let (observer, extract) = (&self.observer, &self.extract);
-        let work = |shard: usize| -> Vec<(Member<N>, Option<S>)> {
+        let work = |shard: usize| -> Vec<(Member, Option<S>)> {
             let range = shard * MEMBERS_PER_OBSERVED_SHARD..count.min((shard + 1) * MEMBERS_PER_OBSERVED_SHARD);
             let member = |index: usize| match observer(index) {
                 Err(cause) => (Member { index, ending: Err(cause), rows: Vec::new() }, None),
@@ -95,7 +95,7 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
                 fold(&member, result);
             }
             done += 1;
-            self.of.report_progress(done, shards);
+            self.of.settings.report_progress(done, shards);
             ControlFlow::Continue(())
         });
         Ok(tally)

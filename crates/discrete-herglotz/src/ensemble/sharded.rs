@@ -5,9 +5,11 @@ use crate::ensemble::builder::Ensemble;
 use crate::ensemble::checkpoint::{self, Shards};
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
-use crate::ensemble::shards::MAX_SHARDS_PER_THREAD;
+use crate::ensemble::members::Members;
+use crate::ensemble::settings::Settings;
+use crate::ensemble::shards::{self, MAX_SHARDS_PER_THREAD};
 use crate::ensemble::task::{MEMBERS_PER_SHARD, Shard, Task};
-use contact_geom::Lagrangian;
+use std::ops::ControlFlow;
 
 /// An [`Ensemble`] after its checks, in shards of a few hundred members that are computed, sent and saved together.
 ///
@@ -25,7 +27,7 @@ use contact_geom::Lagrangian;
 /// let ensemble = Ensemble::new(&pendulum, 0.0, 1000, start).by(SplittingScheme::STRANG).steps(Steps::Size(0.25));
 /// let sharded = ensemble.in_shards(Until::Time(10.0))?;
 /// let mut indices = Vec::new();
-/// let mut fold = |member: &Member<1>| indices.push(member.index);
+/// let mut fold = |member: &Member| indices.push(member.index);
 /// let mut merge = ensemble.merge(&sharded, &mut fold)?;
 /// for shard in merge.missing().into_iter().rev() {
 ///     merge.add(&sharded.compute(shard))?; // Computed by any process.
@@ -33,16 +35,16 @@ use contact_geom::Lagrangian;
 /// assert!(indices.iter().copied().eq(0..1000));
 /// # Ok::<(), discrete_herglotz::ensemble::EnsembleError>(())
 /// ```
-pub struct ShardedEnsemble<'e, 'a, L, const N: usize> {
-    pub(crate) task: Task<'e, 'a, L, N>,
+pub struct ShardedEnsemble<'e> {
+    pub(crate) task: Task<'e>,
 }
 
-impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+impl<'a, M: Members> Ensemble<'a, M> {
     /// The shards of the ensemble, to be computed by several processes. [`Ensemble::threads`] is ignored.
     ///
     /// # Errors
     /// Those of [`Ensemble::run`] before the computation starts.
-    pub fn in_shards(&self, until: Until) -> Result<ShardedEnsemble<'_, 'a, L, N>, EnsembleError> {
+    pub fn in_shards(&self, until: Until) -> Result<ShardedEnsemble<'_>, EnsembleError> {
         Ok(ShardedEnsemble { task: self.task(until)? })
     }
 
@@ -53,19 +55,19 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// [`EnsembleError`] if the checkpoint belongs to another ensemble, is damaged, or cannot be read or written.
     pub fn merge<'s, 'e>(
         &'s self,
-        sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
-        fold: &'s mut dyn FnMut(&Member<N>),
-    ) -> Result<Merge<'s, 'e, 'a, L, N>, EnsembleError> {
+        sharded: &'s ShardedEnsemble<'e>,
+        fold: &'s mut dyn FnMut(&Member),
+    ) -> Result<Merge<'s, 'e, 'a>, EnsembleError> {
         let open = |path| Shards::open(path, sharded.fingerprint(), sharded.count());
-        let file = self.checkpoint.as_deref().map(open).transpose()?;
+        let file = self.settings.checkpoint.as_deref().map(open).transpose()?;
         let (waiting, tally) = (Vec::new(), Tally::default());
-        let mut merge = Merge { ensemble: self, sharded, fold, file, waiting, merged: 0, tally };
+        let mut merge = Merge { settings: &self.settings, sharded, fold, file, waiting, merged: 0, tally };
         merge.merge_waiting()?;
         Ok(merge)
     }
 }
 
-impl<L: Lagrangian<N> + Sync, const N: usize> ShardedEnsemble<'_, '_, L, N> {
+impl ShardedEnsemble<'_> {
     /// A digest that identifies the ensemble, the same in all processes that create the same one. It depends on the
     /// integrator, the steps, the number of members, and the starts and Lagrangians of some members.
     pub fn fingerprint(&self) -> u64 {
@@ -85,19 +87,19 @@ impl<L: Lagrangian<N> + Sync, const N: usize> ShardedEnsemble<'_, '_, L, N> {
 }
 
 /// Merges shards of an ensemble in the order of their members, whatever the order in which they arrive.
-pub struct Merge<'s, 'e, 'a, L, const N: usize> {
-    ensemble: &'s Ensemble<'a, L, N>,
-    sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
-    fold: &'s mut (dyn FnMut(&Member<N>) + 's),
+pub struct Merge<'s, 'e, 'a> {
+    settings: &'s Settings<'a>,
+    sharded: &'s ShardedEnsemble<'e>,
+    fold: &'s mut (dyn FnMut(&Member) + 's),
     file: Option<Shards>,
     /// The shards that arrived before their turn; only if there is no file from which they can be read.
-    waiting: Vec<(usize, Shard<N>)>,
+    waiting: Vec<(usize, Shard)>,
     /// The number of shards whose members have been passed to the fold: all shards before this one.
     merged: usize,
     tally: Tally,
 }
 
-impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
+impl Merge<'_, '_, '_> {
     /// The shards that have neither arrived nor are in the checkpoint, in order.
     pub fn missing(&self) -> Vec<usize> {
         (self.merged..self.sharded.count()).filter(|shard| !self.has(*shard)).collect()
@@ -130,7 +132,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     /// [`EnsembleError`]: the words are not a shard of this ensemble, or the checkpoint cannot be written or read.
     pub fn add(&mut self, words: &[u64]) -> Result<(), EnsembleError> {
         let expected = |shard: usize| self.sharded.task.members_of(shard).len();
-        match checkpoint::shard_of(words) {
+        match checkpoint::shard_of(words, self.sharded.task.members.dimension()) {
             Some((index, shard)) if index < self.sharded.count() && shard.members.len() == expected(index) => {
                 self.add_shard(index, shard)
             }
@@ -138,7 +140,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         }
     }
 
-    pub(crate) fn add_shard(&mut self, index: usize, shard: Shard<N>) -> Result<(), EnsembleError> {
+    pub(crate) fn add_shard(&mut self, index: usize, shard: Shard) -> Result<(), EnsembleError> {
         if self.has(index) {
             return Ok(());
         }
@@ -159,7 +161,10 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     fn merge_waiting(&mut self) -> Result<(), EnsembleError> {
         loop {
             let next = match &mut self.file {
-                Some(file) => file.read(self.merged, self.sharded.task.members_of(self.merged).len())?,
+                Some(file) => {
+                    let task = &self.sharded.task;
+                    file.read(self.merged, (task.members_of(self.merged).len(), task.members.dimension()))?
+                }
                 None => {
                     let place = self.waiting.iter().position(|(index, _)| *index == self.merged);
                     place.map(|place| self.waiting.swap_remove(place).1)
@@ -170,7 +175,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         }
     }
 
-    fn merge_next(&mut self, mut shard: Shard<N>) {
+    fn merge_next(&mut self, mut shard: Shard) {
         if !shard.with_causes {
             self.sharded.task.run_again(&mut shard);
         }
@@ -180,6 +185,30 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
             (self.fold)(member);
         }
         self.merged += 1;
-        self.ensemble.report_progress(self.merged, self.sharded.count());
+        self.settings.report_progress(self.merged, self.sharded.count());
     }
+}
+
+/// Computes the missing shards on several threads, and merges them in their order.
+pub(crate) fn merge_in_order(
+    merge: &mut Merge<'_, '_, '_>,
+    sharded: &ShardedEnsemble<'_>,
+    threads: usize,
+) -> Result<Tally, EnsembleError> {
+    // Several processes may have left gaps in a checkpoint.
+    let missing = merge.missing();
+    let mut error = None;
+    shards::in_order(
+        threads,
+        missing.len(),
+        |i| (missing[i], sharded.task.shard(missing[i])),
+        |(index, shard)| match merge.add_shard(index, shard) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(cause) => {
+                error = Some(cause);
+                ControlFlow::Break(())
+            }
+        },
+    );
+    error.map_or(Ok(merge.tally()), Err)
 }

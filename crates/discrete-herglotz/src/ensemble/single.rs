@@ -1,11 +1,11 @@
 //! The run of a single member.
 
 use crate::ensemble::member::{Ending, Member};
-use crate::ensemble::step_control::{MemberRun, StepControl};
+use crate::ensemble::members::Members;
 use crate::run::Interruption;
 use crate::{
-    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Start, StepError, Stepper,
-    StepperOptions, Until,
+    InputError, Integrator, Interrupt, MethodInfo, Observer, Outcome, Plan, Problem, Rows, StepError, Stepper,
+    StepperOptions, Steps, Until,
     integration::{BatchKernel, StepFormula},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -76,67 +76,52 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 }
 
 /// The settings that all members have in common.
-pub(crate) struct Common<L, const N: usize> {
+#[derive(Clone, Copy)]
+pub(crate) struct Common {
     pub t0: f64,
-    pub length: StepControl<L, N>,
     pub until: Until,
     pub action: bool,
     /// The number of steps from one recorded row to the next.
     pub rows: Option<usize>,
 }
 
-impl<L, const N: usize> Clone for Common<L, N> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<L, const N: usize> Copy for Common<L, N> {}
-
-impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
-    /// Calls a function with the run of a member.
-    pub fn with<'a, R, E: From<InputError>>(
-        &self,
-        integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
-        lagrangian: &'a L,
-        start: Start<N>,
-        interrupt: Option<Interrupt<'a>>,
-        then: impl FnOnce(MemberRun<'_, '_, L, N>) -> Result<R, E>,
-    ) -> Result<R, E> {
-        let problem = Problem { interrupt, ..Problem::new(lagrangian, self.t0, start)? };
-        let run = self.length.of(problem.by(OfMember { integrator, lagrangian }));
-        then(if self.action { run } else { run.without_action() })
-    }
-
+impl Common {
     /// Runs a member with all checks of a run, and with an observer if there is one.
-    pub fn run<'a>(
+    pub fn run(
         &self,
-        integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
-        lagrangian: &'a L,
-        (index, start): (usize, Start<N>),
-        observer: Option<&mut impl Observer>,
-        interrupt: Option<Interrupt<'a>>,
-    ) -> Member<N> {
-        let (mut rows, mut asking) = (Vec::new(), interrupt.map(Interruption));
-        let outcome = self.with(integrator, lagrangian, start, interrupt, |run| {
+        members: &dyn Members,
+        index: usize,
+        mut observer: Option<&mut impl Observer>,
+        interrupt: Option<Interrupt<'_>>,
+    ) -> Member {
+        let mut rows = Vec::new();
+        let mut outcome: Result<Outcome, InputError> = Err(InputError::NoSteps);
+        let started = members.with_run(index, (None, interrupt), &mut |run| {
+            let run = if self.action { run } else { run.without_action() };
+            let mut asking = interrupt.map(Interruption);
             let run = match &mut asking {
                 Some(asking) => run.observe(asking),
                 None => run,
             };
-            let recorded = self.rows.map(Rows::every).transpose()?;
+            let recorded = match self.rows.map(Rows::every).transpose() {
+                Ok(recorded) => recorded,
+                Err(cause) => {
+                    outcome = Err(cause);
+                    return;
+                }
+            };
             let mut recorded = recorded.map(|rows| if self.action { rows } else { rows.without_action() });
-            let run = match observer {
+            let run = match observer.as_deref_mut() {
                 Some(observer) => run.observe(observer),
                 None => run,
             };
-            let outcome = match &mut recorded {
+            outcome = match &mut recorded {
                 Some(rows) => run.observe(rows).run(self.until),
                 None => run.run(self.until),
             };
             rows = recorded.map_or_else(Vec::new, |recorded| recorded.rows);
-            outcome
         });
-        Member { index, ending: outcome.map(Ending::from), rows }
+        Member { index, ending: started.and(outcome).map(Ending::from), rows }
     }
 
     /// The number of rows for a number of steps, if they are recorded: the start, every stride, and the end.
@@ -144,17 +129,19 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
-    /// The step size and the number of steps of the run of a member, after all checks of a plan.
-    pub fn plan<'a>(
+    /// The step size and the number of steps of the run of a member, with its own steps or these, after all checks of a
+    /// plan.
+    pub fn plan(
         &self,
-        integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
-        lagrangian: &'a L,
-        start: Start<N>,
-        interrupt: Option<Interrupt<'a>>,
+        members: &dyn Members,
+        index: usize,
+        settings: (Option<Steps>, Option<Interrupt<'_>>),
     ) -> Result<(f64, usize), InputError> {
-        self.with(integrator, lagrangian, start, interrupt, |run| {
-            let plan: Plan<'_> = run.plan(self.until)?;
-            Ok((plan.step_size(), plan.count()))
-        })
+        let mut planned = Err(InputError::NoSteps);
+        members.with_run(index, settings, &mut |run| {
+            let run = if self.action { run } else { run.without_action() };
+            planned = run.plan(self.until).map(|plan: Plan<'_>| (plan.step_size(), plan.count()));
+        })?;
+        planned
     }
 }

@@ -1,6 +1,7 @@
 //! Splittings for many motions in SIMD lanes.
 
 use crate::ensemble::lane::{Lane, LaneOptions, interrupt};
+use crate::ensemble::members::LaneKernel;
 use crate::integration::interrupt::STEPS_BETWEEN_QUERIES;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
@@ -8,7 +9,7 @@ use crate::resolution::thresholds::{DRIFT_MARGIN_IN_LANES, POSITION_ROUND_OFF};
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, Interrupt, SplittingScheme};
+use crate::{InputError, Interrupt, SplittingScheme, State, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, vector};
 use pulp::{Simd, WithSimd};
@@ -74,15 +75,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let check = DriftCheck::new(&table);
         Ok(SplittingPacks { form, drag, table, check, h, t0, steps, interrupt: None })
     }
+}
 
+impl<L: Lagrangian<N> + Sync, const N: usize> LaneKernel for SplittingPacks<'_, L, N> {
     /// Whether a single run would use compensated sums for a motion.
-    pub fn is_tiny(&self, state: &PhasePoint<N>) -> bool {
-        self.form.has_tiny_steps(self.h, state, &self.form.force(self.t0, &state.q, state.z))
+    fn needs_single_run(&self, state: &State) -> bool {
+        let state: PhasePoint<N> = state.fixed();
+        self.form.has_tiny_steps(self.h, &state, &self.form.force(self.t0, &state.q, state.z))
     }
 
     /// Takes all steps of some motions in place, and records a state after every `rows` steps. If a motion is not
     /// finite at its start or at its end, its final state is not finite.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
+    fn run(&self, instructions: Instructions, lanes: &mut [Lane], action: bool, options: LaneOptions) {
         let stride = options.rows.unwrap_or(self.steps);
         match (action, options.check_resolution) {
             (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
@@ -100,7 +104,7 @@ const PACKS_IN_FLIGHT: usize = 4;
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool, const CHECKED: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
-    lanes: &'s mut [Lane<N>],
+    lanes: &'s mut [Lane],
     /// The number of steps from one recorded state to the next.
     stride: usize,
 }
@@ -141,8 +145,8 @@ struct Pack<S: Simd, const K: usize, const N: usize> {
 impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
     /// The pack of some motions; lanes beyond the last motion repeat it. Not inlined: it is called once for many steps.
     #[inline(never)]
-    fn from_lanes(members: &[Lane<N>]) -> Self {
-        let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
+    fn from_lanes(members: &[Lane]) -> Self {
+        let of = |f: &dyn Fn(&State) -> f64| {
             SimdBatch::from_lanes(|i| members.get(i).or(members.last()).map_or(0.0, |lane| f(&lane.state)))
         };
         let (q, p) = (SVector::from_fn(|d, _| of(&|at| at.q[d])), SVector::from_fn(|d, _| of(&|at| at.p[d])));
@@ -157,9 +161,9 @@ impl<S: Simd, const K: usize, const N: usize> Pack<S, K, N> {
 
     /// The state in a lane. Not inlined: it is called for rows alone.
     #[inline(never)]
-    fn state(&self, i: usize) -> PhasePoint<N> {
-        let of = |x: &SVector<SimdBatch<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
-        PhasePoint { q: of(&self.q), p: of(&self.p), z: self.z.lanes()[i] }
+    fn state(&self, i: usize) -> State {
+        let of = |x: &SVector<SimdBatch<S, K>, N>| Vector::from_fn(N, |d| x[d].lanes()[i]);
+        State { q: of(&self.q), p: of(&self.p), z: self.z.lanes()[i] }
     }
 }
 
@@ -170,11 +174,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
-        &self,
-        lanes: &mut [Lane<N>],
-        stride: usize,
-    ) {
+    fn all<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(&self, lanes: &mut [Lane], stride: usize) {
         let width = SimdBatch::<S, K>::COUNT;
         for members in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
             let mut in_flight = [Pack::zero(); PACKS_IN_FLIGHT];

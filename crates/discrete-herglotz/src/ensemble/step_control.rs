@@ -4,10 +4,10 @@ use crate::{Problem, Run, Steps};
 use contact_geom::Lagrangian;
 
 /// The run of a member.
-pub(crate) type MemberRun<'p, 'o, L, const N: usize> = Run<'p, 'o, Problem<'p, L, N>>;
+pub(crate) type TypedRun<'p, 'o, L, const N: usize> = Run<'p, 'o, Problem<'p, L, N>>;
 
 /// [`Run::accuracy`].
-type Within<L, const N: usize> = for<'p, 'o> fn(MemberRun<'p, 'o, L, N>, f64) -> MemberRun<'p, 'o, L, N>;
+type Within<L, const N: usize> = for<'p, 'o> fn(TypedRun<'p, 'o, L, N>, f64) -> TypedRun<'p, 'o, L, N>;
 
 /// How the steps of the members are determined.
 pub(crate) enum StepControl<L, const N: usize> {
@@ -27,7 +27,7 @@ impl<L, const N: usize> Copy for StepControl<L, N> {}
 
 impl<L: Lagrangian<N>, const N: usize> StepControl<L, N> {
     /// A run with these steps.
-    pub fn of<'p, 'o>(&self, run: MemberRun<'p, 'o, L, N>) -> MemberRun<'p, 'o, L, N> {
+    pub fn of<'p, 'o>(&self, run: TypedRun<'p, 'o, L, N>) -> TypedRun<'p, 'o, L, N> {
         match self {
             StepControl::Given(steps) => run.steps(*steps),
             StepControl::Accuracy(wanted, within) => within(run, *wanted),

@@ -77,7 +77,7 @@ fn ends<const N: usize>(
     start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy,
     by: BatchKernel,
     set: Instructions,
-) -> Vec<Member<N>> {
+) -> Vec<Member> {
     let of = Ensemble::new(lagrangian, 0.0, 61, start).steps(Steps::Count(12)).threads(1).only(set);
     let of = match by {
         BatchKernel::Splitting(scheme) => of.by(scheme),

@@ -84,8 +84,8 @@ pub enum InputError {
     AnotherRun,
     /// A checkpoint was requested for a run whose stepper does not implement saving.
     #[error(
-        "the stepper of the integrator cannot be saved; remove the checkpoint, or implement `Stepper::save` and \
-         `restore`"
+        "the stepper of the integrator cannot be saved; remove the checkpoint, or implement `save` and \
+         `restore` of `RunSupport`"
     )]
     Unsaved,
     /// Times of output are not in order, not finite, or outside of the span of the run.

@@ -15,7 +15,8 @@ use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{restored_from, words_of};
 use crate::{
-    DenseStep, InputError, PlanEntry, Problem, State, StepFailure, Stepper, StepperOptions, UnresolvedStep, Vector,
+    DenseStep, InputError, PlanEntry, Problem, RunSupport, State, StepDetails, StepFailure, Stepper, StepperOptions,
+    UnresolvedStep, Vector,
 };
 use contact_geom::Lagrangian;
 use std::rc::Rc;
@@ -193,14 +194,20 @@ impl Stepper for GaussStepper<'_> {
         self.steps.route.evaluations()
     }
 
-    fn has_constant_rate(&self) -> bool {
-        matches!(self.route(), GaussRoute::Linear | GaussRoute::Condensed)
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
     }
 
-    fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary(self.route(), self.depends_on_action)
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
     }
 
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl StepDetails for GaussStepper<'_> {
     /// The collocation polynomial of the last step; computed only when it is requested.
     fn dense(&self) -> Option<DenseStep> {
         Some(curve_through(self.solved(true)?))
@@ -212,6 +219,16 @@ impl Stepper for GaussStepper<'_> {
 
     fn last_velocity(&self) -> Option<Vector> {
         if self.steps.k == 0 { None } else { self.steps.route.last_velocity().map(Vector::from) }
+    }
+}
+
+impl RunSupport for GaussStepper<'_> {
+    fn has_constant_rate(&self) -> bool {
+        matches!(self.route(), GaussRoute::Linear | GaussRoute::Condensed)
+    }
+
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary(self.route(), self.depends_on_action)
     }
 
     fn guess(&mut self, longer: &DenseStep) {

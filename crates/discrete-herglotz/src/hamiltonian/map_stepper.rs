@@ -4,7 +4,7 @@ use super::ContactIncrement;
 use crate::numbers::array::from_fn;
 use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::state_words::{Saved, saved};
-use crate::{InputError, PlanEntry, State, StepError, StepFailure, Stepper};
+use crate::{InputError, PlanEntry, RunSupport, State, StepError, StepFailure, Stepper};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::numbers::max_abs_or_nan;
@@ -106,6 +106,16 @@ impl<M: ContactMaps<N>, const N: usize> Stepper for MapStepper<M, N> {
         self.evaluations
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<M: ContactMaps<N>, const N: usize> RunSupport for MapStepper<M, N> {
     fn work_summary(&self) -> Vec<PlanEntry> {
         self.maps.work_summary()
     }

@@ -70,7 +70,8 @@ pub struct StepperOptions {
     /// Whether the action is computed even where it does not act back on the motion.
     pub action: bool,
     /// Whether the stepper checks that its steps resolve the motion, if the check takes time; see
-    /// [`Stepper::unresolved`] and [`Stepper::suspect_interval`].
+    /// [`RunSupport::unresolved`](crate::RunSupport::unresolved) and
+    /// [`RunSupport::suspect_interval`](crate::RunSupport::suspect_interval).
     pub check_resolution: bool,
 }
 

@@ -37,7 +37,7 @@ impl<const N: usize> System for OfTyped<'_, N> {
         match self.0.force_structure() {
             ForceStructure::None => ForceKind::None,
             drag if drag.is_of_positions() => ForceKind::OfPositions,
-            ForceStructure::Drag { .. } => ForceKind::Drag,
+            ForceStructure::Drag { linear, quadratic } => ForceKind::Drag { linear: linear.into(), quadratic },
             _ => ForceKind::General,
         }
     }

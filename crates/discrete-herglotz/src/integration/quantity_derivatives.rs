@@ -1,7 +1,7 @@
 //! The derivatives of a Lagrangian and of its force with respect to a parameter or the time.
 
 use contact_geom::ChartVector;
-use contact_geom::nalgebra::{ArrayStorage, SVector};
+use contact_geom::nalgebra::SVector;
 
 /// The derivatives of L, of its gradient, and of the force with respect to a quantity: `L_theta`,
 /// `(L_qtheta, L_vtheta, L_ztheta)`, `f_theta`.
@@ -9,16 +9,4 @@ pub(crate) struct QuantityDerivatives<const N: usize> {
     pub l: f64,
     pub gradient: ChartVector<N>,
     pub force: SVector<f64, N>,
-}
-
-impl<const N: usize> QuantityDerivatives<N> {
-    pub const ZERO: Self = QuantityDerivatives {
-        l: 0.0,
-        gradient: ChartVector {
-            x: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-            y: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-            z: 0.0,
-        },
-        force: SVector::<f64, N>::from_array_storage(ArrayStorage([[0.0; N]])),
-    };
 }

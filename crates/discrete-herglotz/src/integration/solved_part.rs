@@ -4,7 +4,7 @@ use crate::integration::{Motion, WholeStep};
 use crate::{Components, Point, State, StepError, Vector};
 
 /// A part of a step with its solved stages, and what happened at its end: all that its tangent needs. See
-/// [`Stepper::solved_parts`](crate::Stepper::solved_parts).
+/// [`StepDetails::solved_parts`](crate::StepDetails::solved_parts).
 #[derive(Clone, Debug)]
 pub struct SolvedPart {
     /// `None` for a part of length zero, between two passages at one point.

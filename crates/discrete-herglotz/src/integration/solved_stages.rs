@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 pub(crate) type StageVectors = SmallVec<[Stages; 4]>;
 
 /// The solved stages of a step of contact Gauss collocation: all that its tangent needs. See
-/// [`Stepper::solved_stages`](crate::Stepper::solved_stages).
+/// [`StepDetails::solved_stages`](crate::StepDetails::solved_stages).
 #[derive(Clone, Debug)]
 pub struct SolvedStages {
     pub(crate) s: usize,

@@ -1,7 +1,6 @@
 //! Steppers: a method applied to one motion.
 
-use crate::integration::{Piece, Reset};
-use crate::integration::{SolvedPart, SolvedStages};
+use crate::integration::{Piece, RunSupport, SolvedStages, StepDetails, SuspectInterval};
 use crate::{DenseStep, PlanEntry, State, StepError, UnresolvedStep, Vector};
 use thiserror::Error;
 
@@ -10,23 +9,14 @@ use thiserror::Error;
 ///
 /// A run advances a stepper. [`Flow`](crate::rules::Flow) is the stepper of a
 /// [`DiscreteLagrangian`](crate::DiscreteLagrangian); methods that carry more than a guess of the velocity have their
-/// own.
+/// own. The first five methods are enough for a run; a method with dense output, saving or checks of its own implements
+/// [`StepDetails`] or [`RunSupport`] as well, and returns itself where the last three return `None`.
 pub trait Stepper {
     /// Takes `steps` steps without observation between them.
     ///
     /// # Errors
     /// [`StepFailure`] where a step fails: the state is then that before the failed step.
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure>;
-
-    /// Takes `steps` steps, or fewer if a method in transformed time reaches the time `t_end` before; returns their
-    /// number. Methods with steps of constant length ignore `t_end`.
-    ///
-    /// # Errors
-    /// As [`advance`](Self::advance).
-    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
-        let _ = t_end;
-        self.advance(steps).map(|()| steps)
-    }
 
     /// The state `(q, p, z)`. For a stepper without the action, `z` keeps its initial value.
     fn state(&self) -> State;
@@ -40,78 +30,75 @@ pub trait Stepper {
     /// The number of evaluations of forces, or of gradients of L, since the start: one per point of R x TQ x R.
     fn evaluations(&self) -> u64;
 
-    /// The dense output of the last step, for a method that provides it; `None` before the first step and after a
-    /// failed one.
-    fn dense(&self) -> Option<DenseStep> {
+    /// What it knows of its last step, such as dense output.
+    fn last_step(&self) -> Option<&dyn StepDetails> {
         None
     }
 
-    /// The solved stages of the last step, from which its tangent is computed; `None` before the first step, after a
-    /// failed one, and for a method whose tangent is not implemented.
-    fn solved_stages(&self) -> Option<SolvedStages> {
+    /// What a run uses beyond the steps and the state, such as saving.
+    fn run_support(&self) -> Option<&dyn RunSupport> {
         None
     }
 
-    /// The parts into which switching times and breaks divided the last step; empty if it was not divided or the
-    /// [stages](Self::solved_stages) of a part are unknown.
-    fn solved_parts(&self) -> Vec<SolvedPart> {
-        Vec::new()
-    }
-
-    /// A velocity of the motion in its last step, from which Newton's method finds the velocity at the state where
-    /// several velocities have the same momentum. `None` before the first step, and where the velocity is unique.
-    fn last_velocity(&self) -> Option<Vector> {
+    /// The same, for the methods that change the stepper.
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
         None
     }
+}
 
-    /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state.
-    /// This affects only the number of iterations.
-    fn guess(&mut self, _longer: &DenseStep) {}
-
-    /// Whether `sigma_d` is known in advance to be the same in all steps.
-    fn has_constant_rate(&self) -> bool {
-        false
+/// The methods of [`StepDetails`] and [`RunSupport`], with their defaults for a stepper without them.
+impl dyn Stepper + '_ {
+    /// See [`StepDetails::dense`].
+    pub(crate) fn dense(&self) -> Option<DenseStep> {
+        self.last_step()?.dense()
     }
 
-    /// Plan entries: what a step computes and skips. The one for the action is used if the action is not requested.
-    fn work_summary(&self) -> Vec<PlanEntry> {
-        Vec::new()
+    /// See [`StepDetails::solved_stages`].
+    pub(crate) fn solved_stages(&self) -> Option<SolvedStages> {
+        self.last_step()?.solved_stages()
     }
 
-    /// All data that change from step to step, as words for a bitwise resume; `None` where saving is not implemented.
-    fn save(&self) -> Option<Vec<u64>> {
-        None
+    /// See [`StepDetails::last_velocity`].
+    pub(crate) fn last_velocity(&self) -> Option<Vector> {
+        self.last_step()?.last_velocity()
     }
 
-    /// Restores the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they
-    /// are not valid.
-    fn restore(&mut self, _words: &[u64]) -> bool {
-        false
+    /// See [`StepDetails::pieces`].
+    pub(crate) fn pieces(&self) -> &[Piece] {
+        self.last_step().map_or(&[], |step| step.pieces())
     }
 
-    /// The resets in the steps of the last call of [`advance`](Self::advance), in their order.
-    fn resets(&self) -> &[Reset] {
-        &[]
+    /// See [`RunSupport::advance_until`].
+    pub(crate) fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
+        match self.run_support_mut() {
+            Some(run) => run.advance_until(steps, t_end),
+            None => self.advance(steps).map(|()| steps),
+        }
     }
 
-    /// The pieces of the last step between its resets; empty for a step without resets.
-    fn pieces(&self) -> &[Piece] {
-        &[]
+    /// See [`RunSupport::work_summary`].
+    pub(crate) fn work_summary(&self) -> Vec<PlanEntry> {
+        self.run_support().map_or_else(Vec::new, |run| run.work_summary())
     }
 
-    /// Whether a reset so far was not conformally contact, so that the energy changed by an unknown amount.
-    fn has_changed_energy(&self) -> bool {
-        false
+    /// See [`RunSupport::save`].
+    pub(crate) fn save(&self) -> Option<Vec<u64>> {
+        self.run_support()?.save()
     }
 
-    /// The first step so far that was flagged as unresolved.
-    fn unresolved(&self) -> Option<UnresolvedStep> {
-        None
+    /// See [`RunSupport::restore`].
+    pub(crate) fn restore(&mut self, words: &[u64]) -> bool {
+        self.run_support_mut().is_some_and(|run| run.restore(words))
     }
 
-    /// The latest suspect interval since the last call: steps that may not have resolved the motion.
-    fn suspect_interval(&mut self) -> Option<SuspectInterval> {
-        None
+    /// See [`RunSupport::unresolved`].
+    pub(crate) fn unresolved(&self) -> Option<UnresolvedStep> {
+        self.run_support()?.unresolved()
+    }
+
+    /// See [`RunSupport::suspect_interval`].
+    pub(crate) fn suspect_interval(&mut self) -> Option<SuspectInterval> {
+        self.run_support_mut()?.suspect_interval()
     }
 }
 
@@ -123,21 +110,4 @@ pub struct StepFailure {
     pub taken: usize,
     /// The cause of the failure.
     pub cause: StepError,
-}
-
-/// An interval of steps along which the second difference of the velocity is twice as large as in all steps before. For
-/// a smooth force this is harmless, but the force may jump there, or vary on a scale shorter than the steps. A
-/// [`Run`](crate::Run) examines the interval.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SuspectInterval {
-    /// The number of steps before the interval.
-    pub step: usize,
-    /// The number of steps in the interval.
-    pub steps: usize,
-    /// The time at its start.
-    pub t: f64,
-    /// The state at its start.
-    pub from: State,
-    /// The state at its end.
-    pub to: State,
 }

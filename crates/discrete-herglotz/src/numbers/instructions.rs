@@ -8,7 +8,7 @@ use pulp::WithSimd;
 /// run time. A build for processors with wide registers (for example with `target-cpu=native`) compiles each kernel
 /// once instead of three times, for the widest instruction set that it enables.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Instructions(chosen::Set);
+pub struct Instructions(chosen::Set);
 
 impl Instructions {
     /// The best instruction set of the processor.

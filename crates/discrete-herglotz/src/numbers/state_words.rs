@@ -143,14 +143,14 @@ pub(crate) use saved;
 saved!([const N: usize] PhasePoint<N> { q, p, z });
 saved!([] State { q, p, z });
 
-/// The words of a value, for [`Stepper::save`](crate::Stepper::save).
+/// The words of a value, for [`RunSupport::save`](crate::RunSupport::save).
 pub(crate) fn words_of(x: &impl Saved) -> Vec<u64> {
     let mut words = Vec::new();
     x.save(&mut words);
     words
 }
 
-/// Restores a value from exactly its words, for [`Stepper::restore`](crate::Stepper::restore); `false` where they are
+/// Restores a value from exactly its words, for [`RunSupport::restore`](crate::RunSupport::restore); `false` where they are
 /// not those of such a value.
 pub(crate) fn restored_from(x: &mut impl Saved, mut words: &[u64]) -> bool {
     x.load(&mut words).is_some() && words.is_empty()

@@ -4,8 +4,8 @@ use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
 use crate::rules::flow::work_summary_of;
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, SplittingScheme, State, StepError, StepFailure, Stepper,
-    UnresolvedStep, Vector, integration::SuspectInterval, solve::Solver,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, RunSupport, SplittingScheme, State, StepDetails,
+    StepError, StepFailure, Stepper, UnresolvedStep, Vector, integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -218,18 +218,6 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Composition<D, N> {
-    fn has_constant_rate(&self) -> bool {
-        self.rules.iter().all(|rule| rule.constant_rate())
-    }
-
-    fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
-    }
-
-    fn last_velocity(&self) -> Option<Vector> {
-        (self.taken > 0).then(|| self.velocity.into())
-    }
-
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         (0..steps).try_for_each(|taken| self.step().map_err(|cause| StepFailure { taken, cause }))
     }
@@ -248,6 +236,34 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Composition<D, N> {
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> StepDetails for Composition<D, N> {
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.taken > 0).then(|| self.velocity.into())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> RunSupport for Composition<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.rules.iter().all(|rule| rule.constant_rate())
+    }
+
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
     }
 
     fn save(&self) -> Option<Vec<u64>> {

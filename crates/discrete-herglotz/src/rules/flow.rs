@@ -5,8 +5,8 @@ use crate::integration::system_problem::check_time;
 use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, at_rest, sharper};
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, State, StepError, StepFailure, Stepper, UnresolvedStep,
-    Vector, integration::SuspectInterval, solve::Solver,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, RunSupport, State, StepDetails, StepError, StepFailure,
+    Stepper, UnresolvedStep, Vector, integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint};
@@ -194,18 +194,6 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Flow<D, N> {
-    fn has_constant_rate(&self) -> bool {
-        self.ld.constant_rate()
-    }
-
-    fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary_of(self.ld.is_explicit(), "step")
-    }
-
-    fn last_velocity(&self) -> Option<Vector> {
-        (self.k > 0).then(|| self.velocities[0].into())
-    }
-
     fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             self.step().map_err(|cause| StepFailure { taken, cause })?;
@@ -227,6 +215,34 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper for Flow<D, N> {
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> StepDetails for Flow<D, N> {
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.k > 0).then(|| self.velocities[0].into())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> RunSupport for Flow<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.ld.constant_rate()
+    }
+
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary_of(self.ld.is_explicit(), "step")
     }
 
     fn save(&self) -> Option<Vec<u64>> {

@@ -63,6 +63,12 @@ impl<'p, 'o, P> Run<'p, 'o, P> {
         }
     }
 
+    /// The same run without the type of its problem, and so without its derivatives.
+    pub(crate) fn without_type(self) -> Run<'p, 'o, ()> {
+        let Run { system, parts, integrator, length, needs, scales, estimated, observers, from, .. } = self;
+        Run { problem: &(), system, parts, integrator, length, needs, scales, estimated, observers, from }
+    }
+
     fn within(self, wanted: f64, collocation: Collocation<'p>) -> Self {
         Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps, collocation)), ..self }
     }

@@ -139,7 +139,7 @@ impl<'p> Discretization<'p> {
     ) -> Result<Box<dyn Stepper + 'p>, StepError> {
         let v = self.velocity(*t0, from, near)?;
         let guess = |run: &mut dyn Stepper| {
-            if let Some(curve) = curve {
+            if let (Some(curve), Some(run)) = (curve, run.run_support_mut()) {
                 run.guess(curve);
             }
         };

@@ -47,7 +47,7 @@ impl<'p> Plan<'p> {
         Ok(Plan {
             ends_after: selection.ended,
             work_summary: stepper.work_summary(),
-            constant_rate: stepper.has_constant_rate(),
+            constant_rate: stepper.run_support().is_some_and(|run| run.has_constant_rate()),
             estimated: false,
             rests_until: None,
             start: Cell::new(Some(stepper)),
@@ -78,8 +78,8 @@ impl<'p> Plan<'p> {
     }
 
     /// A stepper at the start, for programs that take the steps themselves. In transformed time use
-    /// [`Stepper::advance_until`], which ends at the end of the span. The stepper of a splitting does not monitor
-    /// whether its steps resolve the motion, which would take up to a third of the time.
+    /// [`RunSupport::advance_until`](crate::RunSupport::advance_until), which ends at the end of the span. The stepper of
+    /// a splitting does not monitor whether its steps resolve the motion, which would take up to a third of the time.
     ///
     /// # Errors
     /// Those of the creation of the stepper.

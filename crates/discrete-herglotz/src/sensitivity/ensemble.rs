@@ -1,11 +1,10 @@
 //! Derivatives of the members of an ensemble.
 
-use crate::ensemble::EnsembleError;
 use crate::ensemble::shards;
-use crate::ensemble::single::Common;
+use crate::ensemble::{EnsembleError, Lagrangians};
 use crate::run::Interruption;
 use crate::sensitivity::{EndCovector, Loss, LossGradient, MotionState, SensitivityError, Tangent, Variable};
-use crate::{Ensemble, InputError, Problem, Run, Until};
+use crate::{Ensemble, Problem, Run, Until};
 use contact_geom::Parametric;
 use std::ops::ControlFlow;
 
@@ -47,7 +46,7 @@ impl BatchGradient {
     }
 }
 
-impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+impl<L: Parametric<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'_, L, N>> {
     /// Performs the run of each member, and computes the value and the gradient of a loss of its end, with respect to the
     /// start of this member and the parameters, by the adjoint. Each member has a run of its own, distributed over the
     /// threads, and the gradient is that of [`Run::gradient`](crate::Run::gradient), bitwise, for any number of threads.
@@ -96,7 +95,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         loss: impl Fn(usize, &MotionState) -> (f64, EndCovector) + Sync,
         until: Until,
     ) -> Result<BatchGradient, EnsembleError> {
-        self.each_run(until, |index, run| run.gradient_of(|end| loss(index, end), until))
+        self.each_run(|index, run| run.gradient_of(|end| loss(index, end), until))
             .map(|members| BatchGradient { members })
     }
 
@@ -112,7 +111,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         loss: impl Fn(usize, &[MotionState]) -> (f64, Vec<EndCovector>) + Sync,
         until: Until,
     ) -> Result<BatchGradient, EnsembleError> {
-        self.each_run(until, |index, run| run.gradient_at(times, |states| loss(index, states), until))
+        self.each_run(|index, run| run.gradient_at(times, |states| loss(index, states), until))
             .map(|members| BatchGradient { members })
     }
 
@@ -127,29 +126,24 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         times: &[f64],
         until: Until,
     ) -> Result<Vec<Result<Tangent, SensitivityError>>, EnsembleError> {
-        self.each_run(until, |_, run| run.tangent_at(variables, times, until))
+        self.each_run(|_, run| run.tangent_at(variables, times, until))
     }
 
     /// Calls a function with the run of each member, on several threads, and returns the results in the order of the
     /// members.
     fn each_run<R: Send>(
         &self,
-        until: Until,
         work: impl for<'p, 'o> Fn(usize, Run<'p, 'o, Problem<'p, L, N>>) -> Result<R, SensitivityError> + Sync,
     ) -> Result<Vec<Result<R, SensitivityError>>, EnsembleError> {
-        let (count, threads) = (self.count, self.some_threads()?);
+        let (count, threads) = (self.settings.count, self.settings.some_threads()?);
         if count == 0 {
             return Err(EnsembleError::Empty);
         }
-        let refused = |cause| EnsembleError::Member { index: 0, cause };
-        let integrator = self.integrator.as_deref().ok_or(refused(InputError::NoIntegrator))?;
-        let length = self.length.ok_or(refused(InputError::NoSteps))?;
-        let common = Common { t0: self.t0, length, until, action: true, rows: None };
-        let (members, interrupt) = (&*self.members, self.interrupt);
+        let (members, interrupt) = (&self.members, self.settings.interrupt);
+        members.method().map_err(|cause| EnsembleError::Member { index: 0, cause })?;
         let member = |index: usize| {
-            let (lagrangian, start) = members(index);
             let mut asking = interrupt.map(Interruption);
-            common.with(integrator, lagrangian, start, interrupt, |run| match &mut asking {
+            members.with(index, (None, interrupt), |run| match &mut asking {
                 Some(asking) => work(index, run.observe(asking)),
                 None => work(index, run),
             })
@@ -163,7 +157,7 @@ impl<'a, L: Parametric<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             |shard| (shard * size..count.min((shard + 1) * size)).map(member).collect::<Vec<_>>(),
             |shard| {
                 results.extend(shard);
-                self.report_progress(results.len().div_ceil(size), shards);
+                self.settings.report_progress(results.len().div_ceil(size), shards);
                 ControlFlow::Continue(())
             },
         );

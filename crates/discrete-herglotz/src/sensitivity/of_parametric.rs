@@ -1,11 +1,9 @@
 //! A Lagrangian with parameters whose number of coordinates is known at compile time, as derivatives of runs see it.
 
-use crate::integration::SolvedStages;
-use crate::integration::{OfTyped, QuantityDerivatives, SharedIntegrator, StepFormula};
+use crate::gauss::system::{CollocationSystem, Typed};
+use crate::integration::{OfTyped, QuantityDerivatives, SolvedStages};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
-use crate::sensitivity::SensitivityError;
-use crate::sensitivity::flows::{FlowEngine, FlowTangent, Sources};
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parameter_derivatives::ParameterDerivatives;
 use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity, StageSystem};
@@ -13,7 +11,7 @@ use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::stage_kernel::StageKernel;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::{Argument, moving_point};
-use crate::{Components, Point, State, StepError, System, SystemProblem, Vector};
+use crate::{Components, Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, Parametric};
 use pulp::{Simd, WithSimd};
@@ -133,13 +131,7 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
         Some(Components { x: to.q.map(|x| x.d[0]).into(), y: to.v.map(|x| x.d[0]).into(), z: to.z.d[0] })
     }
 
-    fn flows(
-        &self,
-        problem: &SystemProblem<'a>,
-        formula: StepFormula,
-        integrator: &SharedIntegrator<'a>,
-        quantities: Box<dyn Quantities + 'a>,
-    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
-        Ok(Box::new(FlowEngine::new(&problem.of(self.0), formula, integrator, Sources(quantities))?))
+    fn hamiltonian(&self) -> Option<Box<dyn CollocationSystem + 'a>> {
+        if const { L::HINTS.hamiltonian } { Some(Box::new(Typed::<L, N>(self.0))) } else { None }
     }
 }

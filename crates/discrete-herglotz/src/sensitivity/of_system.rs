@@ -1,16 +1,14 @@
 //! Any system, as derivatives of runs see it: evaluated at one stage after another.
 
-use crate::integration::{SharedIntegrator, SolvedStages, StepFormula};
+use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
-use crate::sensitivity::SensitivityError;
-use crate::sensitivity::flows::FlowTangent;
 use crate::sensitivity::linear_stages::StageTangent;
 use crate::sensitivity::parametric_system::{ExplicitDerivatives, ParametricSystem, Quantities, Quantity, StageSystem};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
-use crate::{Components, Point, SecondDerivatives, StepError, System, SystemProblem, Vector};
+use crate::{Components, Point, SecondDerivatives, StepError, System, Vector};
 use pulp::{Simd, WithSimd};
 use std::rc::Rc;
 
@@ -53,16 +51,6 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
 
     fn state_after_switch_along(&self, _along: Argument, _index: usize, _t: f64, _x: &Point) -> Option<Components> {
         None
-    }
-
-    fn flows(
-        &self,
-        _problem: &SystemProblem<'a>,
-        _formula: StepFormula,
-        integrator: &SharedIntegrator<'a>,
-        _quantities: Box<dyn Quantities + 'a>,
-    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError> {
-        Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" })
     }
 }
 

@@ -1,11 +1,9 @@
 //! Systems with parameters, as derivatives of runs see them.
 
+use crate::gauss::system::CollocationSystem;
 use crate::integration::SolvedStages;
-use crate::integration::{SharedIntegrator, StepFormula};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{StageMap, Stages};
-use crate::sensitivity::SensitivityError;
-use crate::sensitivity::flows::FlowTangent;
 use crate::sensitivity::linear_stages::{Inhomogeneity, StageTangent};
 use crate::sensitivity::of_parametric::OfParametric;
 use crate::sensitivity::of_slices::{BySlices, stages_of};
@@ -119,17 +117,10 @@ pub(crate) trait ParametricSystem<'a> {
     /// The derivative of the `(q, v, z)` after a reset along an argument; `None` where it is not known.
     fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components>;
 
-    /// The tangent of steps that are compositions of sub-flows, with the derivatives of their system in parameters and time.
-    ///
-    /// # Errors
-    /// Those of the steps of the method.
-    fn flows(
-        &self,
-        problem: &SystemProblem<'a>,
-        formula: StepFormula,
-        integrator: &SharedIntegrator<'a>,
-        quantities: Box<dyn Quantities + 'a>,
-    ) -> Result<Box<dyn FlowTangent + 'a>, SensitivityError>;
+    /// The contact Hamiltonian by which the Lagrangian is given, as collocation sees it; `None`, the default, for all others.
+    fn hamiltonian(&self) -> Option<Box<dyn CollocationSystem + 'a>> {
+        None
+    }
 }
 
 /// A problem whose runs can be differentiated: of a [`Parametric`] Lagrangian, or of any [`System`].

@@ -6,7 +6,7 @@ use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::engine::Engine;
-use crate::sensitivity::flows::FlowTangent;
+use crate::sensitivity::flows::FlowEngine;
 use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::step_maps::Direction;
 use crate::{State, StepError, Stepper};
@@ -24,7 +24,7 @@ pub(crate) enum StepTangent<'a> {
     /// From the stages of contact Gauss collocation.
     Collocation(Box<Engine<'a>>),
     /// From the sub-flows of a splitting, a rule or a composition.
-    Flow(Box<dyn FlowTangent + 'a>),
+    Flow(Box<FlowEngine<'a>>),
 }
 
 impl<'a> StepTangent<'a> {
@@ -52,12 +52,10 @@ impl<'a> StepTangent<'a> {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
-            Some(formula) => Ok(StepTangent::Flow(problem.of.flows(
-                &problem.problem,
-                formula,
-                &steps.integrator,
-                problem.stages.quantities(),
-            )?)),
+            Some(formula) => {
+                let engine = FlowEngine::new(problem, formula, &steps.integrator)?;
+                Ok(StepTangent::Flow(Box::new(engine)))
+            }
             None if info.constrained => {
                 Err(SensitivityError::UnderConstraints { method: info.name.clone(), what: "derivatives" })
             }
@@ -70,7 +68,11 @@ impl<'a> StepTangent<'a> {
         match self {
             StepTangent::Collocation(_) => match stepper.solved_stages() {
                 Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(stages))),
-                None => Some(stepper.solved_parts()).filter(|parts| !parts.is_empty()).map(TakenStep::Parts),
+                None => stepper
+                    .last_step()
+                    .map(|step| step.solved_parts())
+                    .filter(|parts| !parts.is_empty())
+                    .map(TakenStep::Parts),
             },
             StepTangent::Flow(_) => {
                 Some(TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() })))

@@ -6,7 +6,8 @@ use super::separable::SeparableForm;
 use crate::integration::plan_entry::DECOUPLED;
 use crate::numbers::state_words::Saved;
 use crate::{
-    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    InputError, PlanEntry, RunSupport, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep,
+    integration::SuspectInterval,
 };
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -122,7 +123,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
     }
 
-    /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved). The
+    /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](RunSupport::unresolved). The
     /// check adds a sixth to the time of a Kepler orbit, a third to that of a pendulum and up to twice the time of an
     /// oscillator; it is intended for motions that are not known in advance.
     pub fn with_resolution_check(self) -> Self {
@@ -184,6 +185,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper for Splitting<'_, L, N> {
         self.progress.evaluations()
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> RunSupport for Splitting<'_, L, N> {
     fn has_constant_rate(&self) -> bool {
         matches!(self.drag, Drag::Constant(_))
     }

@@ -5,7 +5,8 @@ use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::numbers::state_words::Saved;
 use crate::{
-    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+    InputError, PlanEntry, RunSupport, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep,
+    integration::SuspectInterval,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
@@ -147,6 +148,16 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper for ActionSplittin
         self.progress.evaluations()
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> RunSupport for ActionSplitting<'_, L, F, N> {
     fn work_summary(&self) -> Vec<PlanEntry> {
         super::work_summary(PlanEntry::computed("action z", "the motion depends on it"))
     }

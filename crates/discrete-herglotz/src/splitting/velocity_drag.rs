@@ -7,8 +7,8 @@ use crate::integration::plan_entry::DECOUPLED;
 use crate::numbers::state_words::Saved;
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::{
-    InputError, PlanEntry, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
-    splitting::drag::Drift,
+    InputError, PlanEntry, RunSupport, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep,
+    integration::SuspectInterval, splitting::drag::Drift,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ForceStructure, Lagrangian, PhasePoint, VelocityPoint};
@@ -80,7 +80,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> DragSplitting<'a, L, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        Self::of(SeparableForm::read_of(lagrangian, h, t0, &state, L::HINTS.proved)?, scheme, h, t0, state)
+        Self::of(SeparableForm::read_of(lagrangian, h, t0, &state, false)?, scheme, h, t0, state)
     }
 
     /// The same for a separable form that has already been read.
@@ -115,7 +115,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> DragSplitting<'a, L, N> {
         DragSplitting { action: false, ..self }
     }
 
-    /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved).
+    /// The same with a check of each drift whether it resolves the motion, for [`unresolved`](RunSupport::unresolved).
     pub fn with_resolution_check(self) -> Self {
         DragSplitting { check_resolution: true, ..self }
     }
@@ -148,6 +148,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper for DragSplitting<'_, L, N> {
         self.progress.evaluations()
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> RunSupport for DragSplitting<'_, L, N> {
     fn has_constant_rate(&self) -> bool {
         true
     }

@@ -65,7 +65,11 @@ impl System for Guarded<'_> {
         }
     }
     fn force_kind(&self) -> ForceKind {
-        self.checked(|| self.system.force_kind(), |_| true, || ForceKind::General)
+        let fits = |of: &ForceKind| match of {
+            ForceKind::Drag { linear, .. } => linear.len() == self.n,
+            _ => true,
+        };
+        self.checked(|| self.system.force_kind(), fits, || ForceKind::General)
     }
     fn has_force(&self) -> bool {
         self.checked(|| self.system.has_force(), |_| true, || false)

@@ -27,10 +27,18 @@ pub(crate) const MAX_BY_COLUMNS: usize = 16;
 /// # Errors
 /// [`SingularMatrix`].
 pub(crate) fn inverse(m: &DMatrix<f64>) -> Result<DMatrix<f64>, SingularMatrix> {
-    let n = m.nrows();
-    if n > MAX_BY_COLUMNS {
+    if m.nrows() > MAX_BY_COLUMNS {
         return m.clone().try_inverse().ok_or(SingularMatrix { pivot: 0.0 });
     }
+    inverse_by_columns(m)
+}
+
+/// The inverse of a matrix whose size is known at run time, computed column by column.
+///
+/// # Errors
+/// [`SingularMatrix`].
+pub(crate) fn inverse_by_columns(m: &DMatrix<f64>) -> Result<DMatrix<f64>, SingularMatrix> {
+    let n = m.nrows();
     let (mut inverse, mut copy) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
     for mut column in inverse.column_iter_mut() {
         copy.copy_from(m);

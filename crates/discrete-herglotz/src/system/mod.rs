@@ -6,6 +6,7 @@ mod defaults;
 mod guarded;
 mod kernels;
 pub(crate) mod mass_matrix;
+mod over_slices;
 mod points;
 pub(crate) mod products;
 mod quantity;
@@ -55,14 +56,19 @@ pub enum AtSwitch {
 }
 
 /// What is known about an applied force; see [`ForceStructure`](contact_geom::ForceStructure).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ForceKind {
     /// There is no force.
     None,
     /// A function of time and positions.
     OfPositions,
-    /// A function of time and positions, with drag.
-    Drag,
+    /// A function of time and positions, with the drag `-linear_i v_i - quadratic |v| v_i` of the velocity.
+    Drag {
+        /// The coefficients of the linear drag of each velocity.
+        linear: Vector,
+        /// The coefficient of the quadratic drag of the velocity.
+        quadratic: f64,
+    },
     /// Nothing is known.
     General,
 }

@@ -62,7 +62,7 @@ struct Table {
 }
 
 impl Table {
-    fn row(&mut self, Member { index, ending, .. }: &Member<1>) -> io::Result<()> {
+    fn row(&mut self, Member { index, ending, .. }: &Member) -> io::Result<()> {
         if self.file.is_none() {
             writeln!(self.file.insert(BufWriter::new(File::create(&self.part)?)), "index,status,t,q,p,z")?;
         }

@@ -4,7 +4,8 @@ use crate::numerics::flow::flow_between_jumps;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, legendre};
 use discrete_herglotz::{
-    InputError, Integrator, MethodInfo, PlanEntry, Problem, State, StepError, StepFailure, Stepper, StepperOptions,
+    InputError, Integrator, MethodInfo, PlanEntry, Problem, RunSupport, State, StepError, StepFailure, Stepper,
+    StepperOptions,
 };
 
 /// The flow of the Herglotz vector field as an [`Integrator`]. Steps of any length are computed to round-off by
@@ -93,6 +94,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper for Run<'_, L, N> {
         self.evaluations
     }
 
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> RunSupport for Run<'_, L, N> {
     fn save(&self) -> Option<Vec<u64>> {
         let VelocityPoint { q, v, z } = &self.x;
         let numbers = q.iter().chain(v.iter()).chain([z, &self.b]).map(|x| x.to_bits());

@@ -1,20 +1,22 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
+use super::Kernel;
 use super::formula_system::FormulaSystem;
+use super::many::{ManyCoordinates, gauss};
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
 use crate::{
     Check, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual, StepControl,
 };
 use contact_geom::{
-    ChartVector, Lagrangian, OneParameterGroup, PhasePoint, Statement,
+    Lagrangian, OneParameterGroup, PhasePoint, Statement,
     numbers::{max_abs_or_nan, max_or_nan},
 };
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Observer, Problem, Run, Start, StepView, Steps, Stop, Until, gauss::VirtualWork,
-    hamiltonian, hamiltonian::ModifiedDefect, theory::legendre_inverse,
+    AnyIntegrator, GaussCollocation, InputError, Observer, Problem, Run, Start, State, StepView, Steps, Stop,
+    SystemProblem, Until, gauss::VirtualWork, hamiltonian, hamiltonian::ModifiedDefect, theory::legendre_inverse,
 };
-use formula_lagrangian::FormulaLagrangian;
+use formula_lagrangian::{Formula, FormulaLagrangian};
 use std::ops::ControlFlow;
 
 /// The distance of the finite differences, relative to the size of a state: it balances their truncation error, of
@@ -38,15 +40,22 @@ const DEFAULT_STAGES: usize = 4;
 /// The theorems are given up when the step has been halved six times without a discrete Lagrangian for its two points.
 const MAX_STEP_DIVISION: f64 = 64.0;
 
+/// The number of stages of the most accurate method.
+const MOST_STAGES: usize = 16;
+
 /// The number of stages of collocation that stands for the most accurate method with constraints, of order 14.
 const MOST_STAGES_WITH_CONSTRAINTS: usize = 7;
 
 /// A sample of a motion: the time, the state, and the logarithm of the conformal factor.
-type State<const N: usize> = (f64, PhasePoint<N>, f64);
+type StateAt = (f64, State, f64);
 
 /// The steps of a map: the integrator, or `None` for that which the constraints choose, the length of a step, and the
 /// number of steps.
 type MapOfSteps = (Option<AnyIntegrator>, f64, usize);
+
+/// The maps of a system: the start, the end and the conformal factor of one at a state, which is first moved to the
+/// constraints, if there are any.
+type Maps<'m> = dyn Fn(MapOfSteps, f64, &State) -> Result<([State; 2], f64), RuntimeError> + 'm;
 
 /// The run of a number of steps by an integrator, or by the one for the constraints.
 fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
@@ -61,65 +70,63 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     })
 }
 
-/// The start, the end and the conformal factor of a map at a state, which is first moved to the constraints, if there are
-/// any.
+/// See [`Maps`].
 fn mapped<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
     (by, h, count): MapOfSteps,
     t: f64,
-    from: &PhasePoint<N>,
-) -> Result<([PhasePoint<N>; 2], f64), RuntimeError> {
-    let mut problem = Problem::new(lagrangian, t, Start::from(*from))?;
+    from: &State,
+) -> Result<([State; 2], f64), RuntimeError> {
+    let mut problem = Problem::new(lagrangian, t, Start::from(from.fixed()))?;
     if lagrangian.formula().constraints() > 0 {
         problem = Problem::new(lagrangian, t, lagrangian.projected(t, *problem.start())?)?;
     }
     let plan = run_by(&problem, by, count)?.plan(Until::After(h))?;
     let mut stepper = plan.stepper()?;
     stepper.advance(count).map_err(|failure| failure.cause)?;
-    Ok(([*problem.state(), stepper.state().fixed()], stepper.sigma()))
+    Ok(([problem.state().into(), stepper.state()], stepper.sigma()))
 }
 
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
-fn step<L: FormulaSystem<N>, const N: usize>(
-    lagrangian: &L,
-    map: MapOfSteps,
-    t: f64,
-    from: &PhasePoint<N>,
-) -> Result<(PhasePoint<N>, f64), RuntimeError> {
-    let ([_, end], sigma) = mapped(lagrangian, map, t, from)?;
+fn step(maps: &Maps<'_>, map: MapOfSteps, t: f64, from: &State) -> Result<(State, f64), RuntimeError> {
+    let ([_, end], sigma) = maps(map, t, from)?;
     Ok((end, sigma))
+}
+
+/// The numbers of a state, in the order q, p, z.
+fn numbers(State { q, p, z }: &State) -> Vec<f64> {
+    [&q[..], p, &[*z]].concat()
 }
 
 /// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size: by derivatives
 /// along curves of starts. With constraints these are curves in T\*N x R, whose tangent vectors are all of them.
-fn contact_defect<L: FormulaSystem<N>, const N: usize>(
-    lagrangian: &L,
-    map: MapOfSteps,
-    t: f64,
-    at: &PhasePoint<N>,
-) -> Result<f64, RuntimeError> {
-    let center = ChartVector::from(*at);
-    let ([from, end], sigma) = mapped(lagrangian, map, t, at)?;
+fn contact_defect(maps: &Maps<'_>, map: MapOfSteps, t: f64, at: &State) -> Result<f64, RuntimeError> {
+    let n = at.q.len();
+    let ([from, end], sigma) = maps(map, t, at)?;
     let size = |x: f64| if x > 0.0 { x } else { 1.0 };
     let sizes = [size(at.q.amax()), size(at.p.amax()), size(at.z.abs())];
-    let mut differences = Vec::with_capacity(2 * N + 1);
-    for k in 0..=2 * N {
-        let unit = sizes[k / N.max(1)];
+    let mut differences = Vec::with_capacity(2 * n + 1);
+    for k in 0..=2 * n {
+        let unit = sizes[k / n.max(1)];
         let distance = RELATIVE_DISTANCE * unit;
-        let moved = |by: f64| -> Result<[ChartVector<N>; 2], RuntimeError> {
-            let there = ChartVector::<N>::from_fn(|i| center.component(i) + if i == k { by * distance } else { 0.0 });
-            Ok(mapped(lagrangian, map, t, &there.into())?.0.map(ChartVector::from))
+        let moved = |by: f64| -> Result<[Vec<f64>; 2], RuntimeError> {
+            let mut there = at.clone();
+            let all = there.q.iter_mut().chain(there.p.iter_mut()).chain([&mut there.z]);
+            all.enumerate().for_each(|(i, x)| *x += if i == k { by * distance } else { 0.0 });
+            Ok(maps(map, t, &there)?.0.map(|x| numbers(&x)))
         };
-        let mut slopes = [ChartVector::<N>::from_fn(|_| 0.0); 2];
+        let mut slopes = [(); 2].map(|_| vec![0.0; 2 * n + 1]);
         for (by, weight) in [(1.0, 45.0), (2.0, -9.0), (3.0, 1.0)] {
             let (ahead, behind) = (moved(by)?, moved(-by)?);
             for (slope, (ahead, behind)) in slopes.iter_mut().zip(ahead.into_iter().zip(behind)) {
-                *slope = slope.plus(ahead.minus(behind).scale(weight / (60.0 * distance)));
+                for (slope, (ahead, behind)) in slope.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                    *slope += (ahead - behind) * (weight / (60.0 * distance));
+                }
             }
         }
         let [source, image] = slopes;
-        let pulled_back = image.z - end.p.dot(&image.x);
-        let eta = source.z - from.p.dot(&source.x);
+        let pulled_back = image[2 * n] - end.p.dot(&image[..n]);
+        let eta = source[2 * n] - from.p.dot(&source[..n]);
         // In units of the coordinates.
         differences.push(((pulled_back - sigma * eta) * unit, pulled_back * unit));
     }
@@ -128,17 +135,19 @@ fn contact_defect<L: FormulaSystem<N>, const N: usize>(
 }
 
 /// The distance of a step from the exact motion, relative to the size of the state and per unit of time.
-fn herglotz_defect<L: FormulaSystem<N>, const N: usize>(
-    lagrangian: &L,
+fn herglotz_defect(
+    maps: &Maps<'_>,
+    constrained: bool,
     map: MapOfSteps,
     t: f64,
-    at: &PhasePoint<N>,
+    at: &State,
 ) -> Result<f64, RuntimeError> {
-    let stages = if lagrangian.formula().constraints() > 0 { MOST_STAGES_WITH_CONSTRAINTS } else { 16 };
+    let stages = if constrained { MOST_STAGES_WITH_CONSTRAINTS } else { MOST_STAGES };
     let exact = (Some(AnyIntegrator::Gauss { stages }), map.1, 2);
-    let (a, b) =
-        (ChartVector::from(step(lagrangian, map, t, at)?.0), ChartVector::from(step(lagrangian, exact, t, at)?.0));
-    Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / map.1.abs())
+    let (a, b) = (numbers(&step(maps, map, t, at)?.0), numbers(&step(maps, exact, t, at)?.0));
+    let size = |x: &[f64]| max_abs_or_nan(x.iter().copied());
+    let apart = max_abs_or_nan(a.iter().zip(&b).map(|(a, b)| a - b));
+    Ok(apart / max_or_nan(size(&b), size(&numbers(at))) / map.1.abs())
 }
 
 /// The contact and Herglotz defects of the steps of a motion, without the theorems on discrete Lagrangians.
@@ -150,19 +159,24 @@ pub(super) fn of_steps<L: FormulaSystem<N>, const N: usize>(
     Ok(along(system, motion, samples)?.0)
 }
 
-/// Records the states at multiples of a number of steps, and ends the run if its interruption is wanted.
-struct Recorded<I, const N: usize> {
-    states: Vec<State<N>>,
-    stride: usize,
-    interrupted: I,
+/// Whether the interruption of a motion is wanted.
+fn is_interrupted(motion: &Motion) -> bool {
+    motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted)
 }
 
-impl<I: Fn() -> bool, const N: usize> Observer for Recorded<I, N> {
+/// Records the states at multiples of a number of steps, and ends the run if its interruption is wanted.
+struct Recorded<'m> {
+    states: Vec<StateAt>,
+    stride: usize,
+    motion: &'m Motion,
+}
+
+impl Observer for Recorded<'_> {
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if at.k.is_multiple_of(self.stride) && !at.last {
-            self.states.push((at.t, at.state.fixed(), at.log_factor.unwrap_or(f64::NAN)));
+            self.states.push((at.t, at.state.clone(), at.log_factor.unwrap_or(f64::NAN)));
         }
-        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && (self.interrupted)() {
+        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS) && is_interrupted(self.motion) {
             ControlFlow::Break(Stop::here("the check"))
         } else {
             ControlFlow::Continue(())
@@ -175,23 +189,67 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     system: &Sized<L, N>,
     motion: &Motion,
     samples: usize,
-) -> Result<(Check, Vec<State<N>>, Option<usize>), RuntimeError> {
+) -> Result<(Check, Vec<StateAt>, Option<usize>), RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let by = integrator(system, motion, &plan)?;
-    let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
+    let (lagrangian, symmetries, formula) = (&system.0, system.0.symmetries(), system.0.formula());
+    let by = integrator(formula, motion, &plan)?;
     let problem = system.problem_of(motion)?;
-    let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
-    let stride = plan.steps.div_ceil(samples.max(1));
-    let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
-    let first = momenta(problem.state());
-    let states = vec![(motion.start.t, *problem.state(), 0.0)];
-    let mut record = Recorded { states, stride, interrupted: &interrupted };
+    let states = vec![(motion.start.t, problem.state().into(), 0.0)];
+    let mut record = Recorded { states, stride: plan.steps.div_ceil(samples.max(1)), motion };
     run_by(&problem, by, plan.steps)?.with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
     let states = record.states;
-    let map = (by, h, 1);
+    let momenta = |x: &State| {
+        let PhasePoint { q, p, .. } = x.fixed();
+        symmetries.iter().map(|s| s.momentum(&q, &p)).collect()
+    };
+    let maps = |map: MapOfSteps, t: f64, from: &State| mapped(lagrangian, map, t, from);
+    let samples = samples_at(&states, &maps, (formula.constraints() > 0, (by, plan.step_size, 1)), &momenta, motion)?;
+    Ok((checked(formula, lagrangian.has_force(), &plan, samples), states, plan.integrator.collocation))
+}
+
+/// The check of a motion with these samples, without the theorems.
+fn checked(formula: &Formula, has_force: bool, plan: &Plan, samples: Vec<Sample>) -> Check {
+    let not_contact = match has_force {
+        true => Some(NotContact::Forced),
+        false => formula.has_noncontact_resets().then_some(NotContact::Reset),
+    };
+    let integrator = plan.integrator.name.to_string();
+    Check { integrator, step_size: plan.step_size, samples, statements: Vec::new(), not_contact }
+}
+
+/// The contact and Herglotz defects of the steps of a motion in many coordinates.
+pub(super) fn of_many(system: &ManyCoordinates, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+    let (plan, formula) = (Kernel::plan(system, motion)?, Kernel::formula(system));
+    let by = integrator(formula, motion, &plan)?;
+    let stages = |by: Option<AnyIntegrator>| by.map_or(Ok(GaussCollocation { stages: MOST_STAGES }), gauss);
+    let problem = system.problem(motion)?;
+    let states = vec![(motion.start.t, problem.state().clone(), 0.0)];
+    let mut record = Recorded { states, stride: plan.steps.div_ceil(samples.max(1)), motion };
+    let run = problem.by(stages(by)?).steps(Steps::Count(plan.steps)).with_conformal_factor();
+    run.observe(&mut record).run(Until::Time(motion.end))?;
+    let maps = |(by, h, count): MapOfSteps, t: f64, from: &State| {
+        let problem = SystemProblem::new(system, t, from.clone())?;
+        let plan = problem.by(stages(by)?).steps(Steps::Count(count)).plan(Until::After(h))?;
+        let mut stepper = plan.stepper()?;
+        stepper.advance(count).map_err(|failure| failure.cause)?;
+        Ok(([problem.state().clone(), stepper.state()], stepper.sigma()))
+    };
+    let samples = samples_at(&record.states, &maps, (false, (by, plan.step_size, 1)), &|_| Vec::new(), motion)?;
+    Ok(checked(formula, Kernel::has_force(system), &plan, samples))
+}
+
+/// The defects of a map, of a system that has constraints or none, and the momenta, at states of a motion.
+fn samples_at(
+    states: &[StateAt],
+    maps: &Maps<'_>,
+    (constrained, map): (bool, MapOfSteps),
+    momenta: &dyn Fn(&State) -> Vec<f64>,
+    motion: &Motion,
+) -> Result<Vec<Sample>, RuntimeError> {
+    let first = states.first().map_or_else(Vec::new, |(_, x, _)| momenta(x));
     let mut along = Vec::with_capacity(states.len());
-    for (t, x, log_factor) in &states {
-        if interrupted() {
+    for (t, x, log_factor) in states {
+        if is_interrupted(motion) {
             return Err(InputError::Interrupted.into());
         }
         let there = momenta(x).into_iter().zip(&first);
@@ -199,31 +257,21 @@ fn along<L: FormulaSystem<N>, const N: usize>(
             there.map(|(momentum, first)| MomentumSample { momentum, predicted: first * log_factor.exp() }).collect();
         along.push(Sample {
             t: *t,
-            sigma: step(lagrangian, map, *t, x)?.1,
+            sigma: step(maps, map, *t, x)?.1,
             log_factor: *log_factor,
-            contact_defect: contact_defect(lagrangian, map, *t, x)?,
-            herglotz_defect: herglotz_defect(lagrangian, map, *t, x)?,
+            contact_defect: contact_defect(maps, map, *t, x)?,
+            herglotz_defect: herglotz_defect(maps, constrained, map, *t, x)?,
             momenta,
         });
     }
-    let not_contact = match lagrangian.has_force() {
-        true => Some(NotContact::Forced),
-        false => lagrangian.formula().has_noncontact_resets().then_some(NotContact::Reset),
-    };
-    let integrator = plan.integrator.name.to_string();
-    let check = Check { integrator, step_size: h, samples: along, statements: Vec::new(), not_contact };
-    Ok((check, states, plan.integrator.collocation))
+    Ok(along)
 }
 
 /// The integrator of a motion; `None` for that which the constraints choose.
-fn integrator<L: FormulaSystem<N>, const N: usize>(
-    system: &Sized<L, N>,
-    motion: &Motion,
-    plan: &Plan,
-) -> Result<Option<AnyIntegrator>, RuntimeError> {
+fn integrator(formula: &Formula, motion: &Motion, plan: &Plan) -> Result<Option<AnyIntegrator>, RuntimeError> {
     Ok(match motion.step_control {
         StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Some(by),
-        StepControl::Accuracy { by: None, .. } if system.0.formula().constraints() > 0 => None,
+        StepControl::Accuracy { by: None, .. } if formula.constraints() > 0 => None,
         StepControl::Accuracy { by: None, .. } => Some(plan.integrator.name.parse()?),
     })
 }
@@ -235,7 +283,7 @@ pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
     most: usize,
 ) -> Result<Vec<ModifiedDefect>, RuntimeError> {
     let plan = super::run::plan(system, motion)?;
-    let (by, h, problem) = (integrator(system, motion, &plan)?, plan.step_size, system.problem_of(motion)?);
+    let (by, h, problem) = (integrator(system.0.formula(), motion, &plan)?, plan.step_size, system.problem_of(motion)?);
     // Constraints are refused before.
     let Some(by) = by.map(L::by).transpose()? else {
         return Err(RuntimeError::WithConstraints { what: "modified Hamiltonians" });
@@ -250,48 +298,39 @@ pub(super) fn check<const N: usize>(
     samples: usize,
 ) -> Result<Check, RuntimeError> {
     let (mut check, states, collocation) = along(system, motion, samples)?;
-    if system.0.formula().constraints() > 0 {
+    let (lagrangian, formula) = (&system.0, system.0.formula());
+    if formula.constraints() > 0 {
         // The theorems are about discrete Lagrangians on Q x Q x R.
         return Ok(check);
     }
-    let (h, lagrangian) = (check.step_size, &system.0);
-    let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
     let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
     let stages = collocation.unwrap_or(DEFAULT_STAGES);
-    let forced = Lagrangian::has_force(lagrangian);
-    let mut shorter = h;
-    check.statements = loop {
-        if forced {
-            // The theorems are about discrete Lagrangians, which do not exist with a force.
-            break virtual_work(lagrangian, stages, h, &of_theorems)?;
-        }
-        if interrupted() {
-            return Err(InputError::Interrupted.into());
-        }
-        match theorems_with(system, stages, (shorter, &of_theorems)) {
-            // The discrete Lagrangian is defined for points that are close enough to each other.
-            Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < MAX_STEP_DIVISION => {
-                shorter *= 0.5
-            }
-            ended => break ended?,
-        }
+    check.statements = if Lagrangian::has_force(lagrangian) {
+        // The theorems are about discrete Lagrangians, which do not exist with a force.
+        virtual_work(stages, check.step_size, &of_theorems, &|stages, h, t, x| {
+            let from = x.fixed();
+            let guess = legendre_inverse(lagrangian, t, &from, &from.p)?.v;
+            Ok(VirtualWork::of_step(lagrangian, stages, h, t, &from, &guess)?.residual())
+        })?
+    } else {
+        let maps = |map: MapOfSteps, t: f64, from: &State| mapped(lagrangian, map, t, from);
+        theorems_along(formula, &maps, (stages, check.step_size), &of_theorems, motion)?
     };
     Ok(check)
 }
 
+/// The residual of the contact form beside the virtual work, of a Gauss step with a number of stages and a length.
+type WorkResidual<'w> = dyn Fn(usize, f64, f64, &State) -> Result<f64, RuntimeError> + 'w;
+
 /// The contact defect of Gauss steps beside the virtual work of the force: the largest residual over some samples. Those
 /// from which no step of this length is possible are left out, unless that holds for all of them.
-fn virtual_work<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+fn virtual_work(
     stages: usize,
     h: f64,
-    samples: &[&State<N>],
+    samples: &[&StateAt],
+    of: &WorkResidual<'_>,
 ) -> Result<Vec<StatementResidual>, RuntimeError> {
-    let of = |(t, x, _): &&State<N>| -> Result<f64, RuntimeError> {
-        let guess = legendre_inverse(lagrangian, *t, x, &x.p)?.v;
-        Ok(VirtualWork::of_step(lagrangian, stages, h, *t, x, &guess)?.residual())
-    };
-    let found: Vec<Result<f64, RuntimeError>> = samples.iter().map(of).collect();
+    let found: Vec<Result<f64, RuntimeError>> = samples.iter().map(|(t, x, _)| of(stages, h, *t, x)).collect();
     let (known, failed): (Vec<_>, Vec<_>) = found.into_iter().partition(Result::is_ok);
     if let (true, Some(Err(error))) = (known.is_empty(), failed.into_iter().next()) {
         return Err(error);
@@ -301,19 +340,43 @@ fn virtual_work<const N: usize>(
     Ok(vec![StatementResidual { statement: Statement::VirtualWork, method, step_size: h, residual }])
 }
 
-/// The theorems for the discrete Lagrangian of contact Gauss collocation with step h: the largest residuals over the
-/// steps from some samples.
-fn theorems_with<const N: usize>(
-    system: &Sized<FormulaLagrangian<N>, N>,
-    stages: usize,
-    (h, samples): (f64, &[&State<N>]),
+/// The theorems for the discrete Lagrangian of contact Gauss collocation with a number of stages and step h, or with a
+/// shorter one.
+fn theorems_along(
+    formula: &Formula,
+    maps: &Maps<'_>,
+    (stages, h): (usize, f64),
+    samples: &[&StateAt],
+    motion: &Motion,
 ) -> Result<Vec<StatementResidual>, RuntimeError> {
-    let n = system.0.formula().dimension();
+    let mut shorter = h;
+    loop {
+        if is_interrupted(motion) {
+            return Err(InputError::Interrupted.into());
+        }
+        match theorems_with(formula, maps, (stages, shorter), samples) {
+            // The discrete Lagrangian is defined for points that are close enough to each other.
+            Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < MAX_STEP_DIVISION => {
+                shorter *= 0.5
+            }
+            ended => return ended,
+        }
+    }
+}
+
+/// The largest residuals over the steps from some samples.
+fn theorems_with(
+    formula: &Formula,
+    maps: &Maps<'_>,
+    (stages, h): (usize, f64),
+    samples: &[&StateAt],
+) -> Result<Vec<StatementResidual>, RuntimeError> {
+    let n = formula.dimension();
     let mut points = Vec::with_capacity(samples.len());
     for (t, x, _) in samples {
-        let q1 = step(&system.0, (Some(AnyIntegrator::Gauss { stages }), h, 1), *t, x)?.0.q;
-        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q.as_slice(), n).to_vec());
+        let q1 = step(maps, (Some(AnyIntegrator::Gauss { stages }), h, 1), *t, x)?.0.q;
+        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
         points.push(Points { t: *t, q0, q1, z0: x.z });
     }
-    theorems(system.0.formula(), stages, h, &points)
+    theorems(formula, stages, h, &points)
 }

@@ -87,7 +87,7 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
     }
 
     fn check(&self, lagrangian: &FormulaLagrangian<N>) -> Result<(), InputError> {
-        if const { is_compiled(N) } { self.with::<_, N>(lagrangian).check(lagrangian) } else { not_compiled() }
+        if const { is_compiled(N) } { self.with::<_, N>(lagrangian.clone()).check(lagrangian) } else { not_compiled() }
     }
 
     fn stepper(
@@ -97,7 +97,7 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         if const { is_compiled(N) } {
-            self.with::<_, N>(problem.lagrangian()).stepper(problem, h, options)
+            self.with::<_, N>(problem.lagrangian().clone()).stepper(problem, h, options)
         } else {
             not_compiled()
         }
@@ -110,7 +110,7 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
         x: &VelocityPoint<N>,
     ) -> Result<SVector<f64, N>, StepError> {
         if const { is_compiled(N) } {
-            self.with::<_, N>(lagrangian).constraint_force(lagrangian, t, x)
+            self.with::<_, N>(lagrangian.clone()).constraint_force(lagrangian, t, x)
         } else {
             Err(StepError::NonFinite)
         }

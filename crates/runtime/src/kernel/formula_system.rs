@@ -2,7 +2,7 @@
 
 use super::constrained::{OfConstraints, multipliers, projected};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, OfHamiltonian, Symmetry, VelocityPoint};
+use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry, VelocityPoint};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
@@ -23,6 +23,12 @@ pub(super) trait Observed {
     /// What expressions contain beside the position and the action: the velocity, found from a guess, or the momentum
     /// for a Hamiltonian. `None` where there is none.
     fn velocity_or_momentum(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector>;
+    /// The velocity at a state, found from a guess.
+    fn velocity(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector> {
+        self.velocity_or_momentum(t, state, guess)
+    }
+    /// The energy at a state with its velocity.
+    fn energy(&self, t: f64, state: &State, v: Option<&Vector>) -> Option<f64>;
     /// The multiplier of the constraint with this index; NaN where it is not determined.
     fn multiplier(&self, _t: f64, _x: &Point, _index: usize) -> f64 {
         f64::NAN
@@ -86,6 +92,11 @@ impl<const N: usize> Observed for FormulaLagrangian<N> {
         legendre_inverse(self, t, &state.fixed(), &guess).ok().map(|x| x.v.into())
     }
 
+    fn energy(&self, t: f64, state: &State, v: Option<&Vector>) -> Option<f64> {
+        let (PhasePoint { q, p, z }, v): (_, SVector<f64, N>) = (state.fixed(), v?.fixed());
+        Some(v.dot(&p) - Lagrangian::value(self, t, &q, &v, z))
+    }
+
     fn multiplier(&self, t: f64, x: &Point, index: usize) -> f64 {
         multipliers(self, t, &x.fixed()).and_then(|all| all.get(index).copied()).unwrap_or(f64::NAN)
     }
@@ -135,6 +146,14 @@ impl<const N: usize> Observed for OfHamiltonian<FormulaHamiltonian<N>> {
 
     fn velocity_or_momentum(&self, _t: f64, state: &State, _: &[f64]) -> Option<Vector> {
         Some(state.p.clone())
+    }
+
+    fn velocity(&self, t: f64, state: &State, guess: &[f64]) -> Option<Vector> {
+        legendre_inverse(self, t, &state.fixed(), &Vector::from(guess).fixed()).ok().map(|x| x.v.into())
+    }
+
+    fn energy(&self, t: f64, state: &State, _v: Option<&Vector>) -> Option<f64> {
+        Lagrangian::hamiltonian_with_gradient(self, t, &state.fixed()).map(|(h, _)| h)
     }
 }
 

@@ -1,11 +1,11 @@
 //! The kernel of formulas with more coordinates than any other kernel is compiled for.
 
-use super::Kernel;
 use super::formula_system::Observed;
 use super::recorder::Recorder;
 use super::run::{outcome_of, plan_of, requested};
 use super::sensitivity::{exponents_of, loss_gradient, sensitivity_of, unobserved};
 use super::sized::{checked, initial_state};
+use super::{Kernel, check, ensemble};
 use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan,
     RunMonitor, RuntimeError, Sensitivity, StepControl,
@@ -52,11 +52,11 @@ impl System for ManyCoordinates {
         *self.0.proved()
     }
     fn force_kind(&self) -> ForceKind {
-        match () {
-            () if !self.0.has_force() => ForceKind::None,
-            () if self.0.force_is_of_positions() => ForceKind::OfPositions,
-            () if self.0.force_is_drag() => ForceKind::Drag,
-            () => ForceKind::General,
+        match self.0.force_drag() {
+            _ if !self.0.has_force() => ForceKind::None,
+            _ if self.0.force_is_of_positions() => ForceKind::OfPositions,
+            Some((linear, quadratic)) => ForceKind::Drag { linear: linear.into(), quadratic },
+            None => ForceKind::General,
         }
     }
     fn has_force(&self) -> bool {
@@ -154,10 +154,24 @@ impl Observed for ManyCoordinates {
         let guess = Vector::from_fn(state.q.len(), |i| guess.get(i).copied().unwrap_or(0.0));
         self.legendre_inverse(t, state, &guess).ok().map(|x| x.v)
     }
+    fn energy(&self, t: f64, state: &State, v: Option<&Vector>) -> Option<f64> {
+        let x = Point { q: state.q.clone(), v: v?.clone(), z: state.z };
+        Some(x.v.dot(&state.p) - System::value(self, t, &x))
+    }
 }
 
 impl ManyCoordinates {
-    fn problem(&self, motion: &Motion) -> Result<SystemProblem<'_>, RuntimeError> {
+    /// The same formula with other values of some parameters.
+    pub(super) fn with_values<'n>(
+        &self,
+        mut values: impl Iterator<Item = (&'n str, f64)>,
+    ) -> Result<Self, FormulaError> {
+        let mut derivatives = (*self.0).clone();
+        values.try_for_each(|(name, value)| derivatives.set(name, value))?;
+        Ok(ManyCoordinates(Arc::new(derivatives)))
+    }
+
+    pub(super) fn problem(&self, motion: &Motion) -> Result<SystemProblem<'_>, RuntimeError> {
         let start = initial_state(self.0.formula(), &motion.start)?;
         let problem = SystemProblem::new(self, motion.start.t, start)?;
         let force = self.applied_force(motion.start.t, problem.start());
@@ -199,7 +213,7 @@ impl ManyCoordinates {
 ///
 /// # Errors
 /// [`InputError::Hypothesis`] for another integrator.
-fn gauss(by: AnyIntegrator) -> Result<GaussCollocation, InputError> {
+pub(super) fn gauss(by: AnyIntegrator) -> Result<GaussCollocation, InputError> {
     match by {
         AnyIntegrator::Gauss { stages } => Ok(GaussCollocation { stages }),
         _ => Err(InputError::Hypothesis {
@@ -235,9 +249,7 @@ impl Kernel for ManyCoordinates {
     }
 
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
-        let mut derivatives = (*self.0).clone();
-        values.iter().try_for_each(|(name, value)| derivatives.set(name, *value))?;
-        Ok(Arc::new(ManyCoordinates(Arc::new(derivatives))))
+        Ok(Arc::new(self.with_values(values.iter().copied())?))
     }
 
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
@@ -294,12 +306,13 @@ impl Kernel for ManyCoordinates {
         })
     }
 
-    fn ensemble(&self, _ensemble: &Ensemble<'_>, _monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        Err(few("ensembles"))
+    fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        ensemble::run(self, ensemble, monitor)
     }
 
-    fn check(&self, _motion: &Motion, _samples: usize) -> Result<Check, RuntimeError> {
-        Err(few("checks of the contact form"))
+    /// Without the theorems on discrete Lagrangians.
+    fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
+        check::of_many(self, motion, samples)
     }
 
     fn modified_defects(&self, _motion: &Motion, _most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {

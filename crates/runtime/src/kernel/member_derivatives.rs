@@ -1,10 +1,10 @@
 //! Derivatives of the members of an ensemble.
 
-use super::ensemble::invalid_start;
+use super::ensemble_of::invalid_start;
 use super::sensitivity::{covector, loss_gradient, sensitivity_of, state};
 use super::sized::Sized;
 use crate::{BatchLoss, Ensemble, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StepControl};
-use discrete_herglotz::ensemble::EnsembleError;
+use discrete_herglotz::ensemble::{EnsembleError, Lagrangians};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
 use discrete_herglotz::{InputError, Until};
 use formula_lagrangian::FormulaLagrangian;
@@ -51,7 +51,7 @@ fn each_block<R, const N: usize>(
     ensemble: &Ensemble<'_>,
     interrupt: Option<&Interrupt>,
     mut work: impl FnMut(
-        &discrete_herglotz::Ensemble<'_, FormulaLagrangian<N>, N>,
+        &discrete_herglotz::Ensemble<'_, Lagrangians<'_, FormulaLagrangian<N>, N>>,
         usize,
     ) -> Result<Vec<Result<R, SensitivityError>>, EnsembleError>,
 ) -> Result<Vec<Result<R, SensitivityError>>, RuntimeError> {

@@ -3,6 +3,8 @@
 mod check;
 mod constrained;
 mod ensemble;
+mod ensemble_many;
+mod ensemble_of;
 mod formula_system;
 mod geometry;
 mod hamiltonian;

@@ -17,8 +17,7 @@ pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<Fou
     match formula.dimension() {
         1 => within::<1>(formula, problem),
         2 => within::<2>(formula, problem),
-        3 => within::<3>(formula, problem),
-        4 => within::<4>(formula, problem),
+        3..=4 => within::<4>(formula, problem),
         5..=8 => within::<8>(formula, problem),
         n => Err(RuntimeError::argument(
             "coordinates",
@@ -56,12 +55,12 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
                 problem.by
             ),
         )),
-        AnyIntegrator::Gauss { stages } => by(&lagrangian, Gauss::new::<N>(&lagrangian, stages, h)?, problem),
+        AnyIntegrator::Gauss { stages } => by(&lagrangian, Gauss::new::<N>(lagrangian.clone(), stages, h)?, problem),
         AnyIntegrator::Discrete(method) => {
             // The discrete Lagrangian of a splitting is determined at a state.
             let start = VelocityPoint { q: point(&problem.ends[0]), v: SVector::zeros(), z: problem.z0 };
             let state = legendre(&lagrangian, t0, &start);
-            by(&lagrangian, method.discretise::<N, _>(&lagrangian, h, t0, &state)?, problem)
+            by(&lagrangian, method.discretise::<N, _>(lagrangian.clone(), h, t0, &state)?, problem)
         }
         other => Err(RuntimeError::argument(
             "integrator",

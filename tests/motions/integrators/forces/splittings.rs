@@ -139,7 +139,7 @@ fn ensembles_take_forces() {
         let ensemble = Ensemble::new(lagrangian, 0.0, 19, start).by(by).steps(Steps::Count(200));
         ensemble
             .run(Until::Time(10.0), |member| {
-                let end = member.ending.unwrap().state;
+                let end = member.ending.as_ref().unwrap().state.clone();
                 let single = run(lagrangian, start(member.index), by, 10.0, 200);
                 let off = (end.q - single.q).norm() + (end.p - single.p).norm();
                 assert!(off <= bound, "{}: {off:e}", member.index);

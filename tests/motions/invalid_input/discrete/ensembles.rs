@@ -7,7 +7,7 @@ use crate::lagrangians::One;
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{
     Ensemble, Problem, Rows, Status, Steps, Until,
-    ensemble::{EnsembleError, Member, Tally},
+    ensemble::{EnsembleError, Lagrangians, Member, Tally},
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -49,16 +49,16 @@ pub const TESTS: &[InputTest] = &[
 ];
 
 /// The members at their ends.
-fn ends(ensemble: &Ensemble<'_, One, 1>, until: Until) -> Result<(Tally, Vec<Member<1>>), EnsembleError> {
+fn ends(ensemble: &Ensemble<'_, Lagrangians<'_, One, 1>>, until: Until) -> Result<(Tally, Vec<Member>), EnsembleError> {
     let mut all = Vec::new();
     let tally = ensemble.run(until, |member| all.push(member.clone()))?;
     Ok((tally, all))
 }
 
 /// Whether members end with finite states or an error.
-fn good(ended: &Result<(Tally, Vec<Member<1>>), EnsembleError>, count: usize) -> bool {
+fn good(ended: &Result<(Tally, Vec<Member>), EnsembleError>, count: usize) -> bool {
     let Ok((tally, all)) = ended else { return true };
-    let finite = all.iter().all(|m| m.ending.is_ok_and(|e| e.state.check().is_ok()) || m.ending.is_err());
+    let finite = all.iter().all(|m| m.ending.as_ref().is_ok_and(|e| e.state.is_finite()) || m.ending.is_err());
     finite && all.len() == count && (tally.members, tally.completed + tally.failed) == (count, count)
 }
 
@@ -72,7 +72,7 @@ fn ensembles(report: &mut Report) {
             let ended = ends(&of, Until::Time(t + 0.5));
             report.check(good(&ended, 3), || format!("{by}, {x:?} at {t}: {ended:?}"));
             let others = ended.as_ref().map_or(true, |(_, all)| {
-                [0, 2].iter().all(|i| all[*i].ending.is_ok_and(|e| e.status == Status::Completed))
+                [0, 2].iter().all(|i| all[*i].ending.as_ref().is_ok_and(|e| e.status == Status::Completed))
             });
             report.check(others, || format!("{by}, beside {x:?} at {t}: {ended:?}"));
             report.check(ended.is_ok() || !(t + 0.5).is_finite() || t + 0.5 == t, || format!("{by} at {t}: {ended:?}"));
@@ -136,7 +136,7 @@ fn shards(report: &mut Report) {
     };
     report.check(sharded.fingerprint() != foreign.fingerprint(), || "one fingerprint of two ensembles".into());
     let mut indices = Vec::new();
-    let mut fold = |member: &Member<1>| indices.push(member.index);
+    let mut fold = |member: &Member| indices.push(member.index);
     let Ok(mut merge) = ensemble.merge(&sharded, &mut fold) else {
         return report.check(false, || "a merge of a good ensemble".into());
     };

@@ -29,15 +29,15 @@ pub const TESTS: &[InputTest] = &[
             "Integrator::info",
             "Integrator::stepper",
             "CompositionMethod::new",
-            "Stepper::work_summary",
-            "Stepper::has_constant_rate",
+            "RunSupport::work_summary",
+            "RunSupport::has_constant_rate",
             "PlanEntry::computed",
             "PlanEntry::skipped",
         ],
         run: integrators,
     },
     InputTest { entries: &["CustomMethod::new", "MethodInfo::of_discrete", "Run::accuracy"], run: orders },
-    InputTest { entries: &["Stepper::save", "Stepper::restore"], run: saved },
+    InputTest { entries: &["RunSupport::save", "RunSupport::restore"], run: saved },
     InputTest {
         entries: &[
             "Checkpoint::every",
@@ -89,14 +89,15 @@ fn integrators(report: &mut Report) {
             report.entry_point(&h, made.map(driven));
         }
         let mut stepper = by.stepper(&tame(), 0.1, options).unwrap();
-        let work_summary = stepper.work_summary();
+        let support = stepper.run_support().unwrap();
+        let (work_summary, constant_rate) = (support.work_summary(), support.has_constant_rate());
         report.check(!work_summary.is_empty() && work_summary.iter().all(|i| !i.why.is_empty()), || {
             format!("{work_summary:?}")
         });
         // An integrator that reports a constant rate has the same rate in all steps.
         let mut rate = || stepper.advance(1).map(|()| stepper.sigma());
         let same = rate() == rate();
-        report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
+        report.check(same || !constant_rate, || format!("{}: another rate", info.name));
     }
     let rule = Rule::MIDPOINT;
     for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
@@ -136,16 +137,18 @@ fn saved(report: &mut Report) {
     for by in BY.into_iter().flatten() {
         let stepper =
             || Integrator::stepper(&by, &tame(), 0.1, StepperOptions { action: true, check_resolution: true }).unwrap();
+        let restores =
+            |stepper: &mut Box<dyn Stepper>, words: &[u64]| stepper.run_support_mut().unwrap().restore(words);
         let mut first = stepper();
         report.check(first.advance(3).is_ok(), || format!("{by}: three steps"));
-        let words = first.save().unwrap();
+        let words = first.run_support().unwrap().save().unwrap();
         for cut in [0, 1, words.len() / 2, words.len() - 1] {
-            report.check(!stepper().restore(&words[..cut]), || format!("{by}: {cut} words of {}", words.len()));
+            report.check(!restores(&mut stepper(), &words[..cut]), || format!("{by}: {cut} words of {}", words.len()));
         }
         let longer: Vec<u64> = words.iter().copied().chain([0]).collect();
-        report.check(!stepper().restore(&longer), || format!("{by}: a word too many"));
+        report.check(!restores(&mut stepper(), &longer), || format!("{by}: a word too many"));
         let mut second = stepper();
-        report.check(second.state() == start && second.restore(&words), || format!("{by}: its own words"));
+        report.check(second.state() == start && restores(&mut second, &words), || format!("{by}: its own words"));
         let on = first.advance(2).is_ok() && second.advance(2).is_ok();
         let same = (first.state(), first.time(), first.sigma()) == (second.state(), second.time(), second.sigma());
         report.check(on && same, || format!("{by}: {:?} and {:?}", first.state(), second.state()));

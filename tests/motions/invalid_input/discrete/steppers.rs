@@ -12,8 +12,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::statements::AnyForce;
 use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Symmetry};
 use discrete_herglotz::{
-    DiscreteLagrangian, InputError, Problem, SplittingScheme, Start, Stepper, StepperOptions, Steps, TransformedGauss,
-    Until,
+    DiscreteLagrangian, InputError, Problem, RunSupport, SplittingScheme, Start, StepDetails, Stepper, StepperOptions,
+    Steps, TransformedGauss, Until,
     checks::{EnergyDrift, EnergySample},
     gauss::{Gauss, GaussRoute, GaussStepper, TransformedStepper, VirtualWork},
     rules::{Composition, Flow, Rule},
@@ -44,7 +44,7 @@ pub const TESTS: &[InputTest] = &[
             "GaussStepper::without_newton",
             "GaussStepper::route",
             "GaussStepper::newton_steps",
-            "Stepper::dense",
+            "StepDetails::dense",
             "DenseStep::span",
             "DenseStep::at",
             "DenseStep::velocity",
@@ -60,7 +60,7 @@ pub const TESTS: &[InputTest] = &[
             "TransformedStepper::new",
             "TransformedStepper::time_momentum",
             "TransformedStepper::advance_to",
-            "Stepper::advance_until",
+            "RunSupport::advance_until",
         ],
         run: transformed,
     },
@@ -88,10 +88,10 @@ pub const TESTS: &[InputTest] = &[
             "Stepper::time",
             "Stepper::sigma",
             "Stepper::evaluations",
-            "Stepper::unresolved",
-            "Stepper::suspect_interval",
-            "Stepper::guess",
-            "Stepper::last_velocity",
+            "RunSupport::unresolved",
+            "RunSupport::suspect_interval",
+            "RunSupport::guess",
+            "StepDetails::last_velocity",
         ],
         run: steppers,
     },
@@ -203,7 +203,7 @@ fn steppers(report: &mut Report) {
     let start: PhasePoint<1> = triples()[0].into();
     let gauss = Gauss::new(EVERYTHING, 4, 0.1).unwrap();
     let ld = Rule::MIDPOINT.of(EVERYTHING, 0.1).unwrap();
-    let steppers: [Box<dyn Stepper + '_>; 4] = [
+    let steppers: [Box<dyn RunSupport + '_>; 4] = [
         Box::new(gauss.stepper(0.0, start, start.p).unwrap()),
         Box::new(Flow::new(&ld, 0.0, start).unwrap()),
         Box::new(Splitting::new(&CLAIMING, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),
@@ -220,11 +220,12 @@ fn steppers(report: &mut Report) {
             "no step".into()
         });
         let blank = stepper.sigma() == 1.0 && stepper.unresolved().is_none() && stepper.suspect_interval().is_none();
-        report.check(blank && stepper.last_velocity().is_none(), || "before the first step".into());
+        let velocity = |stepper: &dyn RunSupport| stepper.last_step().and_then(|step| step.last_velocity());
+        report.check(blank && velocity(&*stepper).is_none(), || "before the first step".into());
         // The guess of another motion changes the work alone.
         stepper.guess(&foreign);
         report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
-        let v = stepper.last_velocity();
+        let v = velocity(&*stepper);
         report.check(v.as_ref().is_none_or(|v| v.iter().all(|v| v.is_finite())), || format!("{v:?}"));
         report.check(stepper.suspect_interval().is_none_or(|d| d.step + d.steps <= 2), || {
             "a suspect interval beyond the steps taken".into()

@@ -6,6 +6,7 @@ mod table;
 
 use crate::ensemble::convergence::ConvergenceTest;
 use crate::ensemble::lane::{Lane, LaneOptions, LaneStatus, interrupt};
+use crate::ensemble::members::LaneKernel;
 use crate::gauss::resolution::tail::of_sigma;
 use crate::gauss::tables::coefficients::MAX_STAGES;
 use crate::gauss::tables::condensed::Condensed;
@@ -15,7 +16,7 @@ use crate::numbers::compensated_batch::CompensatedBatch;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, Interrupt, StepError};
+use crate::{InputError, Interrupt, State, StepError, Vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 use num_traits::Zero;
@@ -62,10 +63,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         let table = Box::new(Table::new(&condensed));
         Ok(GaussPacks { form, table, t0, h, steps, interrupt: None })
     }
+}
+
+impl<L: Lagrangian<N> + Sync, const N: usize> LaneKernel for GaussPacks<'_, L, N> {
+    /// The kernel uses compensated sums.
+    fn needs_single_run(&self, _state: &State) -> bool {
+        false
+    }
 
     /// Takes all steps of some motions in place, and records a state after every `rows` steps. Lanes in which the
     /// equations of a step could not be solved are flagged.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, options: LaneOptions) {
+    fn run(&self, instructions: Instructions, lanes: &mut [Lane], action: bool, options: LaneOptions) {
         let stride = options.rows.unwrap_or(self.steps);
         if action {
             instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
@@ -78,7 +86,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
     packs: &'s GaussPacks<'a, L, N>,
-    lanes: &'s mut [Lane<N>],
+    lanes: &'s mut [Lane],
     /// The number of steps from one recorded state to the next.
     stride: usize,
 }
@@ -109,7 +117,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
+    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane], stride: usize) {
         let width = SimdBatch::<S, K>::COUNT;
         let mut in_flight = Vec::with_capacity(PACKS_IN_FLIGHT);
         for members in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
@@ -141,16 +149,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// The pack of some motions; lanes beyond the last motion repeat it. Not inlined: it is called once for many steps.
     #[inline(never)]
-    fn start<S: Simd, const K: usize>(&self, members: &[Lane<N>]) -> Pack<S, K, N> {
+    fn start<S: Simd, const K: usize>(&self, members: &[Lane]) -> Pack<S, K, N> {
         let zero = SimdBatch::zero();
-        let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
+        let of = |f: &dyn Fn(&State) -> f64| {
             CompensatedBatch::from(SimdBatch::from_lanes(|i| {
                 members.get(i).or(members.last()).map_or(0.0, |lane| f(&lane.state))
             }))
         };
         Pack {
             q: from_fn(|d| of(&|state| state.q[d])),
-            v: from_fn(|d| of(&|state| self.form.velocity(&state.p)[d])),
+            v: from_fn(|d| of(&|state| self.form.velocity(&state.p.fixed())[d])),
             z: of(&|state| state.z),
             a: [[zero; N]; MAX_STAGES],
             x: [[zero; N]; MAX_STAGES],
@@ -169,11 +177,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// The state in a lane. Not inlined: it is called for rows alone.
     #[inline(never)]
-    fn state<S: Simd, const K: usize>(&self, m: &Pack<S, K, N>, i: usize) -> PhasePoint<N> {
+    fn state<S: Simd, const K: usize>(&self, m: &Pack<S, K, N>, i: usize) -> State {
         let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
-        PhasePoint {
-            q: SVector::from_fn(|d, _| m.q[d].value.lanes()[i]),
-            p: self.form.momentum(&v),
+        State {
+            q: Vector::from_fn(N, |d| m.q[d].value.lanes()[i]),
+            p: self.form.momentum(&v).into(),
             z: m.z.value.lanes()[i],
         }
     }

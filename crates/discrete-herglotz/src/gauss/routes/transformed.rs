@@ -18,7 +18,10 @@ use crate::numbers::lanes::forget_branches;
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::solve::ITERATION_LIMIT;
-use crate::{InputError, PlanEntry, Problem, State, StepError, StepFailure, Stepper, UnresolvedStep, Vector};
+use crate::{
+    InputError, PlanEntry, Problem, RunSupport, State, StepDetails, StepError, StepFailure, Stepper, UnresolvedStep,
+    Vector,
+};
 use contact_geom::{Lagrangian, Structure};
 
 /// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of the
@@ -293,15 +296,6 @@ impl Stepper for TransformedStepper<'_> {
         self.run.advance(with, steps)
     }
 
-    fn last_velocity(&self) -> Option<Vector> {
-        self.run.general.last_velocity().map(Vector::from)
-    }
-
-    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
-        let with = Evaluated { system: &*self.system, kernel: &*self.kernel };
-        self.run.advance_until(with, steps, t_end)
-    }
-
     fn state(&self) -> State {
         let RouteState { q, y, z } = self.run.general.state();
         let values = |of: &[CompensatedSum]| of.iter().map(|x| x.value).collect();
@@ -318,6 +312,31 @@ impl Stepper for TransformedStepper<'_> {
 
     fn evaluations(&self) -> u64 {
         self.run.general.evaluations
+    }
+
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl StepDetails for TransformedStepper<'_> {
+    fn last_velocity(&self) -> Option<Vector> {
+        self.run.general.last_velocity().map(Vector::from)
+    }
+}
+
+impl RunSupport for TransformedStepper<'_> {
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
+        let with = Evaluated { system: &*self.system, kernel: &*self.kernel };
+        self.run.advance_until(with, steps, t_end)
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {

@@ -6,7 +6,7 @@ use crate::hamiltonian::{
     Kinetic, PieceStepper, PieceSum, PointFlow, PolynomialInAction, Potential, Prolonged, SeparableSplitting,
     separable_pieces,
 };
-use crate::{InputError, Integrator, Problem, SplittingScheme, Stepper, StepperOptions};
+use crate::{InputError, Integrator, Problem, RunSupport, SplittingScheme, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ContactHamiltonian, HamiltonianStructure, OfHamiltonian, PhasePoint, Scalar};
 

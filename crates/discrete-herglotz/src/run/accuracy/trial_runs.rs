@@ -238,7 +238,11 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             chunks += 1;
             // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
             let chunk = stride.min(taken.max(1)).min(steps - taken);
-            let (done, cause) = match run.advance_until(chunk, time) {
+            let advanced = match run.run_support_mut() {
+                Some(run) => run.advance_until(chunk, time),
+                None => run.advance(chunk).map(|()| chunk),
+            };
+            let (done, cause) = match advanced {
                 Ok(done) => (done, None),
                 Err(StepFailure { taken, cause }) => (taken, Some(cause)),
             };
@@ -250,7 +254,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             let on_grid = taken == steps || (run.time() - time) * span >= 0.0;
             let x = run.state();
             if on_grid || stride > 1 {
-                let v = speeds.at(run.time(), &x, run.last_velocity().as_ref());
+                let near = run.last_step().and_then(|step| step.last_velocity());
+                let v = speeds.at(run.time(), &x, near.as_ref());
                 velocities.extend(on_grid.then_some(v));
             } else {
                 speeds.record_position(run.time(), &x.q);

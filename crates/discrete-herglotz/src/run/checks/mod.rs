@@ -173,7 +173,7 @@ impl<'r, 'p> Checks<'r, 'p> {
         {
             return Some(status(defect));
         }
-        if step.stepper.has_changed_energy() {
+        if step.stepper.last_step().is_some_and(|last| last.has_changed_energy()) {
             self.energy = None;
         }
         if let Some(energy) = &mut self.energy

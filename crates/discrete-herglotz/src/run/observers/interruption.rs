@@ -92,7 +92,9 @@ mod tests {
                 let ensemble = ensemble.steps(Steps::Size(0.01));
                 let ensemble = if let Some(i) = interrupt { ensemble.with_interrupt(i) } else { ensemble };
                 let mut ends = Vec::new();
-                ensemble.run(Until::Time(10.0), |member| ends.push(member.ending.as_ref().unwrap().state)).unwrap();
+                ensemble
+                    .run(Until::Time(10.0), |member| ends.push(member.ending.as_ref().unwrap().state.clone()))
+                    .unwrap();
                 ends
             };
             assert_eq!(ends(Some(Interrupt::when(&|| false))), ends(None), "{by}");

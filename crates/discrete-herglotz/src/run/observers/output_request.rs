@@ -8,7 +8,7 @@ pub struct OutputRequest {
     pub action: bool,
     /// The conformal factor of the motion, the product of the `sigma_d`.
     pub conformal_factor: bool,
-    /// Whether the stepper must support [saving](crate::Stepper::save).
+    /// Whether the stepper must support [saving](crate::RunSupport::save).
     pub saved: bool,
 }
 

@@ -91,7 +91,7 @@ impl<'r> StepView<'r> {
 
     /// The resets in the steps since the last view, in their order.
     pub fn resets(&self) -> &'r [Reset] {
-        self.stepper.resets()
+        self.stepper.last_step().map_or(&[], |step| step.resets())
     }
 
     /// The energy `E_L = v.p - L`.

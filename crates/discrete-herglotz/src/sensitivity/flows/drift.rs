@@ -2,23 +2,32 @@
 
 use super::coefficients::CoefficientDerivatives;
 use super::exponential_integrals::{length, moment};
-use super::sources::Sources;
+use super::kinetic::Kinetic;
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::array::from_fn;
-use crate::sensitivity::parametric_system::Quantity;
-use crate::splitting::drag::{Drag, QUADRATURE_NODES};
-use crate::splitting::separable::SeparableForm;
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, Derivatives, Parametric, PhasePoint, VelocityPoint};
+use crate::sensitivity::parametric_system::{Quantities, Quantity};
+use crate::splitting::drag::QUADRATURE_NODES;
+use crate::system::products::times;
+use crate::{Components, Point, State, System, Vector};
+use contact_geom::nalgebra::DMatrix;
+
+/// The rate `gamma(t) = L_z` of a linear drag.
+pub(super) enum Drag {
+    /// A constant rate.
+    Constant(f64),
+    /// A rate that depends on time, evaluated at a point at rest at which L is defined.
+    Timed(Point),
+}
 
 /// The drift over a time s from the time t, `q += l M^-1 p`, `p = e^g p`, `z = e^g (z + l p.M^-1 p / 2)`, where g is the
 /// integral of the rate gamma, and l that of `e^g`.
-pub(super) struct Drift<'f, L, const N: usize> {
-    pub form: &'f SeparableForm<&'f L, N>,
+pub(super) struct Drift<'f> {
+    pub system: &'f dyn System,
+    pub kinetic: &'f Kinetic,
     /// The rate; `None` for a drift without drag.
-    pub drag: Option<&'f Drag<N>>,
+    pub drag: Option<&'f Drag>,
     pub t: f64,
     pub s: f64,
 }
@@ -30,38 +39,39 @@ struct Integrals {
     derivatives: Vec<[f64; 2]>,
 }
 
-impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
+impl Drift<'_> {
     /// Applies the drift to a state, with its derivatives.
     pub fn linearise(
         &self,
-        of: Option<(&mut Sources<'_>, &[CoefficientDerivatives<N>])>,
-        state: &mut PhasePoint<N>,
-    ) -> SubFlow<N> {
+        of: Option<(&mut (dyn Quantities + '_), &[CoefficientDerivatives])>,
+        state: &mut State,
+    ) -> SubFlow {
         let coefficients = of.as_ref().map_or(&[][..], |(_, coefficients)| *coefficients);
         let with_sources = of.is_some();
         let Integrals { g, l, derivatives } = self.integrals(of);
-        let PhasePoint { q, p, z } = *state;
-        let v = self.form.velocity(&p);
-        let inverse = self.form.inverse.as_ref().map_or_else(SMatrix::identity, |inverse| **inverse);
+        let State { q, p, z } = std::mem::take(state);
+        let (n, v) = (q.len(), self.kinetic.velocity(&p));
+        let inverse = self.kinetic.inverse();
         let growth = g.exp();
         let half = 0.5 * p.dot(&v);
         let state_map = TangentMatrix {
-            qp: inverse * l,
-            pp: SMatrix::identity() * growth,
-            zp: v * (growth * l),
+            qp: &inverse * l,
+            pp: DMatrix::from_diagonal_element(n, n, growth),
+            zp: &v * (growth * l),
             zz: growth,
-            ..TangentMatrix::identity()
+            ..TangentMatrix::identity(n)
         };
-        *state = PhasePoint { q: q + v * l, p: p * growth, z: growth * (z + l * half) };
+        *state = State { q: q + &v * l, p: &p * growth, z: growth * (z + l * half) };
         let mut sources = Vec::new();
         if with_sources {
             sources.reserve(derivatives.len());
             for (k, [dg, dl]) in derivatives.into_iter().enumerate() {
                 // dv = -M^-1 dM v at a fixed p.
-                let dv = coefficients.get(k).map_or_else(SVector::zeros, |of| -(inverse * (of.mass * v)));
-                sources.push(ChartVector {
-                    x: v * dl + dv * l,
-                    y: state.p * dg,
+                let dv = coefficients.get(k);
+                let dv = dv.map_or_else(|| Vector::zeros(n), |of| -times(&inverse, &times(&of.mass, &v)));
+                sources.push(Components {
+                    x: &v * dl + &dv * l,
+                    y: &state.p * dg,
                     z: state.z * dg + growth * (dl * half + 0.5 * l * p.dot(&dv)),
                 });
             }
@@ -69,10 +79,10 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
         SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 }
     }
 
-    fn integrals(&self, of: Option<(&mut Sources<'_>, &[CoefficientDerivatives<N>])>) -> Integrals {
+    fn integrals(&self, of: Option<(&mut (dyn Quantities + '_), &[CoefficientDerivatives])>) -> Integrals {
         let s = self.s;
-        let (q, z) = match self.drag {
-            Some(Drag::Timed { q, z }) => (*q, *z),
+        let rest = match self.drag {
+            Some(Drag::Timed(rest)) => rest,
             constant => {
                 let gamma = if let Some(Drag::Constant(gamma)) = constant { *gamma } else { 0.0 };
                 let mut derivatives = Vec::new();
@@ -87,11 +97,9 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
                 return Integrals { g: gamma * s, l: length(gamma, s), derivatives };
             }
         };
-        let lagrangian = self.form.lagrangian;
-        let rest = VelocityPoint { q, v: SVector::zeros(), z };
         let table = Coefficients::of(QUADRATURE_NODES);
         let time = |j: usize| self.t + table.c[j].0 * s;
-        let rates: [f64; QUADRATURE_NODES] = from_fn(|j| lagrangian.rate(time(j), &rest));
+        let rates: [f64; QUADRATURE_NODES] = from_fn(|j| self.system.gradient(time(j), rest).z);
         // The integral of a function with these values, and those from the start to each node.
         let whole = |x: &[f64; QUADRATURE_NODES]| (0..QUADRATURE_NODES).map(|i| table.b[i].0 * x[i]).sum::<f64>();
         let part =
@@ -105,10 +113,10 @@ impl<L: Parametric<N>, const N: usize> Drift<'_, L, N> {
                 [s * whole(slopes), s * whole(&changes)]
             };
             for quantity in (0..of.count()).map(Quantity::Parameter) {
-                let slopes = from_fn(|j| of.at(quantity, time(j), &rest).gradient.z);
+                let slopes = from_fn(|j| of.at(quantity, time(j), rest).gradient.z);
                 derivatives.push(moved(&slopes));
             }
-            let slopes: [f64; QUADRATURE_NODES] = from_fn(|j| of.at(Quantity::Time, time(j), &rest).gradient.z);
+            let slopes: [f64; QUADRATURE_NODES] = from_fn(|j| of.at(Quantity::Time, time(j), rest).gradient.z);
             derivatives.push(moved(&slopes));
             // The rates at the nodes move with the duration, and the integrals are multiples of it.
             let [by_rates, by_factors] = moved(&from_fn(|j| table.c[j].0 * slopes[j]));

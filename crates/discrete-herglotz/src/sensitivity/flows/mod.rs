@@ -12,29 +12,28 @@ mod discrete;
 mod drift;
 mod exponential_integrals;
 mod kick;
+mod kinetic;
 mod rule_step;
 mod rules;
-mod sources;
 mod splittings;
 mod sub_flow;
 mod tangent_matrix;
 mod velocity_drag;
 
+use crate::StepError;
 use crate::integration::{SharedIntegrator, StepEnds, StepFormula};
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
-use crate::{Problem, StepError};
+use crate::sensitivity::parametric_system::{Differentiable, Quantities};
 use collocation::HamiltonianSteps;
-use contact_geom::Parametric;
 use contact_geom::numbers::max_or_nan;
 use discrete::DiscreteSteps;
 use rules::Rules;
-pub(crate) use sources::Sources;
 use splittings::{ActionFlows, DragFlows, LinearDragFlows};
 use sub_flow::SubFlow;
 
 /// A method whose steps are compositions of sub-flows.
-trait SubFlows<const N: usize> {
+trait SubFlows {
     /// Appends the sub-flows of a step, linearised at its states; with their sources, if `of` is given.
     ///
     /// # Errors
@@ -42,8 +41,8 @@ trait SubFlows<const N: usize> {
     fn linearise(
         &self,
         step: &StepEnds,
-        of: Option<&mut Sources<'_>>,
-        flows: &mut Vec<SubFlow<N>>,
+        of: Option<&mut (dyn Quantities + '_)>,
+        flows: &mut Vec<SubFlow>,
     ) -> Result<(), StepError>;
 
     /// Why the steps are not differentiable in a parameter, if they are not.
@@ -57,53 +56,30 @@ trait SubFlows<const N: usize> {
     }
 }
 
-/// The tangent of steps that are compositions of sub-flows, without the Lagrangian and its number of coordinates.
-pub(crate) trait FlowTangent {
-    /// Why the steps are not differentiable in a parameter, if they are not.
-    fn obstacle(&self, parameter: usize) -> Option<&'static str>;
-
-    /// Whether the steps are differentiable with respect to their start alone.
-    fn only_in_start(&self) -> bool;
-
-    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
-    ///
-    /// # Errors
-    /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
-    fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column]) -> Result<f64, StepError>;
-
-    /// Carries covectors from the end of a step, the k-th of the run, to its start.
-    ///
-    /// # Errors
-    /// Those of [`push`](Self::push).
-    fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector]) -> Result<(), StepError>;
-}
-
-/// The sub-flows of a method, with their workspace.
-pub(crate) struct FlowEngine<'a, const N: usize> {
-    method: Box<dyn SubFlows<N> + 'a>,
-    of_parameters: Sources<'a>,
-    flows: Vec<SubFlow<N>>,
+/// The tangent of steps that are compositions of sub-flows.
+pub(crate) struct FlowEngine<'a> {
+    method: Box<dyn SubFlows + 'a>,
+    of_parameters: Box<dyn Quantities + 'a>,
+    flows: Vec<SubFlow>,
     /// Why the steps are not differentiable in each parameter, if they are not.
     obstacles: Vec<Option<&'static str>>,
 }
 
-impl<'a, const N: usize> FlowEngine<'a, N> {
+impl<'a> FlowEngine<'a> {
     /// # Errors
     /// Those of the steps of the method.
-    pub fn new<L: Parametric<N>>(
-        problem: &Problem<'a, L, N>,
+    pub fn new(
+        of_system: &Differentiable<'a>,
         formula: StepFormula,
         integrator: &SharedIntegrator<'a>,
-        sources: Sources<'a>,
     ) -> Result<Self, SensitivityError> {
-        let lagrangian = problem.lagrangian;
-        let mut of_parameters = sources;
-        let of = &mut of_parameters;
+        let (problem, mut of_parameters) = (&of_system.problem, of_system.stages.quantities());
+        let (system, of) = (problem.system.clone(), &mut *of_parameters);
         let discrete = |varies| {
-            let (problem, integrator) = (problem.of_system(), integrator.clone());
-            Box::new(DiscreteSteps { lagrangian, problem, integrator, varies })
+            let (problem, integrator) = (problem.clone(), integrator.clone());
+            Box::new(DiscreteSteps { problem, integrator, varies })
         };
-        let method: Box<dyn SubFlows<N> + 'a> = match formula {
+        let method: Box<dyn SubFlows + 'a> = match formula {
             StepFormula::Splitting(scheme) if !problem.structure.is_affine_in_z() => {
                 Box::new(ActionFlows::new(problem, &scheme, of)?)
             }
@@ -111,22 +87,19 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
                 Box::new(DragFlows::new(problem, &scheme, of)?)
             }
             StepFormula::Splitting(scheme) => Box::new(LinearDragFlows::new(problem, &scheme, of)?),
-            StepFormula::Rule(nodes) => Box::new(Rules { lagrangian, nodes, lengths: vec![1.0] }),
+            StepFormula::Rule(nodes) => Box::new(Rules { system, nodes, lengths: vec![1.0] }),
             StepFormula::Composition(nodes, scheme) => {
                 let lengths = scheme.substeps().unwrap_or_else(|| vec![1.0]);
-                Box::new(Rules { lagrangian, nodes, lengths })
+                Box::new(Rules { system, nodes, lengths })
             }
-            StepFormula::Collocation { stages } => {
-                if const { L::HINTS.hamiltonian } {
-                    Box::new(HamiltonianSteps { lagrangian, stages })
-                } else {
-                    return Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" });
-                }
-            }
+            StepFormula::Collocation { stages } => match of_system.of.hamiltonian() {
+                Some(system) => Box::new(HamiltonianSteps { system, stages }),
+                None => return Err(SensitivityError::NoTangent { method: integrator.info().name, case: "" }),
+            },
             StepFormula::Jacobian => discrete(false),
             // The variation of a Lagrangian that is given by a contact Hamiltonian is that of its Legendre transform, which
             // is not implemented.
-            StepFormula::Derivatives => discrete(const { !L::HINTS.hamiltonian }),
+            StepFormula::Derivatives => discrete(!of_system.is_hamiltonian()),
         };
         let obstacles = (0..of.count()).map(|index| method.obstacle(index)).collect();
         Ok(FlowEngine { method, of_parameters, flows: Vec::new(), obstacles })
@@ -134,7 +107,7 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
 
     fn linearise(&mut self, step: &StepEnds, with_sources: bool) -> Result<(), StepError> {
         self.flows.clear();
-        let of = with_sources.then_some(&mut self.of_parameters);
+        let of = with_sources.then_some(&mut *self.of_parameters);
         self.method.linearise(step, of, &mut self.flows)?;
         if let Some(first) = self.flows.first_mut() {
             for (source, obstacle) in first.sources.iter_mut().zip(&self.obstacles) {
@@ -145,37 +118,45 @@ impl<'a, const N: usize> FlowEngine<'a, N> {
         }
         Ok(())
     }
-}
 
-impl<const N: usize> FlowTangent for FlowEngine<'_, N> {
-    fn obstacle(&self, parameter: usize) -> Option<&'static str> {
+    /// Why the steps are not differentiable in a parameter, if they are not.
+    pub fn obstacle(&self, parameter: usize) -> Option<&'static str> {
         self.obstacles.get(parameter).copied().flatten()
     }
 
-    fn only_in_start(&self) -> bool {
+    /// Whether the steps are differentiable with respect to their start alone.
+    pub fn only_in_start(&self) -> bool {
         self.method.only_in_start()
     }
 
-    fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column]) -> Result<f64, StepError> {
+    /// Carries columns from the start of a step, the k-th of the run, to its end; returns the largest component of them.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`] for a derivative that is not finite, and those of the steps.
+    pub fn push(&mut self, step: &StepEnds, k: usize, columns: &mut [Column]) -> Result<f64, StepError> {
         let with_sources =
             columns.iter().any(|column| column.parameter.is_some() || column.dt0 != 0.0 || column.dh != 0.0);
         self.linearise(step, with_sources)?;
         let mut largest = 0.0;
         for column in columns {
-            let mut image = column.state().fixed();
+            let mut image = column.state();
             self.flows.iter().for_each(|flow| flow.push(k, column, &mut image));
-            column.set_state(image.into());
+            column.set_state(image);
             largest = max_or_nan(largest, column.size());
         }
         if largest.is_finite() { Ok(largest) } else { Err(StepError::NonFinite) }
     }
 
-    fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector]) -> Result<(), StepError> {
+    /// Carries covectors from the end of a step, the k-th of the run, to its start.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn pull(&mut self, step: &StepEnds, k: usize, covectors: &mut [Covector]) -> Result<(), StepError> {
         self.linearise(step, true)?;
         for covector in covectors {
-            let mut image = covector.state().fixed();
+            let mut image = covector.state();
             self.flows.iter().rev().for_each(|flow| flow.pull(k, covector, &mut image));
-            covector.set_state(image.into());
+            covector.set_state(image);
             let size = covector.size();
             if !size.is_finite() {
                 return Err(StepError::NonFinite);

@@ -1,57 +1,72 @@
 //! The derivative of a map of states.
 
-use contact_geom::ChartVector;
-use contact_geom::nalgebra::{SMatrix, SVector};
+use crate::system::products::{times, transposed_times};
+use crate::{Components, Vector};
+use contact_geom::nalgebra::DMatrix;
 
 /// The derivative of a map of states `(q, p, z)`, in blocks: `qp` is that of the new q in the old p.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TangentMatrix<const N: usize> {
-    pub qq: SMatrix<f64, N, N>,
-    pub qp: SMatrix<f64, N, N>,
-    pub qz: SVector<f64, N>,
-    pub pq: SMatrix<f64, N, N>,
-    pub pp: SMatrix<f64, N, N>,
-    pub pz: SVector<f64, N>,
-    pub zq: SVector<f64, N>,
-    pub zp: SVector<f64, N>,
+#[derive(Clone, Debug)]
+pub(super) struct TangentMatrix {
+    pub qq: DMatrix<f64>,
+    pub qp: DMatrix<f64>,
+    pub qz: Vector,
+    pub pq: DMatrix<f64>,
+    pub pp: DMatrix<f64>,
+    pub pz: Vector,
+    pub zq: Vector,
+    pub zp: Vector,
     pub zz: f64,
 }
 
-impl<const N: usize> TangentMatrix<N> {
-    /// That of the identity.
-    pub fn identity() -> Self {
-        let (one, none, zero) = (SMatrix::identity(), SMatrix::zeros(), SVector::zeros());
-        TangentMatrix { qq: one, qp: none, qz: zero, pq: none, pp: one, pz: zero, zq: zero, zp: zero, zz: 1.0 }
+impl TangentMatrix {
+    /// That of the identity, for n coordinates.
+    pub fn identity(n: usize) -> Self {
+        let (one, none, zero) = (|| DMatrix::identity(n, n), || DMatrix::zeros(n, n), || Vector::zeros(n));
+        TangentMatrix {
+            qq: one(),
+            qp: none(),
+            qz: zero(),
+            pq: none(),
+            pp: one(),
+            pz: zero(),
+            zq: zero(),
+            zp: zero(),
+            zz: 1.0,
+        }
     }
 
     /// The image of a tangent.
-    pub fn push(&self, x: &ChartVector<N>) -> ChartVector<N> {
-        ChartVector {
-            x: self.qq * x.x + self.qp * x.y + self.qz * x.z,
-            y: self.pq * x.x + self.pp * x.y + self.pz * x.z,
+    pub fn push(&self, x: &Components) -> Components {
+        Components {
+            x: times(&self.qq, &x.x) + times(&self.qp, &x.y) + &self.qz * x.z,
+            y: times(&self.pq, &x.x) + times(&self.pp, &x.y) + &self.pz * x.z,
             z: self.zq.dot(&x.x) + self.zp.dot(&x.y) + self.zz * x.z,
         }
     }
 
     /// The image of a covector by the transpose.
-    pub fn pull(&self, w: &ChartVector<N>) -> ChartVector<N> {
-        ChartVector {
-            x: self.qq.tr_mul(&w.x) + self.pq.tr_mul(&w.y) + self.zq * w.z,
-            y: self.qp.tr_mul(&w.x) + self.pp.tr_mul(&w.y) + self.zp * w.z,
+    pub fn pull(&self, w: &Components) -> Components {
+        Components {
+            x: transposed_times(&self.qq, &w.x) + transposed_times(&self.pq, &w.y) + &self.zq * w.z,
+            y: transposed_times(&self.qp, &w.x) + transposed_times(&self.pp, &w.y) + &self.zp * w.z,
             z: self.qz.dot(&w.x) + self.pz.dot(&w.y) + self.zz * w.z,
         }
     }
 
     /// Sets the j-th column: the image of the j-th of the coordinates q, then p, then z.
-    pub fn set_column(&mut self, j: usize, image: &ChartVector<N>) {
-        if j < N {
-            self.qq.set_column(j, &image.x);
-            self.pq.set_column(j, &image.y);
+    pub fn set_column(&mut self, j: usize, image: Components) {
+        let n = self.qz.len();
+        let set = |matrix: &mut DMatrix<f64>, j: usize, x: &Vector| {
+            matrix.column_mut(j).iter_mut().zip(x).for_each(|(entry, x)| *entry = *x);
+        };
+        if j < n {
+            set(&mut self.qq, j, &image.x);
+            set(&mut self.pq, j, &image.y);
             self.zq[j] = image.z;
-        } else if j < 2 * N {
-            self.qp.set_column(j - N, &image.x);
-            self.pp.set_column(j - N, &image.y);
-            self.zp[j - N] = image.z;
+        } else if j < 2 * n {
+            set(&mut self.qp, j - n, &image.x);
+            set(&mut self.pp, j - n, &image.y);
+            self.zp[j - n] = image.z;
         } else {
             (self.qz, self.pz, self.zz) = (image.x, image.y, image.z);
         }

@@ -1,14 +1,16 @@
 //! The derivative of a drift with a drag of the velocity.
 
-use super::coefficients::CoefficientDerivatives;
+use super::coefficients::{CoefficientDerivatives, mean};
 use super::exponential_integrals::{length, moment};
+use super::kinetic::{Kinetic, rest_of};
 use super::sub_flow::SubFlow;
 use super::tangent_matrix::TangentMatrix;
 use crate::gauss::tables::coefficients::Coefficients;
+use crate::integration::SystemProblem;
 use crate::splitting::drag::QUADRATURE_NODES;
-use crate::splitting::velocity_drag_flow::DragLaw;
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, Dual, PhasePoint, Scalar};
+use crate::{Components, ForceKind, InputError, State, Vector};
+use contact_geom::nalgebra::{DMatrix, DVectorView, SVector};
+use contact_geom::{Dual, Scalar};
 
 /// The size of x below which functions of `ln(1 + x)` are computed by series.
 const SMALL: f64 = 0.1;
@@ -19,55 +21,80 @@ const TERMS: i32 = 18;
 /// A number with its derivatives in `(|p|, b, rate, gamma, m, s)`; see [`RadialFlow`].
 type Radial = Dual<f64, SVector<f64, 6>>;
 
-/// Applies the flow of a [`DragLaw`] over a time s to a state, with its derivatives.
-pub(super) fn linearise<const N: usize>(
-    law: &DragLaw<N>,
-    s: f64,
-    coefficients: Option<&[CoefficientDerivatives<N>]>,
-    state: &mut PhasePoint<N>,
-) -> SubFlow<N> {
-    if law.quadratic == 0.0 { linear(law, s, coefficients, state) } else { quadratic(law, s, coefficients, state) }
+/// The coefficients of a [`DragLaw`](crate::splitting::velocity_drag_flow::DragLaw), for a number of coordinates that is
+/// known at run time.
+pub(super) struct DragLaw {
+    pub gamma: f64,
+    pub mass: Vector,
+    pub linear: Vector,
+    pub quadratic: f64,
 }
 
-/// Whether all masses are equal, and all linear drags.
-pub(super) fn has_equal_coefficients<const N: usize>(law: &DragLaw<N>) -> bool {
-    law.mass.iter().all(|m| *m == law.mass[0]) && law.linear.iter().all(|c| *c == law.linear[0])
+impl DragLaw {
+    /// The law of a problem with a separable Lagrangian with a drag of the velocity.
+    ///
+    /// # Errors
+    /// [`InputError::Forced`] for a mass matrix of another form.
+    pub fn of(problem: &SystemProblem<'_>, kinetic: &Kinetic) -> Result<Self, InputError> {
+        let (linear, quadratic) = match problem.system.force_kind() {
+            ForceKind::Drag { linear, quadratic } => (linear, quadratic),
+            _ => (Vector::zeros(problem.system.dimension()), 0.0),
+        };
+        let gamma = problem.system.gradient(problem.t0, &rest_of(problem)).z;
+        let refused = InputError::Forced { method: "a splitting with a mass matrix that has other entries" };
+        let mass = kinetic.diagonal_mass().ok_or(refused)?;
+        if quadratic != 0.0 && mass.iter().any(|m| *m != mass[0]) {
+            return Err(InputError::Forced { method: "a splitting with different masses beside a quadratic drag" });
+        }
+        Ok(DragLaw { gamma, mass, linear, quadratic })
+    }
+
+    /// Whether all masses are equal, and all linear drags.
+    pub fn has_equal_coefficients(&self) -> bool {
+        self.mass.iter().all(|m| *m == self.mass[0]) && self.linear.iter().all(|c| *c == self.linear[0])
+    }
+}
+
+/// Applies the flow of a [`DragLaw`] over a time s to a state, with its derivatives.
+pub(super) fn linearise(
+    law: &DragLaw,
+    s: f64,
+    coefficients: Option<&[CoefficientDerivatives]>,
+    state: &mut State,
+) -> SubFlow {
+    if law.quadratic == 0.0 { linear(law, s, coefficients, state) } else { quadratic(law, s, coefficients, state) }
 }
 
 /// `q_i += l(r_i) p_i / m_i`, `p_i = e^(r_i s) p_i` with `r_i = gamma - c_i / m_i`, and
 /// `z = e^(gamma s) (z + sum_i p_i^2 l(2 r_i - gamma) / (2 m_i))`, where `l(r)` is the integral of `e^(r u)` over s.
-fn linear<const N: usize>(
-    law: &DragLaw<N>,
-    s: f64,
-    coefficients: Option<&[CoefficientDerivatives<N>]>,
-    state: &mut PhasePoint<N>,
-) -> SubFlow<N> {
+fn linear(law: &DragLaw, s: f64, coefficients: Option<&[CoefficientDerivatives]>, state: &mut State) -> SubFlow {
     let DragLaw { gamma, mass, linear, .. } = law;
-    let PhasePoint { q, p, z } = *state;
-    let rate = SVector::<f64, N>::from_fn(|i, _| gamma - linear[i] / mass[i]);
+    let start = std::mem::take(state);
+    let State { q, p, z } = &start;
+    let n = q.len();
+    let product = |a: &Vector, b: &Vector| Vector::from_fn(n, |i| a[i] * b[i]);
+    let rate = Vector::from_fn(n, |i| gamma - linear[i] / mass[i]);
     let of_action = rate.map(|r| 2.0 * r - gamma);
     let growth = (gamma * s).exp();
     let decay = rate.map(|r| (r * s).exp());
-    let shift = SVector::<f64, N>::from_fn(|i, _| length(rate[i], s) / mass[i]);
-    let lift = SVector::<f64, N>::from_fn(|i, _| length(of_action[i], s) / (2.0 * mass[i]));
-    let square = p.component_mul(&p);
-    *state =
-        PhasePoint { q: q + shift.component_mul(&p), p: decay.component_mul(&p), z: growth * (z + lift.dot(&square)) };
+    let shift = Vector::from_fn(n, |i| length(rate[i], s) / mass[i]);
+    let lift = Vector::from_fn(n, |i| length(of_action[i], s) / (2.0 * mass[i]));
+    let square = product(p, p);
+    *state = State { q: q + product(&shift, p), p: product(&decay, p), z: growth * (z + lift.dot(&square)) };
     let state_map = TangentMatrix {
-        qp: SMatrix::from_diagonal(&shift),
-        pp: SMatrix::from_diagonal(&decay),
-        zp: lift.component_mul(&p) * (2.0 * growth),
+        qp: diagonal(&shift),
+        pp: diagonal(&decay),
+        zp: product(&lift, p) * (2.0 * growth),
         zz: growth,
-        ..TangentMatrix::identity()
+        ..TangentMatrix::identity(n)
     };
     let mut sources = Vec::new();
     if let Some(coefficients) = coefficients {
-        let end = *state;
-        let moved = |of: &CoefficientDerivatives<N>, ds: f64| {
+        let end = &*state;
+        let moved = |of: &CoefficientDerivatives, ds: f64| {
             let mass_change = of.mass.diagonal();
-            let mut source =
-                ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: (s * of.gamma + gamma * ds) * end.z };
-            for i in 0..N {
+            let mut source = Components { z: (s * of.gamma + gamma * ds) * end.z, ..Components::zeros(n) };
+            for i in 0..n {
                 let m = mass[i];
                 let stretch = mass_change[i] / m;
                 let change = of.gamma - of.linear[i] / m + linear[i] / m * stretch;
@@ -82,44 +109,44 @@ fn linear<const N: usize>(
             let mut source = moved(of, 0.0);
             if of.quadratic != 0.0 {
                 // The flow with a quadratic drag at the coefficient 0.
-                let radial = CoefficientDerivatives { quadratic: of.quadratic, ..CoefficientDerivatives::zero() };
-                let start = PhasePoint { q, p, z };
-                source = source.plus(RadialFlow::new(law, s, &p).source(law, &start, &radial, 0.0));
+                let radial = CoefficientDerivatives { quadratic: of.quadratic, ..CoefficientDerivatives::zero(n) };
+                source = source.plus(&RadialFlow::new(law, s, p).source(law, &start, &radial, 0.0));
             }
             sources.push(source);
         }
-        sources.push(ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
-        sources.push(moved(&CoefficientDerivatives::zero(), 1.0));
+        sources.push(Components::zeros(n));
+        sources.push(moved(&CoefficientDerivatives::zero(n), 1.0));
     }
     SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 }
 }
 
-fn quadratic<const N: usize>(
-    law: &DragLaw<N>,
-    s: f64,
-    coefficients: Option<&[CoefficientDerivatives<N>]>,
-    state: &mut PhasePoint<N>,
-) -> SubFlow<N> {
-    let start = *state;
-    let PhasePoint { q, p, z } = start;
-    let flow = RadialFlow::new(law, s, &p);
-    let direction = p.try_normalize(0.0).unwrap_or_else(SVector::zeros);
-    let radial = p * direction.transpose();
+/// The matrix with this diagonal.
+fn diagonal(of: &Vector) -> DMatrix<f64> {
+    DMatrix::from_diagonal(&DVectorView::from_slice(of, of.len()))
+}
+
+fn quadratic(law: &DragLaw, s: f64, coefficients: Option<&[CoefficientDerivatives]>, state: &mut State) -> SubFlow {
+    let start = std::mem::take(state);
+    let State { q, p, z } = &start;
+    let flow = RadialFlow::new(law, s, p);
+    let (n, norm) = (q.len(), p.norm());
+    let direction = if norm <= 0.0 { Vector::zeros(n) } else { p / norm };
+    let radial = DMatrix::from_fn(n, n, |i, j| p[i] * direction[j]);
     let RadialFlow { shift, decay, lift, growth } = &flow;
-    *state = PhasePoint { q: q + p * shift.re, p: p * decay.re, z: growth.re * z + lift.re };
-    let one = SMatrix::<f64, N, N>::identity();
+    *state = State { q: q + p * shift.re, p: p * decay.re, z: growth.re * z + lift.re };
+    let one = DMatrix::<f64>::identity(n, n);
     let state_map = TangentMatrix {
-        qp: one * shift.re + radial * shift.d[0],
+        qp: &one * shift.re + &radial * shift.d[0],
         pp: one * decay.re + radial * decay.d[0],
         zp: direction * lift.d[0],
         zz: growth.re,
-        ..TangentMatrix::identity()
+        ..TangentMatrix::identity(n)
     };
     let mut sources = Vec::new();
     if let Some(coefficients) = coefficients {
         sources.extend(coefficients.iter().map(|of| flow.source(law, &start, of, 0.0)));
-        sources.push(ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
-        sources.push(flow.source(law, &start, &CoefficientDerivatives::zero(), 1.0));
+        sources.push(Components::zeros(n));
+        sources.push(flow.source(law, &start, &CoefficientDerivatives::zero(n), 1.0));
     }
     SubFlow { state: state_map, sources, start: 0.0, duration: 0.0 }
 }
@@ -136,7 +163,7 @@ struct RadialFlow {
 }
 
 impl RadialFlow {
-    fn new<const N: usize>(law: &DragLaw<N>, s: f64, p: &SVector<f64, N>) -> Self {
+    fn new(law: &DragLaw, s: f64, p: &Vector) -> Self {
         let variable =
             |re: f64, index: usize| Radial { re, d: SVector::from_fn(|i, _| f64::from(u8::from(i == index))) };
         let m = law.mass[0];
@@ -165,16 +192,10 @@ impl RadialFlow {
     }
 
     /// The derivative of the end of the flow along changes of the coefficients and of the duration.
-    fn source<const N: usize>(
-        &self,
-        law: &DragLaw<N>,
-        start: &PhasePoint<N>,
-        of: &CoefficientDerivatives<N>,
-        ds: f64,
-    ) -> ChartVector<N> {
-        let (m, mass_change) = (law.mass[0], of.mass.trace() / N as f64);
+    fn source(&self, law: &DragLaw, start: &State, of: &CoefficientDerivatives, ds: f64) -> Components {
+        let (m, mass_change) = (law.mass[0], of.mass.trace() / start.q.len() as f64);
         let stretch = mass_change / m;
-        let linear_change = of.linear.mean();
+        let linear_change = mean(&of.linear);
         let direction = SVector::<f64, 6>::from([
             0.0,
             of.quadratic / (m * m) - 2.0 * law.quadratic / (m * m) * stretch,
@@ -183,9 +204,9 @@ impl RadialFlow {
             mass_change,
             ds,
         ]);
-        ChartVector {
-            x: start.p * self.shift.d.dot(&direction),
-            y: start.p * self.decay.d.dot(&direction),
+        Components {
+            x: &start.p * self.shift.d.dot(&direction),
+            y: &start.p * self.decay.d.dot(&direction),
             z: start.z * self.growth.d.dot(&direction) + self.lift.d.dot(&direction),
         }
     }

@@ -8,7 +8,7 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::surfaces::TimedState;
 use crate::{
-    DenseStep, PlanEntry, State, StepFailure, Stepper, UnresolvedStep, Vector,
+    DenseStep, PlanEntry, RunSupport, State, StepDetails, StepFailure, Stepper, UnresolvedStep, Vector,
     integration::{Piece, Reset, SuspectInterval},
 };
 
@@ -30,16 +30,30 @@ impl Stepper for SwitchingStepper<'_> {
         self.problem.t0 + self.k as f64 * self.h
     }
 
-    fn last_velocity(&self) -> Option<Vector> {
-        (self.k > 0).then(|| self.here.v.clone())
-    }
-
     fn sigma(&self) -> f64 {
         self.sigma
     }
 
     fn evaluations(&self) -> u64 {
         self.spent + self.base.stepper().evaluations()
+    }
+
+    fn last_step(&self) -> Option<&dyn StepDetails> {
+        Some(self)
+    }
+
+    fn run_support(&self) -> Option<&dyn RunSupport> {
+        Some(self)
+    }
+
+    fn run_support_mut(&mut self) -> Option<&mut dyn RunSupport> {
+        Some(self)
+    }
+}
+
+impl StepDetails for SwitchingStepper<'_> {
+    fn last_velocity(&self) -> Option<Vector> {
+        (self.k > 0).then(|| self.here.v.clone())
     }
 
     fn dense(&self) -> Option<DenseStep> {
@@ -65,7 +79,9 @@ impl Stepper for SwitchingStepper<'_> {
     fn has_changed_energy(&self) -> bool {
         self.changed_energy
     }
+}
 
+impl RunSupport for SwitchingStepper<'_> {
     fn work_summary(&self) -> Vec<PlanEntry> {
         let mut items = self.base.stepper().work_summary();
         items.push(PlanEntry::computed(

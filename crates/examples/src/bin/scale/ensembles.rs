@@ -47,7 +47,7 @@ fn timed(
     let clock = Instant::now();
     let tally = ensemble
         .run(Until::Time(end), |member| {
-            ends.push(member.ending.map_or([f64::NAN; 2], |e| [e.state.q[0], e.state.p[0]]));
+            ends.push(member.ending.as_ref().map_or([f64::NAN; 2], |e| [e.state.q[0], e.state.p[0]]));
         })
         .map_err(failure)?;
     let seconds = clock.elapsed().as_secs_f64();
@@ -252,7 +252,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
             .without_action();
         let (clock, mut sum) = (Instant::now(), 0.0);
         ensemble
-            .run(Until::Time(10.0), |member| sum += member.ending.map_or(0.0, |e| e.state.q[0]))
+            .run(Until::Time(10.0), |member| sum += member.ending.as_ref().map_or(0.0, |e| e.state.q[0]))
             .map_err(failure)?;
         Ok(clock.elapsed().as_secs_f64())
     };

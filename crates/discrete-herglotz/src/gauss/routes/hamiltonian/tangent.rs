@@ -8,41 +8,30 @@ use crate::gauss::routes::hamiltonian::newton::factorise;
 use crate::gauss::routes::hamiltonian::stage::Stage;
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::product::dot;
-use crate::gauss::system::{CollocationSystem, PointGradient, PointRef, SystemAtPoints, Typed, vector_of};
+use crate::gauss::system::{CollocationSystem, PointRef, SystemAtPoints, Typed};
 use crate::gauss::tables::stage_table::StageTable;
-use crate::integration::QuantityDerivatives;
 use crate::numbers::lanes::forget_branches;
 use crate::solve::DenseLu;
-use crate::{Problem, StepError};
+use crate::{Components, ExplicitDerivatives, Problem, State, StepError};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{ChartVector, Lagrangian, PhasePoint};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// The derivatives of the end of a step.
-pub(crate) struct StepDerivatives<const N: usize> {
+pub(crate) struct StepDerivatives {
     /// In the coordinates q, p, z of its start.
-    pub state: Vec<ChartVector<N>>,
+    pub state: Vec<Components>,
     /// In each parameter, in the time of its start, and in its length; empty if not requested.
-    pub sources: Vec<ChartVector<N>>,
+    pub sources: Vec<Components>,
 }
 
 /// The derivatives of H, of its gradient and of the force at a stage, in each parameter and in the time.
-pub(crate) type Explicit<'e, const N: usize> = &'e mut dyn FnMut(f64, &PhasePoint<N>) -> Vec<QuantityDerivatives<N>>;
+type Explicit<'e> = &'e mut dyn FnMut(f64, &State) -> Vec<ExplicitDerivatives>;
 
 /// The same derivatives as [`StepDerivatives`], with the coordinates q, p, z in this order.
 struct Columns {
     state: Vec<Vec<f64>>,
     sources: Vec<Vec<f64>>,
 }
-
-/// The derivatives of H, of its gradient and of the force with respect to a quantity.
-struct ExplicitDerivatives {
-    value: f64,
-    gradient: PointGradient,
-    force: Vec<f64>,
-}
-
-/// Those in each parameter and in the time, at a stage.
-type AtStage<'e> = &'e mut dyn FnMut(f64, PointRef<'_>) -> Vec<ExplicitDerivatives>;
 
 /// The derivative of the end of a step in (q, p, z) at its start, as a matrix with the coordinates in this order.
 ///
@@ -55,7 +44,7 @@ pub(crate) fn step_jacobian<L: Lagrangian<N>, const N: usize>(
     (t, start): (f64, &PhasePoint<N>),
 ) -> Result<DMatrix<f64>, StepError> {
     let system = Typed::<L, N>(problem.lagrangian);
-    let columns = derivatives(&system, StageTable::new(s, h), (t, point_of(start)), None)?.state;
+    let columns = derivatives(&system, StageTable::new(s, h), (t, PointRef::of_state(start)), None)?.state;
     Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| columns[j][i]))
 }
 
@@ -67,31 +56,19 @@ pub(crate) fn step_jacobian<L: Lagrangian<N>, const N: usize>(
 ///
 /// # Errors
 /// Those of the step.
-pub(crate) fn step_derivatives<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
+pub(crate) fn step_derivatives(
+    system: &dyn CollocationSystem,
     s: usize,
     h: f64,
-    (t, start): (f64, &PhasePoint<N>),
-    explicit: Option<Explicit<'_, N>>,
-) -> Result<StepDerivatives<N>, StepError> {
-    let (system, table, from) = (Typed::<L, N>(lagrangian), StageTable::new(s, h), (t, point_of(start)));
-    let columns = match explicit {
-        None => derivatives(&system, table, from, None),
-        Some(explicit) => {
-            let mut at_stage = |t: f64, x: PointRef<'_>| {
-                let state = PhasePoint { q: vector_of(x.q), p: vector_of(x.v), z: x.z };
-                explicit(t, &state).iter().map(ExplicitDerivatives::of).collect()
-            };
-            derivatives(&system, table, from, Some(&mut at_stage))
-        }
-    }?;
-    let [state, sources] = [columns.state, columns.sources]
-        .map(|columns| columns.iter().map(|column| ChartVector::from_fn(|i| column[i])).collect());
+    (t, start): (f64, &State),
+    explicit: Option<Explicit<'_>>,
+) -> Result<StepDerivatives, StepError> {
+    let n = start.q.len();
+    let from = PointRef { q: &start.q, v: &start.p, z: start.z };
+    let columns = derivatives(system, StageTable::new(s, h), (t, from), explicit)?;
+    let of_column = |of: &Vec<f64>| Components { x: of[..n].into(), y: of[n..2 * n].into(), z: of[2 * n] };
+    let [state, sources] = [columns.state, columns.sources].map(|columns| columns.iter().map(of_column).collect());
     Ok(StepDerivatives { state, sources })
-}
-
-fn point_of<const N: usize>(x: &PhasePoint<N>) -> PointRef<'_> {
-    PointRef { q: x.q.as_slice(), v: x.p.as_slice(), z: x.z }
 }
 
 /// The derivatives of a step from a time and a state.
@@ -99,7 +76,7 @@ fn derivatives(
     system: &dyn CollocationSystem,
     table: StageTable,
     (t, start): (f64, PointRef<'_>),
-    explicit: Option<AtStage<'_>>,
+    explicit: Option<Explicit<'_>>,
 ) -> Result<Columns, StepError> {
     let (s, h, v) = (table.s, table.h, vec![0.0; start.q.len()]);
     let mut stages = HamiltonianStages::new(system, table, start, &v);
@@ -123,7 +100,7 @@ impl HamiltonianStages {
         system: &dyn SystemAtPoints,
         t: f64,
         start_p: &[f64],
-        explicit: Option<AtStage<'_>>,
+        explicit: Option<Explicit<'_>>,
     ) -> Result<Columns, StepError> {
         let (s, n, components) = (self.table.s, self.q.len(), self.components());
         let stages: Vec<Stage> = (0..s).map(|i| self.stage_of_last_step(t, i)).collect();
@@ -163,7 +140,11 @@ impl HamiltonianStages {
         let mut sources = Vec::new();
         if let Some(explicit) = explicit {
             let still = |_: usize| 0.0;
-            let at_stages: Vec<_> = stages.iter().map(|stage| explicit(stage.t, stage.phase_point())).collect();
+            let at_stage = |stage: &Stage| {
+                let x = stage.phase_point();
+                explicit(stage.t, &State { q: x.q.into(), p: x.v.into(), z: x.z })
+            };
+            let at_stages: Vec<_> = stages.iter().map(at_stage).collect();
             let count = at_stages.first().map_or(0, Vec::len);
             let mut known = Vec::new();
             for quantity in 0..count {
@@ -203,21 +184,13 @@ impl HamiltonianStages {
 impl Stage {
     /// The change of the right-hand side for a fixed stage, from that of H.
     fn explicit_change(&self, of: &ExplicitDerivatives, out: &mut [f64]) {
-        let ExplicitDerivatives { value, gradient, force } = of;
+        let ExplicitDerivatives { l: value, gradient, force } = of;
         let (n, rho) = (force.len(), self.rho());
         for d in 0..n {
-            out[d] = gradient.v[d];
-            out[n + d] = rho * (force[d] - gradient.q[d]);
+            out[d] = gradient.y[d];
+            out[n + d] = rho * (force[d] - gradient.x[d]);
         }
-        out[2 * n] = dot(self.phase_point().v, &gradient.v) - value;
+        out[2 * n] = dot(self.phase_point().v, &gradient.y) - value;
         out[2 * n + 1] = -rho * gradient.z;
-    }
-}
-
-impl ExplicitDerivatives {
-    fn of<const N: usize>(of: &QuantityDerivatives<N>) -> Self {
-        let QuantityDerivatives { l, gradient: ChartVector { x, y, z }, force } = of;
-        let [q, v, force] = [x, y, force].map(|part| part.as_slice().to_vec());
-        ExplicitDerivatives { value: *l, gradient: PointGradient { q, v, z: *z }, force }
     }
 }
