@@ -50,7 +50,8 @@ impl Lane {
         Lane { state, rows, suspect: false, status: LaneStatus::Valid, action }
     }
 
-    /// Updates the state, and records a row if rows are recorded.
+    /// Updates the state, and records a row if rows are recorded. Not inlined: it is called for rows and at the end.
+    #[inline(never)]
     pub fn record(&mut self, t: f64, state: State) {
         if let Some(rows) = &mut self.rows {
             rows.push(row(t, &state, self.action));

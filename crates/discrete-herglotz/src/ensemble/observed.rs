@@ -4,7 +4,9 @@ use crate::ensemble::builder::Ensemble;
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Member, Tally};
 use crate::ensemble::members::Members;
+use crate::ensemble::settings::Settings;
 use crate::ensemble::shards;
+use crate::ensemble::task::Task;
 use crate::{InputError, Observer, Until};
 use std::ops::ControlFlow;
 
@@ -70,34 +72,42 @@ impl<M: Members, F, T> ObservedEnsemble<'_, M, F, T> {
         if self.of.settings.checkpoint.is_some() {
             return Err(EnsembleError::Observed);
         }
-        let threads = self.of.settings.some_threads()?;
-        let task = self.of.task(until)?;
-        let count = self.of.settings.count;
-        let shards = count.div_ceil(MEMBERS_PER_OBSERVED_SHARD);
-        let (observer, extract) = (&self.observer, &self.extract);
-        let work = |shard: usize| -> Vec<(Member, Option<S>)> {
-            let range = shard * MEMBERS_PER_OBSERVED_SHARD..count.min((shard + 1) * MEMBERS_PER_OBSERVED_SHARD);
-            let member = |index: usize| match observer(index) {
-                Err(cause) => (Member { index, ending: Err(cause), rows: Vec::new() }, None),
-                Ok(mut observer) => {
-                    let member = task.run_single(index, Some(&mut observer));
-                    let result = member.ending.is_ok().then(|| extract(observer));
-                    (member, result)
-                }
-            };
-            range.map(member).collect()
-        };
-        let mut tally = Tally::default();
-        let mut done = 0;
-        shards::in_order(threads, shards, work, |members| {
-            for (member, result) in members {
-                tally.add(&member);
-                fold(&member, result);
-            }
-            done += 1;
-            self.of.settings.report_progress(done, shards);
-            ControlFlow::Continue(())
-        });
-        Ok(tally)
+        let settings = &self.of.settings;
+        let (threads, task) = (settings.some_threads()?, self.of.task(until)?);
+        Ok(run_observed(&task, (settings, threads), (&self.observer, &self.extract), &mut fold))
     }
+}
+
+/// Runs the members with their observers: for each kind of observer compiled once.
+fn run_observed<O: Observer, S: Send>(
+    task: &Task<'_>,
+    (settings, threads): (&Settings<'_>, usize),
+    (observer, extract): (&(dyn Fn(usize) -> Result<O, InputError> + Sync), &(dyn Fn(O) -> S + Sync)),
+    fold: &mut dyn FnMut(&Member, Option<S>),
+) -> Tally {
+    let count = settings.count;
+    let shards = count.div_ceil(MEMBERS_PER_OBSERVED_SHARD);
+    let work = |shard: usize| -> Vec<(Member, Option<S>)> {
+        let range = shard * MEMBERS_PER_OBSERVED_SHARD..count.min((shard + 1) * MEMBERS_PER_OBSERVED_SHARD);
+        let member = |index: usize| match observer(index) {
+            Err(cause) => (Member { index, ending: Err(cause), rows: Vec::new() }, None),
+            Ok(mut observer) => {
+                let member = task.run_single(index, Some(&mut observer));
+                let result = member.ending.is_ok().then(|| extract(observer));
+                (member, result)
+            }
+        };
+        range.map(member).collect()
+    };
+    let (mut tally, mut done) = (Tally::default(), 0);
+    shards::in_order(threads, shards, work, |members| {
+        for (member, result) in members {
+            tally.add(&member);
+            fold(&member, result);
+        }
+        done += 1;
+        settings.report_progress(done, shards);
+        ControlFlow::Continue(())
+    });
+    tally
 }

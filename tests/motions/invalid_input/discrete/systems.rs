@@ -4,10 +4,11 @@ use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::{GeometryError, Scalar, ScalarSystem, Slopes};
+use discrete_herglotz::ensemble::Systems;
 use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{
-    Components, GaussCollocation, InitialState, InputError, Kernels, Outcome, Point, SecondDerivatives, State, Status,
-    Steps, System, SystemProblem, Until, Vector,
+    Components, Ensemble, GaussCollocation, InitialState, InputError, Kernels, Outcome, Point, SecondDerivatives,
+    State, Status, Steps, System, SystemProblem, Until, Vector,
 };
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["SystemProblem::by", "SystemProblem::steps", "SystemProblem::accuracy"], run: runs },
     InputTest { entries: &["System::value", "System::gradient", "System::hessian"], run: faults },
     InputTest { entries: &["Kernels::of"], run: kernels },
+    InputTest { entries: &["Ensemble::of_systems"], run: ensembles },
     InputTest { entries: &["State::check", "$name::new", "$name::fixed", "$name::is_finite"], run: states },
     InputTest { entries: &["Vector::dot", "Vector::component_div", "Vector::fixed"], run: vectors },
 ];
@@ -263,6 +265,61 @@ fn kernels(report: &mut Report) {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-13;
     let same = one.columns.iter().zip(&other.columns).all(|(a, b)| near(a.q[0], b.q[0]) && near(a.z, b.z));
     report.check(same && near(one.outcome.q[0], other.outcome.q[0]), || format!("{one:?} and {other:?}"));
+}
+
+/// A member whose system or start is faulty is refused, or ends with a status; the others are its single runs.
+fn ensembles(report: &mut Report) {
+    let (sound, start) = (Pendulum(Fault::None, 0.0), || Point::new([0.3], [0.7], 0.2));
+    let by = GaussCollocation { stages: 4 };
+    let problem = SystemProblem::new(&sound, 0.0, start()).unwrap();
+    let single = problem.by(by).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
+    let wrong = [
+        Point::new([f64::NAN], [0.7], 0.2),
+        Point::new([0.3], [0.7], f64::INFINITY),
+        Point { q: Vector::zeros(2), v: Vector::zeros(1), z: 0.0 },
+    ];
+    let faulty = [Fault::Nan, Fault::Longer, Fault::Shorter, Fault::Panics].map(|fault| Pendulum(fault, 0.53));
+    let of = |i: usize| -> (&(dyn System + Sync), Point) {
+        match i {
+            0..3 => (&sound, wrong[i].clone()),
+            3..7 => (&faulty[i - 3], start()),
+            _ => (&sound, start()),
+        }
+    };
+    // Members that cannot start among others, of which the last has all checks.
+    let many = Ensemble::of_systems(0.0, 9, of).by(by).steps(Steps::Size(0.1)).threads(2);
+    let mut ends = Vec::new();
+    let tally = many.run(Until::Time(2.0), |member| ends.push(member.ending.clone()));
+    let good = tally.as_ref().is_ok_and(|tally| (tally.members, tally.completed, tally.failed) == (9, 2, 7));
+    report.check(good, || format!("{tally:?}"));
+    for (i, end) in ends.iter().enumerate() {
+        let good = match end {
+            Err(_) => i < 3,
+            Ok(end) if i < 7 => matches!(end.status, Status::Failed { .. }) && end.steps == 5 && end.state.is_finite(),
+            Ok(end) => end.status == Status::Completed && end.state == single.state(),
+        };
+        report.check(good, || format!("member {i}: {end:?}"));
+    }
+    for number in EXTREME {
+        let of = || Ensemble::of_systems(0.0, 2, |_| (&sound as &(dyn System + Sync), start()));
+        let finite = |members: Ensemble<'_, Systems<'_>>, until: Until| {
+            let mut all_finite = true;
+            let tally = members.run(until, |member| {
+                all_finite &= member.ending.as_ref().map_or(true, |end| end.state.is_finite());
+            });
+            (tally.is_ok(), all_finite)
+        };
+        let (ok, all_finite) = finite(of().by(by).steps(Steps::Count(3)), Until::Time(number));
+        report.check(all_finite && (number.is_finite() || !ok), || format!("until {number}"));
+        if !(number > 0.0 && number < 1e-100) {
+            let (ok, all_finite) = finite(of().accuracy(number), Until::Time(0.5));
+            report.check(all_finite && (number > 0.0 || !ok), || format!("accuracy {number}"));
+        }
+    }
+    let refused = |members: Ensemble<'_, Systems<'_>>| members.run(Until::Time(1.0), |_| ()).is_err();
+    let of = |count| Ensemble::of_systems(0.0, count, |_| (&sound as &(dyn System + Sync), start()));
+    report.check(refused(of(0).accuracy(1e-6)) && refused(of(1)), || "no member, or no steps".into());
+    report.check(refused(of(1).by(GaussCollocation { stages: 17 }).accuracy(1e-6)), || "17 stages".into());
 }
 
 fn states(report: &mut Report) {

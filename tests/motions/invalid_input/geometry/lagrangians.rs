@@ -8,15 +8,22 @@ use contact_examples::systems::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::{ActionSquared, AnyForce};
 use contact_geom::{
-    Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Statement, Structure, VelocityDrag,
-    VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre, legendre_jacobian,
-    regularity, statements,
+    Derivatives, Dual, Force, ForceStructure, Forced, Lagrangian, Regularity, Scalar, Statement, Structure,
+    VelocityDrag, VelocityPoint, WithoutClosedDerivatives, check_closed_derivatives, herglotz_field, legendre,
+    legendre_jacobian, regularity, statements,
     support::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates, legendre_polynomials},
 };
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
-        entries: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates", "gradient_rounding"],
+        entries: &[
+            "legendre",
+            "legendre_jacobian",
+            "herglotz_field",
+            "herglotz_rates",
+            "irregular",
+            "gradient_rounding",
+        ],
         run: herglotz,
     },
     InputTest { entries: &["legendre_polynomials"], run: polynomials },
@@ -87,7 +94,21 @@ fn herglotz(report: &mut Report) {
     }
 }
 
+/// A Lagrangian that is linear in the velocity.
+struct Linear;
+
+impl Lagrangian<1> for Linear {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * q[0]
+    }
+}
+
 fn regularities(report: &mut Report) {
+    // The error that `irregular` makes.
+    let refused = herglotz_field(&Linear, 0.4, &triples()[0].into()).err().map(|error| error.to_string());
+    let says = refused.as_ref().is_some_and(|error| error.contains("choose a regular Lagrangian"));
+    report.check(says, || format!("a singular W: {refused:?}"));
+
     for (t, x) in places() {
         let w = regularity(&EVERYTHING, t, &x.into());
         report.formula(&(t, x), fine((w.smallest, w.condition())));

@@ -18,7 +18,7 @@ impl Kinetic {
     ///
     /// # Errors
     /// [`InputError::Unclaimed`] for a Lagrangian that is not separable; [`InputError::Geometry`] for a singular mass matrix.
-    pub fn of(problem: &SystemProblem<'_>) -> Result<Self, InputError> {
+    pub(super) fn of(problem: &SystemProblem<'_>) -> Result<Self, InputError> {
         let (system, t, rest) = (&problem.system, problem.t0, rest_of(problem));
         if !system.structure().separable {
             return Err(InputError::Unclaimed { claim: "separable" });
@@ -35,18 +35,18 @@ impl Kinetic {
     }
 
     /// `M^-1 p`.
-    pub fn velocity(&self, p: &Vector) -> Vector {
+    pub(super) fn velocity(&self, p: &Vector) -> Vector {
         self.inverse.as_ref().map_or_else(|| p.clone(), |inverse| times(inverse, p))
     }
 
     /// `M^-1`.
-    pub fn inverse(&self) -> DMatrix<f64> {
+    pub(super) fn inverse(&self) -> DMatrix<f64> {
         let n = self.mass.nrows();
         self.inverse.clone().unwrap_or_else(|| DMatrix::identity(n, n))
     }
 
     /// The diagonal of M; `None` if another entry is not zero.
-    pub fn diagonal_mass(&self) -> Option<Vector> {
+    pub(super) fn diagonal_mass(&self) -> Option<Vector> {
         let n = self.mass.nrows();
         let diagonal = (0..n).all(|i| (0..n).all(|j| i == j || self.mass[(i, j)] == 0.0));
         diagonal.then(|| Vector::from_fn(n, |i| self.mass[(i, i)]))
