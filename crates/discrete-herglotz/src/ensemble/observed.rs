@@ -74,7 +74,7 @@ impl<M: Members, F, T> ObservedEnsemble<'_, M, F, T> {
         }
         let settings = &self.of.settings;
         let (threads, task) = (settings.some_threads()?, self.of.task(until)?);
-        Ok(run_observed(&task, (settings, threads), (&self.observer, &self.extract), &mut fold))
+        Ok(run_observed(&task, (settings, threads), &self.observer, &self.extract, &mut fold))
     }
 }
 
@@ -82,7 +82,8 @@ impl<M: Members, F, T> ObservedEnsemble<'_, M, F, T> {
 fn run_observed<O: Observer, S: Send>(
     task: &Task<'_>,
     (settings, threads): (&Settings<'_>, usize),
-    (observer, extract): (&(dyn Fn(usize) -> Result<O, InputError> + Sync), &(dyn Fn(O) -> S + Sync)),
+    observer: &(dyn Fn(usize) -> Result<O, InputError> + Sync),
+    extract: &(dyn Fn(O) -> S + Sync),
     fold: &mut dyn FnMut(&Member, Option<S>),
 ) -> Tally {
     let count = settings.count;
