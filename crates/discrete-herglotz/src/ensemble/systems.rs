@@ -40,9 +40,7 @@ impl<'m> Ensemble<'_, Systems<'m>> {
     ///
     /// ```
     /// use contact_geom::nalgebra::DMatrix;
-    /// use discrete_herglotz::{
-    ///     Components, Ensemble, InitialState, Point, SecondDerivatives, System, Until, Vector,
-    /// };
+    /// use discrete_herglotz::{Components, Ensemble, Point, SecondDerivatives, System, Until, Vector};
     ///
     /// /// Two oscillators under linear drag.
     /// struct Pair;
@@ -55,7 +53,7 @@ impl<'m> Ensemble<'_, Systems<'m>> {
     ///         (x.v.norm_squared() - x.q.norm_squared()) / 2.0 - x.z / 10.0
     ///     }
     ///     fn gradient(&self, _t: f64, x: &Point) -> Components {
-    ///         Components { x: -&x.q, y: x.v.clone(), z: -0.1 }
+    ///         Components { x: -x.q.clone(), y: x.v.clone(), z: -0.1 }
     ///     }
     ///     fn hessian(&self, _t: f64, _x: &Point) -> SecondDerivatives {
     ///         let (one, line) = (DMatrix::identity(2, 2), Vector::zeros(2));
