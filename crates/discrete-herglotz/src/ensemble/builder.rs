@@ -132,7 +132,7 @@ impl<'a, M: Members> Ensemble<'a, M> {
     }
 
     /// Records states of each member in its [rows](Member::rows): the start, the state after every `steps` steps, and
-    /// the end, as [`Rows::every`] does. They are recorded in lanes too. Only the rows of members in progress are kept
+    /// the end, as [`Rows::every`](crate::Rows::every) does. They are recorded in lanes too. Only the rows of members in progress are kept
     /// in memory: of eight shards of 384 members for each thread.
     pub fn rows_every(self, steps: usize) -> Self {
         Ensemble { settings: Settings { rows: Some(steps), ..self.settings }, ..self }
@@ -152,7 +152,7 @@ impl<'a, M: Members> Ensemble<'a, M> {
 
     /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
     /// that follow end at their current state, with [`Status::Stopped`](crate::Status::Stopped) by an [`INTERRUPTION`](crate::INTERRUPTION), or
-    /// with [`InputError::Interrupted`] if they have not started.
+    /// with [`InputError::Interrupted`](crate::InputError::Interrupted) if they have not started.
     pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
         Ensemble { settings: Settings { interrupt: Some(interrupt), ..self.settings }, ..self }
     }
