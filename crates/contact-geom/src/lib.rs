@@ -62,7 +62,7 @@ pub mod support {
     pub use crate::dynamics::constraint::{independent_rows, least_norm, restricted};
     pub use crate::dynamics::nearest_name::nearest_name;
     pub use crate::dynamics::{
-        derived_gradient, derived_hessian, extended, gradient_rounding, herglotz_rates, indexed_names, irregular,
+        derived_gradient, derived_hessian, extended, gradient_rounding, herglotz_rates, indexed_names,
         rounding_at_state, split_last,
     };
     pub use crate::forms::{conformality_with_jacobian, generic, seed};

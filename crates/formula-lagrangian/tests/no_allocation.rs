@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
-// Other binaries use the rest of it.
-#[allow(dead_code)]
+#[allow(dead_code)] // Other binaries use the rest of it.
 #[path = "../../../tests/common/counting_allocator.rs"]
 mod counting_allocator;
 

@@ -15,7 +15,7 @@ use formula_lagrangian::Formula;
 use std::sync::Arc;
 
 /// A Lagrangian given by its formula, in 1 to 16 coordinates with all that integrators need, in up to 256 by contact Gauss
-/// collocation, with derivatives; or a contact Hamiltonian, in 1 to 4 coordinates, which runs by contact Gauss collocation from a momentum. Cloning is inexpensive.
+/// collocation, with derivatives, ensembles and checks; or a contact Hamiltonian, in 1 to 4 coordinates, which runs by contact Gauss collocation from a momentum. Cloning is inexpensive.
 ///
 /// ```
 /// use herglotz_runtime::{Motion, Start, System, StepControl};

@@ -156,8 +156,8 @@ fn rates_of_many<T: Scalar, const N: usize>(
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
 }
 
-/// The error for a singular `W = L_vv`, where an acceleration is asked for.
-pub fn irregular(singular: SingularMatrix) -> GeometryError {
+/// The error for a singular W.
+fn irregular(singular: SingularMatrix) -> GeometryError {
     singular.of(
         "W = L_vv",
         "L is not regular here, so that Herglotz' equation does not determine the acceleration; choose a regular \

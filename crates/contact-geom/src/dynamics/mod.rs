@@ -40,8 +40,8 @@ pub use hamiltonian::{
     lie_derivative,
 };
 pub use herglotz::{
-    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, herglotz_field, herglotz_rates, irregular,
-    legendre, legendre_jacobian, regularity,
+    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, herglotz_field, herglotz_rates, legendre,
+    legendre_jacobian, regularity,
 };
 pub use impact::{Impact, Impacts, Surface};
 pub use lagrangian::{Hints, Lagrangian, WithoutClosedDerivatives};

@@ -116,8 +116,8 @@ impl<'m, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'m, L
 
 impl<'a, M: Members> Ensemble<'a, M> {
     /// Sets the number of threads; the default is the number of processors.
-    pub fn threads(self, threads: usize) -> Self {
-        Ensemble { settings: Settings { threads: Some(threads), ..self.settings }, ..self }
+    pub fn threads(self, threads: impl Into<Option<usize>>) -> Self {
+        Ensemble { settings: Settings { threads: threads.into(), ..self.settings }, ..self }
     }
 
     /// Omits the action: it is not computed if z does not act back on the motion.
@@ -153,8 +153,8 @@ impl<'a, M: Members> Ensemble<'a, M> {
     /// Sets an interrupt that is polled during the run: when it requests the end, the members in progress and those
     /// that follow end at their current state, with [`Status::Stopped`](crate::Status::Stopped) by an [`INTERRUPTION`](crate::INTERRUPTION), or
     /// with [`InputError::Interrupted`](crate::InputError::Interrupted) if they have not started.
-    pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
-        Ensemble { settings: Settings { interrupt: Some(interrupt), ..self.settings }, ..self }
+    pub fn with_interrupt(self, interrupt: impl Into<Option<Interrupt<'a>>>) -> Self {
+        Ensemble { settings: Settings { interrupt: interrupt.into(), ..self.settings }, ..self }
     }
 
     /// Restricts the run to these instructions.

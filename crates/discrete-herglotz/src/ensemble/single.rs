@@ -78,7 +78,6 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 /// The settings that all members have in common.
 #[derive(Clone, Copy)]
 pub(crate) struct Common {
-    pub t0: f64,
     pub until: Until,
     pub action: bool,
     /// The number of steps from one recorded row to the next.

@@ -62,7 +62,7 @@ impl<'e> Task<'e> {
         until: Until,
     ) -> Result<Self, EnsembleError> {
         let Settings { count, instructions, interrupt, .. } = *settings;
-        let common = Common { t0: members.t0(), until, action: settings.action, rows: settings.rows };
+        let common = Common { until, action: settings.action, rows: settings.rows };
         if let Some(stride) = settings.rows {
             Rows::every(stride).map_err(|cause| EnsembleError::Member { index: 0, cause })?;
         }
@@ -114,9 +114,9 @@ impl<'e> Task<'e> {
 
     /// A digest that identifies the ensemble: of the integrator, the steps, and the starts and L of some members.
     pub(crate) fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
-        let (Common { t0, action, rows, .. }, members) = (self.common, self.members);
+        let (Common { action, rows, .. }, members) = (self.common, self.members);
         let n = members.dimension() as u64;
-        let mut words = vec![n, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
+        let mut words = vec![n, self.count as u64, members.t0().to_bits(), action.into(), self.plan.0.to_bits()];
         words.extend([self.plan.1, rows.unwrap_or(0)].map(|x| x as u64));
         words.push(members.requested_error().unwrap_or(0.0).to_bits());
         words.extend(members.info().name.bytes().map(u64::from));
@@ -196,7 +196,7 @@ impl<'e> Task<'e> {
         (members, done): (&mut [Member], &mut [bool]),
         may_drift: &dyn Fn(At<'_>, At<'_>) -> bool,
     ) -> usize {
-        let (Common { t0, action, rows, .. }, (h, steps)) = (self.common, self.plan);
+        let (Common { action, rows, .. }, t0, (h, steps)) = (self.common, self.members.t0(), self.plan);
         let Some(kernel) = kernel else { return 0 };
         let all =
             starts.iter().enumerate().filter_map(|(place, (_, _, state))| state.as_ref().map(|state| (place, state)));

@@ -6,7 +6,6 @@ mod defaults;
 mod guarded;
 mod kernels;
 pub(crate) mod mass_matrix;
-mod over_slices;
 mod points;
 pub(crate) mod products;
 mod quantity;

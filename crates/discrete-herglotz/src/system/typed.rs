@@ -2,12 +2,11 @@
 
 use super::ForceDerivatives;
 use super::applied_force::{AppliedForce, ForceAt};
-use super::over_slices::RatesAt;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
-    Arguments, ChartVector, Defect, Defects, Derivatives, ForceStructure, GeometryError, Hessian, Hints, Lagrangian,
-    PhasePoint, Structure, VelocityPoint,
+    ChartVector, Defect, Defects, Derivatives, ForceStructure, GeometryError, Hessian, Hints, Lagrangian, PhasePoint,
+    Structure, VelocityPoint,
     support::{gradient_rounding, herglotz_rates, rounding_at_state},
 };
 
@@ -146,14 +145,6 @@ impl<L: Lagrangian<N>, const N: usize> TypedSystem<N> for L {
         // The derivatives of an inverse Legendre transformation are not compiled where nothing needs them.
         if const { L::HINTS.hamiltonian } {
             return Err(GeometryError::Undefined { what: "the acceleration as a function of position and velocity" });
-        }
-        if const { L::HINTS.over_slices } {
-            let mut field: ChartVector<N> = ChartVector { x: x.v, y: SVector::from_element(f64::NAN), z: f64::NAN };
-            let at = Arguments { t, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
-            let found = Lagrangian::over_slices(self, RatesAt { at, to: field.y.as_mut_slice() });
-            let (l, rate) = found.unwrap_or(Ok((f64::NAN, f64::NAN)))?;
-            field.z = l;
-            return Ok((field, rate));
         }
         herglotz_rates(self, t, x)
     }

@@ -5,7 +5,7 @@ use super::formula_system::Observed;
 use super::many::{ManyCoordinates, gauss};
 use super::observed::{MemberObserver, MemberRecord};
 use super::sized::initial_state;
-use crate::{Ensemble, StepControl};
+use crate::{Ensemble, Interrupt, StepControl};
 use discrete_herglotz::ensemble::{EnsembleError, Member, Tally};
 use discrete_herglotz::{InitialState, Point, System, Until, Vector};
 use formula_lagrangian::FormulaError;
@@ -41,14 +41,7 @@ impl ManyMotions for ManyCoordinates {
             StepControl::Accuracy { error, by: Some(by) } => many.by(gauss(by).map_err(refused)?).accuracy(error),
             StepControl::Steps { by, steps } => many.by(gauss(by).map_err(refused)?).steps(steps),
         };
-        let many = match threads {
-            Some(threads) => many.threads(*threads),
-            None => many,
-        };
-        let many = match block.interrupt {
-            Some(interrupt) => many.with_interrupt(interrupt.for_integrators()),
-            None => many,
-        };
+        let many = many.threads(*threads).with_interrupt(block.interrupt.map(Interrupt::for_integrators));
         let mut pass_on = |member: &Member, record: MemberRecord| {
             results.pass_on(block, system(member.index).unwrap_or(self), member, record);
         };

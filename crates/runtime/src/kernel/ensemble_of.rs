@@ -4,7 +4,7 @@ use super::ensemble::{Block, ManyMotions, Results};
 use super::formula_system::{FormulaSystem, Observed};
 use super::observed::{MemberObserver, MemberRecord};
 use super::sized::Sized;
-use crate::{Ensemble, StepControl};
+use crate::{Ensemble, Interrupt, StepControl};
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::ensemble::{EnsembleError, Member, Tally};
@@ -55,14 +55,7 @@ impl<L: FormulaSystem<N>, const N: usize> ManyMotions for Sized<L, N> {
             }
             (StepControl::Steps { by, steps }, None) => many.by(L::by(by).map_err(refused)?).steps(steps),
         };
-        let many = match threads {
-            Some(threads) => many.threads(*threads),
-            None => many,
-        };
-        let many = match block.interrupt {
-            Some(interrupt) => many.with_interrupt(interrupt.for_integrators()),
-            None => many,
-        };
+        let many = many.threads(*threads).with_interrupt(block.interrupt.map(Interrupt::for_integrators));
         let mut pass_on = |member: &Member, record: MemberRecord| {
             results.pass_on(block, lagrangian(member.index).unwrap_or(&self.0), member, record);
         };

@@ -91,14 +91,7 @@ fn each_block<R, const N: usize>(
             StepControl::Accuracy { error, by: Some(by) } => many.by(by).accuracy(error),
             StepControl::Steps { by, steps } => many.by(by).steps(steps),
         };
-        let many = match ensemble.threads {
-            Some(threads) => many.threads(threads),
-            None => many,
-        };
-        let many = match interrupt {
-            Some(interrupt) => many.with_interrupt(interrupt.for_integrators()),
-            None => many,
-        };
+        let many = many.threads(ensemble.threads).with_interrupt(interrupt.map(Interrupt::for_integrators));
         results.extend(work(&many, first)?);
     }
     Ok(results)

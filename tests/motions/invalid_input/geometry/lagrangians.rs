@@ -16,14 +16,7 @@ use contact_geom::{
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
-        entries: &[
-            "legendre",
-            "legendre_jacobian",
-            "herglotz_field",
-            "herglotz_rates",
-            "irregular",
-            "gradient_rounding",
-        ],
+        entries: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates", "gradient_rounding"],
         run: herglotz,
     },
     InputTest { entries: &["legendre_polynomials"], run: polynomials },
@@ -104,7 +97,6 @@ impl Lagrangian<1> for Linear {
 }
 
 fn regularities(report: &mut Report) {
-    // The error that `irregular` makes.
     let refused = herglotz_field(&Linear, 0.4, &triples()[0].into()).err().map(|error| error.to_string());
     let says = refused.as_ref().is_some_and(|error| error.contains("choose a regular Lagrangian"));
     report.check(says, || format!("a singular W: {refused:?}"));
