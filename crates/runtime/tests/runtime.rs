@@ -5,6 +5,7 @@
 mod body;
 mod fit;
 mod motions;
+mod pairs;
 mod path;
 mod sensitivity;
 mod sparse;
