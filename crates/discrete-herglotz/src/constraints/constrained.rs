@@ -105,7 +105,7 @@ where
                 }
                 check_kicks(&OfTyped(lagrangian), "RATTLE")
             }
-            ConstrainedMethod::Lobatto { stages } => ContactLobatto::<L, C, N, M>::check(lagrangian, stages),
+            ConstrainedMethod::Lobatto { stages } => ContactLobatto::<L, C, N, M>::check(stages),
         }
     }
 

@@ -4,9 +4,9 @@ use super::lobatto_tables::{LobattoTables, STAGES};
 use super::lobatto_workspace::Workspace;
 use super::variation::{Unvaried, Vary};
 use super::{ConstrainedStart, ConstraintError, Corrections, Progress, velocity_scale};
-use crate::integration::check_unforced;
 use crate::numbers::extent::extent;
 use crate::numbers::state_words::{restored_from, saved, words_of};
+use crate::system::applied_force::AppliedForce;
 use crate::{InputError, RunSupport, State, StepDetails, StepError, StepFailure, Stepper, Vector};
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::SVector;
@@ -19,14 +19,14 @@ use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoi
 /// The motion is symplectified: with `rho' = -rho L_z` and `P = rho p`, `(q, z)` and `(P, -rho)` are canonical
 /// coordinates, in which the motion has the homogeneous Hamiltonian `rho H(t, q, P/rho, z)`. Lobatto IIIA is applied to
 /// `(q, z)` and IIIB to `(P, rho)`, with the constraints at all stages (Jay's SPARK method). With `G = c_q`,
-/// `rho_0 = 1` and `f_j = h rho_j L_q + G(Q_j)^T Y_j`:
+/// `rho_0 = 1`, an applied force f and `f_j = h rho_j (L_q + f) + G(Q_j)^T Y_j`:
 ///
 /// `Q_i = q0 + h sum a_ij V_j`, `Z_i = z0 + h sum a_ij L_j`, `rho_i = 1 - h sum a_hat_ij rho_j L_z,j`,
 /// `rho_i L_v(Q_i, V_i, Z_i) = p0 + sum a_hat_ij f_j`, `c(Q_i) = 0`,
 /// `rho_1 p1 = p0 + sum b_j f_j`, `G(q1) v(q1, p1, z1) = 0`.
 ///
 /// The map is symplectic and homogeneous of degree one, so it keeps the form `P dq - rho dz = -rho eta`: on `T*N x R`
-/// it is conformally contact with `sigma_d = 1/rho_1`. For `s = 2` it is RATTLE.
+/// it is conformally contact with `sigma_d = 1/rho_1`, where no force is applied. For `s = 2` it is RATTLE.
 ///
 /// Reference: Jay, SIAM J. Numer. Anal. 33 (1996) 368-387; Hairer, Lubich and Wanner, Geometric Numerical Integration,
 /// section VII.1.4.
@@ -73,8 +73,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
     ///
     /// # Errors
     /// [`InputError`]: a start off the constraints, dependent constraints, a number of stages that is not from 2
-    /// to 8, a step that is 0 or not finite, an applied force, a Lagrangian that is singular at the start, a first step
-    /// that fails.
+    /// to 8, a step that is 0 or not finite, a Lagrangian that is singular at the start, a first step that fails.
     pub fn new(
         lagrangian: L,
         constraint: C,
@@ -99,7 +98,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         h: f64,
         start: &ConstrainedStart<N>,
     ) -> Result<Self, InputError> {
-        Self::check(&lagrangian, stages)?;
+        Self::check(stages)?;
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -121,12 +120,9 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
         })
     }
 
-    /// Checks the number of stages, and that no force is applied.
-    pub(super) fn check(lagrangian: &L, stages: usize) -> Result<(), InputError> {
-        if !STAGES.contains(&stages) {
-            return Err(ConstraintError::Stages { found: stages }.into());
-        }
-        check_unforced(lagrangian, "contact Lobatto collocation")
+    /// Checks the number of stages.
+    pub(super) fn check(stages: usize) -> Result<(), InputError> {
+        if STAGES.contains(&stages) { Ok(()) } else { Err(ConstraintError::Stages { found: stages }.into()) }
     }
 
     /// The step from a state on the constraint, over any scalar: on dual numbers it is the step with its derivatives
@@ -232,7 +228,10 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             (stage.value, stage.gradient) = self.lagrangian.with_gradient(T::from(time), &x);
             vary.add(time, &x, &mut stage.value, &mut stage.gradient);
             (stage.c, stage.g) = self.constraint.with_jacobian(&q);
-            stage.force = stage.gradient.x * (stage.rho * self.h) + stage.g.transpose() * stage.y;
+            if const { L::HINTS.forced } {
+                stage.applied = self.lagrangian.applied_force(T::from(time), &x);
+            }
+            stage.force = (stage.gradient.x + stage.applied) * (stage.rho * self.h) + stage.g.transpose() * stage.y;
         }
         work.evaluations += work.stages.len() as u64;
     }
@@ -273,7 +272,15 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             let x = VelocityPoint { q: stage.q.map(|e| e.re()), v: stage.v.map(|e| e.re()), z: stage.z.re() };
             let hessian = self.lagrangian.hessian(t + self.tables.c[j] * h, &x);
             let y = stage.y.map(|e| e.re());
-            let stiffness = hessian.qq * (h * rho) + self.constraint.force_slope(&x.q, &y);
+            let mut stiffness = hessian.qq * (h * rho) + self.constraint.force_slope(&x.q, &y);
+            // The derivatives of the impulse `rho (L_q + f)` in the velocity, the factor and the action.
+            let (mut by_velocity, mut by_factor, mut by_action) = (hessian.qv, slope.x, hessian.qz);
+            if let Some(applied) = AppliedForce::of(&self.lagrangian, t + self.tables.c[j] * h, &x) {
+                stiffness += applied.q * (h * rho);
+                by_velocity += applied.v;
+                by_factor += applied.value;
+                by_action += applied.z;
+            }
             let system = &mut work.system;
             // Stage j enters the equations of stage i by the weights a_hat_ij or a_ij, and itself directly.
             for i in 0..s {
@@ -282,7 +289,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
                     let row = i * N + m;
                     let direct = if own { rho } else { 0.0 };
                     for k in 0..N {
-                        system.add(row, j * N + k, a_hat * h * rho * hessian.qv[(m, k)] - direct * hessian.vv[(m, k)]);
+                        system.add(row, j * N + k, a_hat * h * rho * by_velocity[(m, k)] - direct * hessian.vv[(m, k)]);
                         for l in 0..s {
                             let moved = h * self.tables.a[j][l];
                             let by_position = a_hat * stiffness[(m, k)] - direct * hessian.qv[(k, m)];
@@ -290,8 +297,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
                         }
                     }
                     let own_momentum = if own { slope.y[m] } else { 0.0 };
-                    system.add(row, rhos + j, a_hat * h * slope.x[m] - own_momentum);
-                    system.add(row, zs + j, a_hat * h * rho * hessian.qz[m] - direct * hessian.vz[m]);
+                    system.add(row, rhos + j, a_hat * h * by_factor[m] - own_momentum);
+                    system.add(row, zs + j, a_hat * h * rho * by_action[m] - direct * hessian.vz[m]);
                     if j + 1 < s {
                         (0..M).for_each(|b| system.add(row, ys + j * M + b, a_hat * g[(b, m)]));
                     }

@@ -17,7 +17,9 @@ pub(super) struct Stage<const N: usize, const M: usize, T> {
     pub gradient: ChartVector<N, T>,
     pub c: SVector<T, M>,
     pub g: SMatrix<T, M, N>,
-    /// `h rho L_q + G^T Y`.
+    /// The applied force f; 0 where there is none.
+    pub applied: SVector<T, N>,
+    /// `h rho (L_q + f) + G^T Y`.
     pub force: SVector<T, N>,
 }
 
@@ -54,6 +56,7 @@ impl<const N: usize, const M: usize, T: Scalar> Workspace<N, M, T> {
             gradient: ChartVector { x, y: x, z: zero },
             c: y,
             g: SMatrix::from_fn(|_, _| zero),
+            applied: x,
             force: x,
         };
         let n = s * (N + 2) + (s - 1) * M;

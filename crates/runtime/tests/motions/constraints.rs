@@ -171,10 +171,38 @@ fn steps_with_constraints_are_contact() {
             assert!((sigma - (-0.3 * check.step_size).exp()).abs() < 1e-14, "{sigma}");
         }
     }
-    // A force that is no kick by a potential does not preserve the form: there is no method for it with constraints.
-    let dragged = Formula::parse(NEWTON, &["x", "y"], &[("gamma", 0.0)]).unwrap().with_force("x", "-x'").unwrap();
-    let dragged = System::new(&dragged.with_constraints(&["x^2 + y^2 = 1"]).unwrap()).unwrap();
-    assert!(dragged.check(&Motion::new(at_rest(), 1.5, named("gauss_3", 50)), 4).is_err());
+}
+
+/// A force under constraints, of time, positions, velocities and the action: the motion is that of the pendulum in its
+/// angle, and the order of collocation remains.
+#[test]
+fn a_force_under_constraints() {
+    // The force `c (1 + z) (x, y)'^2 cos(t) (-y, x)` is along the circle.
+    let parameters = [("gamma", -0.2), ("c", 0.7)];
+    let forced = Formula::parse(NEWTON, &["x", "y"], &parameters).unwrap();
+    let along = ["-y", "x"].map(|e| format!("{e}*c*(1 + z)*(x'^2 + y'^2)*cos(t)"));
+    let forced = forced.with_forces(&[("x", &along[0]), ("y", &along[1])]).unwrap();
+    let forced = System::new(&forced.with_constraints(&["x^2 + y^2 = 1"]).unwrap()).unwrap();
+    let angle = "u'^2/2 - sin(u)*9.81 + gamma*z";
+    let angle = Formula::parse(angle, &["u"], &parameters).unwrap();
+    let angle = System::new(&angle.with_force("u", "c*(1 + z)*u'^2*cos(t)").unwrap()).unwrap();
+    let end = 1.5;
+    let exact = StepControl::Accuracy { error: 1e-13, by: None };
+    let expected = angle.run(&Motion::new(Start::new(0.0, [0.0], [0.0], 0.0), end, exact), &mut ()).unwrap();
+    let error = |step_control| {
+        let found = forced.run(&Motion::new(at_rest(), end, step_control), &mut ()).unwrap();
+        let (u, p) = (expected.q[0], expected.p[0]);
+        let exact = [u.cos(), u.sin(), -u.sin() * p, u.cos() * p, expected.z.unwrap()];
+        let found = [&found.q[..], &found.p, &[found.z.unwrap()]].concat();
+        found.iter().zip(exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    for (stages, steps) in [(1, 160), (2, 40), (3, 20), (4, 12)] {
+        let [coarse, fine] = [steps, 2 * steps].map(|steps| error(named(&format!("gauss_{stages}"), steps)));
+        let slope = (coarse / fine).log2();
+        assert!((slope - f64::from(2 * stages)).abs() < 0.15, "{stages}: {slope} from {coarse:e} and {fine:e}");
+    }
+    let reached = error(StepControl::Accuracy { error: 1e-10, by: None });
+    assert!(reached < 1e-9, "{reached:e}");
 }
 
 /// What is not computed with constraints is refused by one error, and integrators that take none by another.

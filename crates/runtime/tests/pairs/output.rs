@@ -53,8 +53,8 @@ impl Output {
             times
         };
         let names: Vec<&str> = problem.parameters().iter().map(|(name, _)| *name).collect();
-        let differentiable =
-            problem.form == Form::Lagrangian && !problem.features.iter().any(|f| matches!(f, Feature::TerminalEvent { .. }));
+        let differentiable = problem.form == Form::Lagrangian
+            && !problem.features.iter().any(|f| matches!(f, Feature::TerminalEvent { .. }));
         match random.below(7) {
             0 => Output::End,
             1 => Output::Rows(times(random, 7)),
@@ -238,13 +238,7 @@ fn events(problem: &Problem, system: &System, b: f64, bound: f64) -> Result<(), 
     differ("events", &found, &truth.crossings, 20.0 * bound)
 }
 
-fn resume(
-    problem: &Problem,
-    system: &System,
-    middle: f64,
-    truth: &Reference,
-    bound: f64,
-) -> Result<(), Verdict> {
+fn resume(problem: &Problem, system: &System, middle: f64, truth: &Reference, bound: f64) -> Result<(), Verdict> {
     if middle >= truth.t || middle <= 0.0 {
         return Err(Sensitive);
     }
@@ -311,11 +305,7 @@ fn fit(problem: &Problem, system: &System, name: &str, times: &[f64]) -> Result<
     }
     let values = truth.rows.iter().map(|row| row[0]).collect();
     let data = Series { quantity: "x".into(), times: times.to_vec(), values, deviations: None };
-    let request = MotionFit::new(
-        started.motion(system),
-        [Unknown::free(name)],
-        [data],
-    );
+    let request = MotionFit::new(started.motion(system), [Unknown::free(name)], [data]);
     let started = refused(system.with_parameters(&[(name, guess)]))?;
     let fitted = refused(started.fit(&request, &mut ()))?;
     if !fitted.fit.status.is_converged() {
@@ -361,7 +351,12 @@ fn ensemble(problem: &Problem, system: &System, name: &str, bound: f64) -> Resul
         }
         let [x, v, z] = problem.observed(truth.end);
         let found = problem.observed_of(&ending.q, &ending.p, ending.z);
-        differ(&format!("member {name}"), &[&found[..], &[ending.t]].concat(), &[x, v, z, truth.t], 3.0 * bound * (1.0 + growth))?;
+        differ(
+            &format!("member {name}"),
+            &[&found[..], &[ending.t]].concat(),
+            &[x, v, z, truth.t],
+            3.0 * bound * (1.0 + growth),
+        )?;
     }
     Ok(())
 }

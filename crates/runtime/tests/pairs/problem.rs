@@ -3,8 +3,8 @@
 use super::feature::Feature;
 use super::random::Random;
 use herglotz_runtime::{
-    AnyIntegrator, Event, Formula, FormulaDirection, FormulaNames, FormulaReset, Impact, InitialVelocity, Motion, Start,
-    StepControl, Steps, System,
+    AnyIntegrator, Event, Formula, FormulaDirection, FormulaNames, FormulaReset, Impact, InitialVelocity, Motion,
+    Start, StepControl, Steps, System,
 };
 
 /// How the library is given a system.
@@ -179,9 +179,7 @@ impl Problem {
         let [x, v, z] = self.start;
         let start = match self.form {
             Form::Lagrangian => Start::new(0.0, [x], [v], z),
-            Form::Hamiltonian => {
-                Start { t: 0.0, q: vec![x], velocity: InitialVelocity::Momentum(vec![self.m * v]), z }
-            }
+            Form::Hamiltonian => Start { t: 0.0, q: vec![x], velocity: InitialVelocity::Momentum(vec![self.m * v]), z },
             Form::Constrained => Start::new(0.0, [x.sin(), -x.cos()], [x.cos() * v, x.sin() * v], z),
         };
         Motion { events: self.events(system), ..Motion::new(start, self.end, self.step_control) }
