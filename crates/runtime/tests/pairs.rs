@@ -1,7 +1,7 @@
 //! Random pairs of features: what two features do to each other, in every output of a run, against an independent
 //! reference. Nothing may be wrong without a word.
 //!
-//! A hundred cases of a seed that changes with the day; `PAIRS=10000 PAIRS_SEED=7` runs other ones, and
+//! A hundred cases of a seed that changes with the day, or as many as are asked for: `PAIRS=10000 PAIRS_SEED=7` runs other ones, and
 //! `PAIR=12 PAIRS_SEED=7` one of them, in words.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.

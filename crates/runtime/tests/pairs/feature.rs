@@ -16,8 +16,12 @@ pub enum Feature {
     Drive { f: f64, w: f64 },
     /// `-k |x - a|` in L.
     Kink { a: f64, k: f64 },
-    /// The force of a table over time.
-    TableOverTime { table: Samples },
+    /// `-k (x - a)^2/2` in L beyond a.
+    Spring { a: f64, k: f64 },
+    /// `-h` in L beyond a: a step of the potential, which the motion passes or is reflected by.
+    Step { a: f64, h: f64 },
+    /// The force of a table over time, in L or as an applied force.
+    TableOverTime { table: Samples, applied: bool },
     /// The potential of a table of straight lines over x.
     TableOverPosition { table: Samples },
     /// The force b before the time T.
@@ -26,6 +30,8 @@ pub enum Feature {
     Reset { a: f64, e: f64 },
     /// An elastic impact at x = a.
     Impact { a: f64 },
+    /// An elastic impact at the moving surface `x = a + b sin(w t)`.
+    MovingImpact { a: f64, b: f64, w: f64 },
     /// The run ends where x = a, or at rest.
     TerminalEvent { a: Option<f64> },
 }
@@ -74,8 +80,10 @@ pub enum Surface {
     Position(f64),
     /// `x' = 0`, where the field changes.
     Rest,
-    /// `x = a`, where the velocity is multiplied by -e.
-    Wall { a: f64, e: f64 },
+    /// `x = a`, where the potential rises by h.
+    Step { a: f64, h: f64 },
+    /// `x = a + b sin(w t)`, where the velocity relative to it is multiplied by -e.
+    Wall { a: f64, b: f64, w: f64, e: f64 },
     /// `x = a` or `x' = 0`, where the motion ends.
     End(Option<f64>),
 }
@@ -87,31 +95,35 @@ impl Feature {
         let other_wall = others.iter().find_map(Feature::wall);
         let side = other_wall.map_or_else(|| random.sign(), |a| (x - a).signum());
         let near = x + side * random.between(0.1, 0.7);
+        // The first eight are of a Hamiltonian too.
         let kind = match form {
-            Form::Lagrangian => random.below(10),
-            Form::Hamiltonian => 3 + random.below(5),
-            Form::Constrained => [0, 2, 7][random.below(3)],
+            Form::Lagrangian => random.below(13),
+            Form::Hamiltonian => random.below(8),
+            Form::Constrained => [6, 8, 9][random.below(3)],
         };
         match kind {
-            0 => Feature::LinearDrag { c: random.between(0.05, 0.8) },
-            1 => Feature::QuadraticDrag { c: random.between(0.05, 0.8) },
-            2 => Feature::Drive { f: random.between(0.1, 1.0), w: random.between(0.5, 5.0) },
-            3 => Feature::Kink { a: near, k: random.between(-0.5, 1.0) },
-            4 => {
-                let held = random.chance(0.5);
-                Feature::TableOverTime { table: Samples::draw(random, (-0.1 * span, 1.1 * span), held) }
+            0 => Feature::Kink { a: near, k: random.between(-0.5, 1.0) },
+            1 => Feature::Spring { a: near, k: random.between(-0.5, 5.0) },
+            2 => Feature::Step { a: near, h: random.between(-0.5, 0.5) },
+            3 | 4 => {
+                let table = Samples::draw(random, (-0.1 * span, 1.1 * span), kind == 3);
+                Feature::TableOverTime { table, applied: form == Form::Lagrangian && random.chance(0.3) }
             }
             5 => Feature::TableOverPosition { table: Samples::draw(random, (x - 1.5, x + 1.5), false) },
-            6 => Feature::JumpInTime { at: random.between(0.1, 0.9) * span, b: random.between(-1.5, 1.5) },
-            7 => Feature::TerminalEvent { a: random.chance(0.7).then_some(near) },
-            8 => Feature::Reset { a: near, e: random.between(0.7, 1.0) },
-            _ => Feature::Impact { a: near },
+            6 => Feature::TerminalEvent { a: random.chance(0.7).then_some(near) },
+            7 => Feature::JumpInTime { at: random.between(0.1, 0.9) * span, b: random.between(-1.5, 1.5) },
+            8 => Feature::LinearDrag { c: random.between(0.05, 0.8) },
+            9 => Feature::Drive { f: random.between(0.1, 1.0), w: random.between(0.5, 5.0) },
+            10 => Feature::QuadraticDrag { c: random.between(0.05, 0.8) },
+            11 => Feature::Reset { a: near, e: random.between(0.7, 1.0) },
+            _ if random.chance(0.5) => Feature::Impact { a: near },
+            _ => Feature::MovingImpact { a: near, b: random.between(-0.05, 0.05), w: random.between(0.5, 4.0) },
         }
     }
 
     pub fn wall(&self) -> Option<f64> {
         match self {
-            Feature::Reset { a, .. } | Feature::Impact { a } => Some(*a),
+            Feature::Reset { a, .. } | Feature::Impact { a } | Feature::MovingImpact { a, .. } => Some(*a),
             _ => None,
         }
     }
@@ -128,6 +140,9 @@ impl Feature {
             Feature::QuadraticDrag { c } => vec![("quadratic", c)],
             Feature::Drive { f, w } => vec![("f", f), ("w", w)],
             Feature::Kink { a, k } => vec![("kink", a), ("slope", k)],
+            Feature::Spring { a, k } => vec![("floor", a), ("stiffness", k)],
+            Feature::Step { a, h } => vec![("edge", a), ("height", h)],
+            Feature::MovingImpact { a, b, w } => vec![("centre", a), ("amplitude", b), ("frequency", w)],
             Feature::JumpInTime { at, b } => vec![("T", at), ("b", b)],
             Feature::Reset { a, e } => vec![("wall", a), ("e", e)],
             Feature::Impact { a } => vec![("surface", a)],
@@ -145,6 +160,12 @@ impl Feature {
             (Feature::Drive { w, .. }, "w") => *w = value,
             (Feature::Kink { a, .. }, "kink") => *a = value,
             (Feature::Kink { k, .. }, "slope") => *k = value,
+            (Feature::Spring { a, .. }, "floor") | (Feature::Step { a, .. }, "edge") => *a = value,
+            (Feature::Spring { k, .. }, "stiffness") => *k = value,
+            (Feature::Step { h, .. }, "height") => *h = value,
+            (Feature::MovingImpact { a, .. }, "centre") => *a = value,
+            (Feature::MovingImpact { b, .. }, "amplitude") => *b = value,
+            (Feature::MovingImpact { w, .. }, "frequency") => *w = value,
             (Feature::JumpInTime { at, .. }, "T") => *at = value,
             (Feature::JumpInTime { b, .. }, "b") => *b = value,
             (Feature::Reset { a, .. }, "wall") | (Feature::Impact { a }, "surface") => *a = value,
@@ -159,7 +180,9 @@ impl Feature {
     pub fn potential(&self) -> Option<&'static str> {
         match self {
             Feature::Kink { .. } => Some("slope*abs(x - kink)"),
-            Feature::TableOverTime { .. } => Some("-drive(t)*x"),
+            Feature::Spring { .. } => Some("stiffness*max(x - floor, 0)^2/2"),
+            Feature::Step { .. } => Some("if(x > edge, height, 0)"),
+            Feature::TableOverTime { applied: false, .. } => Some("-drive(t)*x"),
             Feature::TableOverPosition { .. } => Some("hills(x)"),
             Feature::JumpInTime { .. } => Some("-if(t < T, b, 0)*x"),
             _ => None,
@@ -177,13 +200,14 @@ impl Feature {
             Feature::LinearDrag { .. } => Some(drag),
             Feature::QuadraticDrag { .. } => Some("-quadratic*x'*abs(x')"),
             Feature::Drive { .. } => Some(drive),
+            Feature::TableOverTime { applied: true, .. } => Some("drive(t)"),
             _ => None,
         }
     }
 
     pub fn table(&self) -> Option<(&'static str, Table)> {
         match self {
-            Feature::TableOverTime { table } => Some(("drive", table.table())),
+            Feature::TableOverTime { table, .. } => Some(("drive", table.table())),
             Feature::TableOverPosition { table } => Some(("hills", table.table())),
             _ => None,
         }
@@ -192,7 +216,7 @@ impl Feature {
     /// The times at which its field changes.
     pub fn times(&self) -> Vec<f64> {
         match self {
-            Feature::TableOverTime { table } => table.at.clone(),
+            Feature::TableOverTime { table, .. } => table.at.clone(),
             Feature::JumpInTime { at, .. } => vec![*at],
             _ => Vec::new(),
         }
@@ -201,10 +225,12 @@ impl Feature {
     pub fn surfaces(&self) -> Vec<Surface> {
         match self {
             Feature::QuadraticDrag { .. } => vec![Surface::Rest],
-            Feature::Kink { a, .. } => vec![Surface::Position(*a)],
+            Feature::Kink { a, .. } | Feature::Spring { a, .. } => vec![Surface::Position(*a)],
+            Feature::Step { a, h } => vec![Surface::Step { a: *a, h: *h }],
             Feature::TableOverPosition { table } => table.at.iter().map(|a| Surface::Position(*a)).collect(),
-            Feature::Reset { a, e } => vec![Surface::Wall { a: *a, e: *e }],
-            Feature::Impact { a } => vec![Surface::Wall { a: *a, e: 1.0 }],
+            Feature::Reset { a, e } => vec![Surface::Wall { a: *a, b: 0.0, w: 0.0, e: *e }],
+            Feature::Impact { a } => vec![Surface::Wall { a: *a, b: 0.0, w: 0.0, e: 1.0 }],
+            Feature::MovingImpact { a, b, w } => vec![Surface::Wall { a: *a, b: *b, w: *w, e: 1.0 }],
             Feature::TerminalEvent { a } => vec![Surface::End(*a)],
             _ => Vec::new(),
         }
@@ -218,9 +244,14 @@ impl Feature {
             Feature::QuadraticDrag { c } => (0.0, -c * v * v * sides[0]),
             Feature::Drive { f, w } => (0.0, f * (w * t).cos()),
             Feature::Kink { a, k } => (k * sides[0] * (x - a), -k * sides[0]),
-            Feature::TableOverTime { table } => {
+            Feature::Spring { a, k } => {
+                let beyond = if sides[0] > 0.0 { x - a } else { 0.0 };
+                (k * beyond * beyond / 2.0, -k * beyond)
+            }
+            Feature::Step { h, .. } => (if sides[0] > 0.0 { *h } else { 0.0 }, 0.0),
+            Feature::TableOverTime { table, applied } => {
                 let force = table.branch(passed, t).0;
-                (-force * x, force)
+                (if *applied { 0.0 } else { -force * x }, force)
             }
             Feature::TableOverPosition { table } => {
                 let (value, slope) = table.branch(sides.iter().filter(|s| **s > 0.0).count(), x);

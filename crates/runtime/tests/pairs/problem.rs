@@ -136,6 +136,11 @@ impl Problem {
                     let when = if above { "x - surface" } else { "surface - x" };
                     formula.with_impact(when, Impact::Elastic, None)
                 }
+                Feature::MovingImpact { .. } => {
+                    let surface = "x - (centre + amplitude*sin(frequency*t))";
+                    let when = if above { surface.to_owned() } else { format!("-({surface})") };
+                    formula.with_impact(&when, Impact::Elastic, None)
+                }
                 _ => Ok(formula),
             }
             .map_err(|error| error.to_string())?;

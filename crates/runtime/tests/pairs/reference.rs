@@ -71,8 +71,8 @@ impl Piece<'_> {
     }
 
     /// Whether the motion has left the sides of the piece.
-    fn is_left(&self, y: [f64; 3]) -> bool {
-        self.surfaces().any(|(i, j, surface)| surface.function(y) * self.sides[i][j] < 0.0)
+    fn is_left(&self, t: f64, y: [f64; 3]) -> bool {
+        self.surfaces().any(|(i, j, surface)| surface.function(t, y) * self.sides[i][j] < 0.0)
     }
 
     /// All surfaces, with the number of the feature and theirs in it; the last feature is the watched position.
@@ -88,16 +88,18 @@ impl Surface {
     }
 
     /// Its function, which changes its sign where the motion crosses it.
-    fn function(self, [x, v, _]: [f64; 3]) -> f64 {
+    fn function(self, t: f64, [x, v, _]: [f64; 3]) -> f64 {
         match self {
-            Surface::Position(a) | Surface::Wall { a, .. } | Surface::End(Some(a)) => x - a,
+            Surface::Position(a) | Surface::Step { a, .. } | Surface::End(Some(a)) => x - a,
+            Surface::Wall { a, b, w, .. } => x - (a + b * (w * t).sin()),
             Surface::Rest | Surface::End(None) => v,
         }
     }
 }
 
 /// The motion from a time and a state, with rows at these times, until the end of the problem; a watched position is
-/// one whose crossings are recorded. `None` where a thousand surfaces are met.
+/// one whose crossings are recorded. `None` where a thousand surfaces are met, or where it is not defined whether the
+/// motion comes to rest.
 pub fn motion(
     problem: &Problem,
     (mut t, mut y): (f64, [f64; 3]),
@@ -108,7 +110,7 @@ pub fn motion(
     let mut surfaces: Vec<_> = problem.features.iter().map(super::feature::Feature::surfaces).collect();
     surfaces.push(watched.map(Surface::Position).into_iter().collect());
     let mut piece = Piece { problem, sides: Vec::new(), passed: Vec::new(), surfaces };
-    let side = |surface: &Surface| surface.function(y).signum();
+    let side = |surface: &Surface| surface.function(t, y).signum();
     piece.sides = piece.surfaces.iter().map(|of| of.iter().map(side).collect()).collect();
     let changes: Vec<Vec<f64>> = problem.features.iter().map(super::feature::Feature::times).collect();
     let passed = |t: f64| changes.iter().map(|times| times.iter().filter(|at| **at <= t).count()).collect::<Vec<_>>();
@@ -123,7 +125,7 @@ pub fn motion(
             let h = STEP.min(cut - t);
             found.farthest = found.farthest.max(y[0].abs());
             let to = |part: f64| piece.step(t, y, part * h);
-            let Some(outside) = [0.5, 1.0].into_iter().find(|part| piece.is_left(to(*part))) else {
+            let Some(outside) = [0.5, 1.0].into_iter().find(|part| piece.is_left(t + *part * h, to(*part))) else {
                 y = to(1.0);
                 t = if h == cut - t { cut } else { t + h };
                 continue;
@@ -131,7 +133,7 @@ pub fn motion(
             let (mut inside, mut outside) = (outside - 0.5, outside);
             for _ in 0..60 {
                 let middle = (inside + outside) / 2.0;
-                if piece.is_left(to(middle)) { outside = middle } else { inside = middle }
+                if piece.is_left(t + middle * h, to(middle)) { outside = middle } else { inside = middle }
             }
             y = to(outside);
             t += outside * h;
@@ -140,16 +142,30 @@ pub fn motion(
                 return None;
             }
             let crossed: Vec<_> =
-                piece.surfaces().filter(|(i, j, surface)| surface.function(y) * piece.sides[*i][*j] < 0.0).collect();
+                piece.surfaces().filter(|(i, j, surface)| surface.function(t, y) * piece.sides[*i][*j] < 0.0).collect();
+            let mut reversed = false;
             for (i, j, surface) in crossed {
                 match surface {
-                    Surface::Wall { a, e } => {
-                        (y[0], y[1]) = (a, -e * y[1]);
-                        found.impacts.push((t, y));
-                        // The velocity passes 0 in an instant, which is no crossing.
-                        for (i, j, _) in piece.surfaces().filter(|of| of.2.is_of_velocity()).collect::<Vec<_>>() {
-                            piece.sides[i][j] = y[1].signum();
+                    Surface::Step { h, .. } => {
+                        let rise = -h * piece.sides[i][j];
+                        let square = y[1] * y[1] - 2.0 * rise / problem.m;
+                        if square > 0.0 {
+                            y[1] = square.sqrt().copysign(y[1]);
+                            piece.sides[i][j] = -piece.sides[i][j];
+                        } else {
+                            // Whether it is at rest in between is a matter of the limit.
+                            if piece.surfaces().any(|of| of.2 == Surface::End(None)) {
+                                return None;
+                            }
+                            y[1] = -y[1];
+                            reversed = true;
                         }
+                    }
+                    Surface::Wall { a, b, w, e } => {
+                        let speed = b * w * (w * t).cos();
+                        (y[0], y[1]) = (a + b * (w * t).sin(), speed - e * (y[1] - speed));
+                        found.impacts.push((t, y));
+                        reversed = true;
                     }
                     Surface::End(_) => return Some(Reference { t, end: y, ..found }),
                     Surface::Position(_) | Surface::Rest => {
@@ -159,6 +175,11 @@ pub fn motion(
                         }
                     }
                 }
+            }
+            // The velocity passes 0 in an instant, which is no crossing.
+            let of_velocity: Vec<_> = piece.surfaces().filter(|of| reversed && of.2.is_of_velocity()).collect();
+            for (i, j, _) in of_velocity {
+                piece.sides[i][j] = y[1].signum();
             }
         }
         if times.contains(&cut) {
