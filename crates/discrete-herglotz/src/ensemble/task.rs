@@ -167,7 +167,8 @@ impl<'e> Task<'e> {
         let Some(first) = starts.first().map(|start| start.0) else { return 0 };
         let mut own = None;
         let [kernel, finer] = self.kernels.as_ref().unwrap_or_else(|| {
-            let state = starts.iter().find_map(|(_, _, state)| state.as_ref());
+            let few = self.members.batch_kernel().is_some_and(|kernel| starts.len() < kernel.fewest());
+            let state = starts.iter().find_map(|(_, _, state)| state.as_ref().filter(|_| !few));
             own.insert(self.kernels_of(first, state))
         });
         let mut done = [false; MEMBERS_PER_SHARD];
