@@ -76,7 +76,7 @@ pub mod table {
 
 /// Surfaces at which a motion is interrupted: impacts, resets, and the times of kinks and jumps.
 pub mod switching {
-    pub use crate::dynamics::{Breaks, Control, Impact, Impacts, Surface};
+    pub use crate::dynamics::{BreakRate, Breaks, Control, Impact, Impacts, Surface};
 }
 
 pub use dynamics::{

@@ -1,7 +1,12 @@
 //! Kinks and jumps of formulas: at known times, and at zeros of functions of the state.
 
+use crate::evaluation::At;
 use crate::node::Inputs;
+use crate::parametric_nodes::ParametricNodes;
 use crate::{Formula, FormulaError, Function, Graph, Id, Node, Operation};
+use contact_geom::Dual;
+use contact_geom::nalgebra::SVector;
+use contact_geom::switching::BreakRate;
 
 /// The maximum number of samples of a table at an argument that depends on the state, each of which is a switching
 /// function.
@@ -15,6 +20,24 @@ enum TimeKink {
     /// Where an affine function of time has one of these values.
     Values(Id, Vec<f64>),
 }
+
+impl TimeKink {
+    fn function(&self) -> Id {
+        match self {
+            TimeKink::Zero(id) | TimeKink::Values(id, _) => *id,
+        }
+    }
+}
+
+/// A time of a kink or a jump, with the number of its function and the slope of this in time.
+struct KinkTime {
+    time: f64,
+    function: usize,
+    slope: f64,
+}
+
+/// A number with its derivative in a parameter.
+type Along = Dual<f64, SVector<f64, 1>>;
 
 /// The kinks and jumps of a formula.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +74,7 @@ impl Kinks {
                 functions.push(function);
             }
         }
-        let affine = graph.affine_in_time(functions.iter().chain(lookups.iter().map(|(_, a)| a)), &[]);
+        let affine = graph.affine_in_time(functions.iter().chain(lookups.iter().map(|(_, a)| a)).copied(), &[]);
         let is_affine = |id: &Id| affine.get(id.index()).is_some_and(Option::is_some);
         let (known, mut functions): (Vec<Id>, Vec<Id>) = functions.into_iter().partition(is_affine);
         let mut in_time: Vec<TimeKink> = known.into_iter().map(TimeKink::Zero).collect();
@@ -75,33 +98,64 @@ impl Kinks {
     /// The times of kinks and jumps in ascending order, from the values of all constant nodes, with others that are
     /// given.
     pub fn times(&self, graph: &Graph, constants: &[f64], given: &[f64]) -> Vec<f64> {
-        let functions = self.in_time.iter().map(|kink| match kink {
-            TimeKink::Zero(id) | TimeKink::Values(id, _) => id,
-        });
-        let affine = if self.in_time.is_empty() { Vec::new() } else { graph.affine_in_time(functions, constants) };
         let mut times = given.to_vec();
-        for kink in &self.in_time {
-            let (id, values) = match kink {
-                TimeKink::Zero(id) => (id, [0.0].as_slice()),
-                TimeKink::Values(id, values) => (id, values.as_slice()),
-            };
-            if let Some([slope, at_zero]) = affine.get(id.index()).copied().flatten() {
-                times.extend(values.iter().map(|value| (value - at_zero) / slope));
-            }
-        }
-        // A function with a slope of 0 has no zero. Both zeros are one time.
-        times.retain(|t| t.is_finite());
+        times.extend(self.in_time(graph, constants).into_iter().map(|kink| kink.time));
+        // Both zeros are one time.
         times.iter_mut().for_each(|t| *t += 0.0);
         times.sort_by(f64::total_cmp);
         times.dedup();
         times
+    }
+
+    /// The same times with their derivatives in a parameter, one for each kink and jump; `theta` are the values of the
+    /// parameters. Times that are given do not depend on them.
+    pub fn rates(&self, graph: &Graph, given: &[f64], theta: &[f64], parameter: usize) -> Vec<BreakRate> {
+        let functions: Vec<Id> = self.in_time.iter().map(TimeKink::function).collect();
+        let nodes = ParametricNodes::new(graph, &functions);
+        let moving = |x: f64, is: bool| Along { re: x, d: SVector::from([f64::from(u8::from(is))]) };
+        let moved: Vec<Along> = theta.iter().enumerate().map(|(k, x)| moving(*x, k == parameter)).collect();
+        // The derivative of an affine function is affine too.
+        let [at_0, at_1] = [0.0, 1.0].map(|t| {
+            let mut values = vec![moving(0.0, false); functions.len()];
+            let at = At { q: &[], v: &[], z: moving(0.0, false), t: moving(t, false) };
+            nodes.evaluate(&moved, at, &mut values);
+            values
+        });
+        let along = |values: &[Along], kink: &KinkTime| values.get(kink.function).map_or(f64::NAN, |g| g.d[0]);
+        let rate = |kink: KinkTime| {
+            let [a, b] = [&at_0, &at_1].map(|values| along(values, &kink));
+            BreakRate { time: kink.time + 0.0, rate: -(a + (b - a) * kink.time) / kink.slope }
+        };
+        let given = given.iter().map(|time| BreakRate { time: *time + 0.0, rate: 0.0 });
+        self.in_time(graph, &graph.constants(theta)).into_iter().map(rate).chain(given).collect()
+    }
+
+    /// The time of each kink and jump, from the values of all constant nodes.
+    fn in_time(&self, graph: &Graph, constants: &[f64]) -> Vec<KinkTime> {
+        if self.in_time.is_empty() {
+            return Vec::new();
+        }
+        let affine = graph.affine_in_time(self.in_time.iter().map(|kink| kink.function()), constants);
+        let mut found = Vec::new();
+        for (function, kink) in self.in_time.iter().enumerate() {
+            let values = match kink {
+                TimeKink::Zero(_) => [0.0].as_slice(),
+                TimeKink::Values(_, values) => values.as_slice(),
+            };
+            if let Some([slope, at_zero]) = affine.get(kink.function().index()).copied().flatten() {
+                found.extend(values.iter().map(|value| KinkTime { time: (value - at_zero) / slope, function, slope }));
+            }
+        }
+        // A function with a slope of 0 has no zero.
+        found.retain(|kink| kink.time.is_finite());
+        found
     }
 }
 
 impl Graph {
     /// For each node up to the last of some, its slope and its value at the time 0 if it is an affine function of time
     /// as it is written. The values of constants are NaN unless they are given.
-    fn affine_in_time<'a>(&self, of: impl Iterator<Item = &'a Id>, constants: &[f64]) -> Vec<Option<[f64; 2]>> {
+    fn affine_in_time(&self, of: impl Iterator<Item = Id>, constants: &[f64]) -> Vec<Option<[f64; 2]>> {
         let count = of.map(|id| id.index() + 1).max().unwrap_or(0);
         let mut affine: Vec<Option<[f64; 2]>> = Vec::with_capacity(count);
         for id in (0..count).map(|i| Id(i as u32)) {

@@ -13,6 +13,7 @@ use crate::structure::{Partials, is_split, kinks, proved};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::switching::BreakRate;
 use contact_geom::{HamiltonianStructure, Hessian, Scalar, Structure};
 
 /// The maximum number of nodes of a formula with its gradient. Reverse accumulation adds a few nodes for each node of
@@ -193,6 +194,12 @@ impl Derived {
     pub fn set_all(&mut self, values: &[f64]) {
         self.formula.values.copy_from_slice(values);
         self.set_constants();
+    }
+
+    /// The times of kinks and jumps with their derivatives in a parameter; a time with several kinks occurs once for each.
+    pub fn break_rates(&self, parameter: usize) -> Vec<BreakRate> {
+        let Formula { graph, breaks, values, .. } = &self.formula;
+        self.kinks.rates(graph, breaks, values, parameter)
     }
 
     /// The derivative in z, if it is proved to be constant.

@@ -6,6 +6,7 @@ use crate::evaluation::At;
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::support::KernelDual;
+use contact_geom::switching::BreakRate;
 use contact_geom::{Arguments, Scalar, ScalarSystem, Slopes, Structure};
 
 /// A Lagrangian formula with its derivatives in closed form and its proved structure, evaluated at points that are given
@@ -153,6 +154,20 @@ impl FormulaDerivatives {
     /// The times of kinks and jumps.
     pub fn breaks(&self) -> &[f64] {
         &self.derived.breaks
+    }
+
+    /// The same times with their derivatives in the parameter with this index; a time with several kinks or jumps occurs
+    /// once for each of them.
+    ///
+    /// ```
+    /// use formula_lagrangian::Formula;
+    /// let pulse = Formula::parse("x'^2/2 + if(2*t < T - 1, x, 0)", &["x"], &[("T", 4.0)])?.derivatives()?;
+    /// let found = pulse.break_rates(0);
+    /// assert_eq!((found[0].time, found[0].rate), (1.5, 0.5));
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    pub fn break_rates(&self, parameter: usize) -> Vec<BreakRate> {
+        self.derived.break_rates(parameter)
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::evaluation::At;
 use crate::{FormulaHamiltonian, FormulaLagrangian};
 use contact_geom::nalgebra::SVector;
+use contact_geom::switching::BreakRate;
 use contact_geom::{Parametric, ParametricHamiltonian, Scalar, VelocityPoint, vector};
 
 /// The parameters of the formula in their order, also those that it does not use.
@@ -58,6 +59,10 @@ impl<const N: usize> Parametric<N> for FormulaLagrangian<N> {
             self.derived().parametric_force.evaluate(theta, at, force.as_mut_slice());
         }
         force
+    }
+
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        Some(self.derived().break_rates(parameter))
     }
 }
 

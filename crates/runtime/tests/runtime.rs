@@ -4,6 +4,7 @@
 
 mod body;
 mod fit;
+mod jump_times;
 mod motions;
 mod pairs;
 mod path;

@@ -5,6 +5,15 @@ use crate::switching::Control;
 use crate::{GeometryError, Hints, Lagrangian, Parametric, PhasePoint, Scalar, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
+/// A [named time](Lagrangian::breaks) of a kink or a jump with its derivative in a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BreakRate {
+    /// The time.
+    pub time: f64,
+    /// Its derivative.
+    pub rate: f64,
+}
+
 /// A Lagrangian, or a Lagrangian with a force, that has a kink or a jump in time at each of these times: steps end
 /// there, whatever the integrator.
 ///
@@ -85,6 +94,10 @@ impl<const N: usize, L: Parametric<N>> Parametric<N> for Breaks<L> {
     #[inline(always)]
     fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
         self.lagrangian.hamiltonian_at(theta, t, x)
+    }
+    /// The times do not depend on the parameters.
+    fn break_rates(&self, _parameter: usize) -> Option<Vec<BreakRate>> {
+        Some(self.times.iter().map(|time| BreakRate { time: *time, rate: 0.0 }).collect())
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         self.lagrangian.switching_function_at(theta, index, t, x)

@@ -2,6 +2,7 @@
 
 use crate::dynamics::impact::{Impact, Impacts, Surface, normal_of};
 use crate::dynamics::law_derivatives::AtParameters;
+use crate::switching::BreakRate;
 use crate::{Parametric, PhasePoint, Scalar, VelocityPoint};
 use nalgebra::SVector;
 
@@ -88,6 +89,14 @@ impl<const N: usize, L: Parametric<N>, S: Surface<N> + Clone> Parametric<N> for 
     #[inline(always)]
     fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
         self.lagrangian.hamiltonian_at(&theta[..self.lagrangian.parameter_count()], t, x)
+    }
+    /// Those of the Lagrangian; they do not depend on the other parameters.
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        if parameter < self.lagrangian.parameter_count() {
+            return self.lagrangian.break_rates(parameter);
+        }
+        let times = self.lagrangian.breaks();
+        Some(times.iter().map(|time| BreakRate { time: *time, rate: 0.0 }).collect())
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         let Parts { lagrangian, surface, .. } = self.parts::<_, N>(theta)?;

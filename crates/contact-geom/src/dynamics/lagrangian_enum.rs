@@ -164,6 +164,11 @@ macro_rules! lagrangian_enum {
             ) -> $crate::nalgebra::SVector<T, $n> {
                 match self { $($name::$variant(lagrangian) => $crate::Parametric::<$n>::force_at(lagrangian, theta, t, x),)* }
             }
+            fn break_rates(&self, parameter: usize) -> Option<Vec<$crate::switching::BreakRate>> {
+                match self {
+                    $($name::$variant(lagrangian) => $crate::Parametric::<$n>::break_rates(lagrangian, parameter),)*
+                }
+            }
             #[inline]
             fn switching_function_at<T: $crate::Scalar>(
                 &self,

@@ -26,7 +26,7 @@ mod structure;
 mod table;
 
 pub use action::{OneParameterGroup, Symmetry};
-pub use breaks::Breaks;
+pub use breaks::{BreakRate, Breaks};
 pub use contact_hamiltonian::{
     AsFunction, AtEnergy, ContactHamiltonian, HamiltonianDerivatives, HamiltonianStructure, InTransformedTime, Lifted,
     NoMomentum, OfHamiltonian, ParametricHamiltonian, TimesRate, VectorField, extended, momentum, split_last,

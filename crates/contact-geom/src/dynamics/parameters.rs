@@ -1,6 +1,7 @@
 //! Parameters of Lagrangians and of forces, with respect to which motions can be differentiated.
 
 use crate::dynamics::nearest_name::nearest_name;
+use crate::switching::BreakRate;
 use crate::{Force, Forced, Lagrangian, PhasePoint, Scalar, VelocityDrag, VelocityPoint};
 use nalgebra::SVector;
 use thiserror::Error;
@@ -120,6 +121,14 @@ pub trait Parametric<const N: usize>: Lagrangian<N> {
         _t: T,
         _x: &VelocityPoint<N, T>,
     ) -> Option<VelocityPoint<N, T>> {
+        None
+    }
+
+    /// The [times of kinks and jumps](Lagrangian::breaks) with their derivatives in the parameter with this index. A time
+    /// at which there are several kinks or jumps that move differently occurs once for each of their rates. `None`, the
+    /// default: the derivatives are found by differences of the times for nearby parameters, to about ten digits.
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        let _ = parameter;
         None
     }
 
@@ -258,6 +267,14 @@ impl<const N: usize, L: Parametric<N>, F: ParametricForce<N>> Parametric<N> for 
     #[inline(always)]
     fn hamiltonian_at<T: Scalar>(&self, theta: &[T], t: T, x: &PhasePoint<N, T>) -> Option<T> {
         self.lagrangian.hamiltonian_at(&theta[..self.lagrangian.parameter_count()], t, x)
+    }
+    /// Those of the Lagrangian; they do not depend on the parameters of the force.
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        if parameter < self.lagrangian.parameter_count() {
+            return self.lagrangian.break_rates(parameter);
+        }
+        let times = self.lagrangian.breaks();
+        Some(times.iter().map(|time| BreakRate { time: *time, rate: 0.0 }).collect())
     }
     fn switching_function_at<T: Scalar>(&self, theta: &[T], index: usize, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         self.lagrangian.switching_function_at(&theta[..self.lagrangian.parameter_count()], index, t, x)

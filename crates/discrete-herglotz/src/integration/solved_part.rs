@@ -35,7 +35,7 @@ impl SolvedPart {
 pub enum PartEnd {
     /// It is the end of the step.
     Step,
-    /// A named time of a kink or a jump ([`breaks`](contact_geom::Lagrangian::breaks)), which is fixed.
+    /// A named time of a kink or a jump ([`breaks`](contact_geom::Lagrangian::breaks)), which may depend on parameters.
     Break,
     /// The step is divided there. The end stays at this fraction of the step: which parts are taken is not
     /// differentiated, as the choice of steps is not.
@@ -83,9 +83,9 @@ impl PartPoint {
         Point { q: self.state.q.clone(), v: self.v.clone(), z: self.state.z }
     }
 
-    /// The time derivatives of the state, as a vector.
-    pub fn rates(&self, motion: &impl Motion) -> Result<Components, StepError> {
-        let State { q, p, z } = motion.rates(self.t, &self.state, Some(&self.v))?;
+    /// The time derivatives of the state, as a vector, at this time or at another one.
+    pub fn rates(&self, t: f64, motion: &impl Motion) -> Result<Components, StepError> {
+        let State { q, p, z } = motion.rates(t, &self.state, Some(&self.v))?;
         Ok(Components { x: q, y: p, z })
     }
 }

@@ -1,12 +1,13 @@
 //! Columns that are carried along the steps of a run.
 
-use crate::integration::WholeStep;
+use crate::integration::{PartPoint, WholeStep};
 use crate::run::discretization::Discretization;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::{SwitchTime, TangentRow, row};
+use crate::sensitivity::time_jumps::{TimeJump, TimeJumps};
 use crate::sensitivity::{MotionState, SensitivityError};
 
 /// Columns, with the rows and the zeros of switching functions on their way.
@@ -17,6 +18,7 @@ pub(super) struct CarriedColumns<'r, 'p> {
     /// For shortened steps and parts of steps.
     pub row_engine: RowTangent<'p>,
     pub columns: Vec<Column>,
+    pub jumps: TimeJumps<'r, 'p>,
     pub times: RowTimes,
     pub rows: Vec<TangentRow>,
     pub switches: Vec<SwitchTime>,
@@ -30,12 +32,18 @@ impl<'r, 'p> CarriedColumns<'r, 'p> {
         columns: Vec<Column>,
         times: RowTimes,
     ) -> Self {
-        let (rows, switches) = (Vec::new(), Vec::new());
-        CarriedColumns { problem, steps, engine, row_engine: RowTangent::new(), columns, times, rows, switches }
+        let (rows, switches, jumps) = (Vec::new(), Vec::new(), TimeJumps::new(problem, steps));
+        CarriedColumns { problem, steps, engine, row_engine: RowTangent::new(), columns, jumps, times, rows, switches }
     }
 
     /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.
     pub fn push(&mut self, step: &TakenStep, end: f64, k: usize) -> Result<f64, SensitivityError> {
+        if let Some(jump) = step.start_time().and_then(|t| self.jumps.at_start(t, k))
+            && let Some(at) = step.start()
+        {
+            let times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
+            self.push_over(jump, &at, &times, k)?;
+        }
         match step {
             TakenStep::Whole(step) => {
                 self.rows_within(step, end, None, k)?;
@@ -44,6 +52,23 @@ impl<'r, 'p> CarriedColumns<'r, 'p> {
             }
             TakenStep::Parts(parts) => self.push_parts(parts, k),
         }
+    }
+
+    /// Carries the columns over a jump in time at a point, whose time has these derivatives.
+    pub fn push_over(
+        &mut self,
+        jump: TimeJump,
+        at: &PartPoint,
+        times: &[f64],
+        k: usize,
+    ) -> Result<(), SensitivityError> {
+        let wanted: Vec<usize> = self.columns.iter().filter_map(|column| column.parameter).collect();
+        if wanted.is_empty() && times.iter().all(|dt| *dt == 0.0) {
+            return Ok(());
+        }
+        let of = self.jumps.derivatives(jump, at, &wanted, true);
+        let of = of.map_err(|cause| SensitivityError::Step { step: k, cause })?;
+        self.columns.iter_mut().zip(times).try_for_each(|(column, dt)| of.push(column, *dt))
     }
 
     /// The rows before the end of a step or of a part of one, from its start by shortened steps; `starts` are the

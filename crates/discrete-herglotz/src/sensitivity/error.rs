@@ -97,6 +97,18 @@ pub enum SensitivityError {
         /// The cause.
         cause: &'static str,
     },
+    /// The derivative of a time of kinks and jumps in a parameter is not known.
+    #[error(
+        "the derivative of the time t = {t} of a kink or a jump in parameter {parameter} is not known, since for nearby \
+         values there are more or fewer such times; choose another value of the parameter, or state the derivatives by \
+         `break_rates`"
+    )]
+    TimeJump {
+        /// The time.
+        t: f64,
+        /// The index of the parameter.
+        parameter: usize,
+    },
     /// The tangent of a step cannot be computed.
     #[error("the derivative of step {step} cannot be computed: {cause}")]
     Step {

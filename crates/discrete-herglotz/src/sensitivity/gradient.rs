@@ -7,10 +7,11 @@ use crate::sensitivity::columns::Covector;
 use crate::sensitivity::gradient_parts::PartCovectors;
 use crate::sensitivity::kept_states::{BLOCK, KeptStates, for_each_block};
 use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem, Quantity};
-use crate::sensitivity::row_times::{check_times, is_same_time};
+use crate::sensitivity::row_times::{SameTime, check_times};
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::tangent::no_tangent;
+use crate::sensitivity::time_jumps::TimeJumps;
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, Loss, MotionState, SensitivityError};
 use crate::system::products::times;
@@ -220,14 +221,15 @@ impl RecordedRun<'_> {
     /// [`InputError::Count`](crate::InputError::Count) where there are fewer covectors than times.
     pub fn pullback_at(&self, times: &[f64], covectors: &[EndCovector]) -> Result<Gradient, SensitivityError> {
         let steps = &self.plan.steps;
-        check_times(times, (steps.problem.t0, steps.t_end))?;
+        let span = (steps.problem.t0, steps.t_end);
+        check_times(times, span)?;
         if covectors.len() != times.len() {
             let (found, least) = (covectors.len(), times.len());
             return Err(InputError::Count { what: "the number of covectors", least, found }.into());
         }
         let (mut end, mut inner) = (EndCovector::zero(self.problem.dimension()), times.len());
         if let (Some(t), Some(last)) = (times.last(), covectors.last())
-            && is_same_time(*t, self.outcome.t)
+            && SameTime::of_span(span).is(*t, self.outcome.t)
         {
             (end, inner) = (last.clone(), inner - 1);
         }
@@ -260,9 +262,10 @@ impl RecordedRun<'_> {
             all.push(Covector::new(of_state, parameters));
         }
         let mut engine = StepTangent::new(problem, steps, Direction::Backward)?;
-        let mut rows = RowCovectors { problem, steps, times, of_rows, tangent: RowTangent::new() };
+        let (jumps, same) = (TimeJumps::new(problem, steps), SameTime::of_span((steps.problem.t0, steps.t_end)));
+        let mut rows = RowCovectors { problem, steps, jumps: &jumps, same, times, of_rows, tangent: RowTangent::new() };
         let mut stepper = self.plan.stepper()?;
-        let mut of_parts = PartCovectors { problem, steps, tangent: RowTangent::new() };
+        let mut of_parts = PartCovectors { problem, steps, jumps: &jumps, tangent: RowTangent::new() };
         let mut block: Vec<TakenStep> = Vec::with_capacity(BLOCK);
         let mut work = |stepper: &mut dyn Stepper, range: Range<usize>| {
             block.clear();
@@ -281,6 +284,7 @@ impl RecordedRun<'_> {
                     }
                     TakenStep::Parts(parts) => of_parts.pull(&mut engine, (parts, k), &mut all, &mut rows)?,
                 }
+                of_parts.pull_at_start(step, k, &mut all, &mut rows).map_err(|cause| failed(k, cause))?;
             }
             Ok(())
         };
@@ -315,14 +319,16 @@ fn check_length(what: &'static str, found: usize, n: usize) -> Result<(), InputE
 pub(super) struct RowCovectors<'r, 'p> {
     problem: &'r Differentiable<'p>,
     steps: &'r Discretization<'p>,
+    jumps: &'r TimeJumps<'r, 'p>,
+    same: SameTime,
     times: &'r [f64],
     of_rows: &'r [EndCovector],
     tangent: RowTangent<'p>,
 }
 
 impl<'p> RowCovectors<'_, 'p> {
-    /// Adds the covectors of the rows in a step, the k-th of the run, to that at its start; `engine` is the tangent of whole
-    /// steps.
+    /// Adds the covectors of the rows after the start of a step, the k-th of the run, to that at its start; `engine` is the
+    /// tangent of whole steps.
     fn add(
         &mut self,
         engine: &mut StepTangent<'p>,
@@ -332,11 +338,7 @@ impl<'p> RowCovectors<'_, 'p> {
     ) -> Result<(), StepError> {
         let of_start = self.add_within(engine, step, to)?;
         to.add_time(of_start, k);
-        let (t, state) = step.start();
-        if !self.is_next(t) {
-            return Ok(());
-        }
-        self.add_at_start(&PartPoint { t, state: state.clone(), v: step.velocity() }, k, to)
+        Ok(())
     }
 
     /// Adds the covectors of the rows after the start of a step, or of a part of one, to that at its start. Returns the
@@ -352,7 +354,7 @@ impl<'p> RowCovectors<'_, 'p> {
         let mut of_start = 0.0;
         while let Some(t) = self.times.last().copied() {
             let passed = if step.length() < 0.0 { t <= start } else { t >= start };
-            if is_same_time(t, start) || !passed {
+            if self.same.is(t, start) || !passed {
                 break;
             }
             let (short, state, v) = self.steps.shortened(step, t)?;
@@ -367,8 +369,8 @@ impl<'p> RowCovectors<'_, 'p> {
     }
 
     /// Whether a time is that of the last row that is not yet added.
-    fn is_next(&self, t: f64) -> bool {
-        self.times.last().is_some_and(|row| is_same_time(*row, t))
+    pub fn is_next(&self, t: f64) -> bool {
+        self.times.last().is_some_and(|row| self.same.is(*row, t))
     }
 
     /// Adds the covector of a row at the start of a step, the k-th of the run.
@@ -379,7 +381,7 @@ impl<'p> RowCovectors<'_, 'p> {
         let v = self.steps.velocity(at.t, &at.state, Some(&at.v))?;
         let at = PartPoint { t: at.t, state: at.state.clone(), v };
         let Some(row) = self.take(&at)? else { return Ok(()) };
-        let rates = self.steps.rates(at.t, &at.state, Some(&at.v))?;
+        let rates = self.steps.rates(self.jumps.before(at.t), &at.state, Some(&at.v))?;
         to.add_at_fixed_time(&row.state(), &row.parameters, &rates, k);
         Ok(())
     }

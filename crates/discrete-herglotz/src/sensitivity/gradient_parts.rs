@@ -11,8 +11,9 @@ use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
 use crate::sensitivity::gradient::RowCovectors;
 use crate::sensitivity::parametric_system::Differentiable;
-use crate::sensitivity::step_tangent::{RowTangent, StepTangent};
+use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
 use crate::sensitivity::switch::Switch;
+use crate::sensitivity::time_jumps::{TimeJump, TimeJumps};
 use crate::{Components, StepError};
 use contact_geom::numbers::max_or_nan;
 
@@ -20,6 +21,7 @@ use contact_geom::numbers::max_or_nan;
 pub(super) struct PartCovectors<'r, 'p> {
     pub problem: &'r Differentiable<'p>,
     pub steps: &'r Discretization<'p>,
+    pub jumps: &'r TimeJumps<'r, 'p>,
     pub tangent: RowTangent<'p>,
 }
 
@@ -37,17 +39,18 @@ impl<'p> PartCovectors<'_, 'p> {
         // The derivatives in the time of the end of a part.
         let mut times = vec![0.0; all.len()];
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.next.rates(self.steps).map_err(failed)?;
+            let rates = last.next.rates(self.jumps.before(last.next.t), self.steps).map_err(failed)?;
             for (covector, time) in all.iter_mut().zip(&mut times) {
                 let along = covector.state().dot(&rates);
                 covector.add_time(along, k + 1);
                 *time = -along;
             }
         }
-        for (i, part) in parts.iter().enumerate().rev() {
+        let jumps = self.jumps.in_parts(parts, k);
+        for ((i, part), jump) in parts.iter().enumerate().zip(jumps).rev() {
             // A row at the end of a part is one before the passage there, at a fixed time.
             let row = if i + 1 < parts.len() { rows.take_at(&part.to).map_err(failed)? } else { None };
-            self.pull_part(engine, (part, k), all, &mut times)?;
+            self.pull_part(engine, (part, jump, k), all, &mut times)?;
             let (Some(first), Some(time)) = (all.first_mut(), times.first_mut()) else { continue };
             if let Some(mut row) = row {
                 self.pull_over(engine, part, std::slice::from_mut(&mut row)).map_err(failed)?;
@@ -62,23 +65,61 @@ impl<'p> PartCovectors<'_, 'p> {
         for (covector, time) in all.iter_mut().zip(&times) {
             covector.add_time(*time, k);
         }
-        if let (Some(part), Some(first)) = (parts.first(), all.first_mut()) {
-            rows.add_at_start(&part.from, k, first).map_err(failed)?;
-        }
         Ok(())
+    }
+
+    /// Carries covectors at the start of a step, the k-th of the run, over a jump in time there, and adds that of a row
+    /// before it.
+    pub fn pull_at_start(
+        &self,
+        step: &TakenStep,
+        k: usize,
+        all: &mut [Covector],
+        rows: &mut RowCovectors<'_, 'p>,
+    ) -> Result<(), StepError> {
+        let Some(t) = step.start_time() else { return Ok(()) };
+        let jump = self.jumps.at_start(t, k);
+        let Some(at) = step.start().filter(|_| jump.is_some() || rows.is_next(t)) else { return Ok(()) };
+        if let Some(jump) = jump {
+            let of = self.jumps.derivatives(jump, &at, &self.parameters(), true)?;
+            for covector in all.iter_mut() {
+                let of_time = of.pull(covector);
+                covector.add_time(of_time, k);
+            }
+        }
+        match all.first_mut() {
+            Some(first) => rows.add_at_start(&at, k, first),
+            None => Ok(()),
+        }
+    }
+
+    /// The indices of all parameters.
+    fn parameters(&self) -> Vec<usize> {
+        (0..self.problem.of.parameters().len()).collect()
     }
 
     /// Carries covectors over a part; `times` are their derivatives in the time of its end, and then of its start.
     fn pull_part(
         &mut self,
         engine: &mut StepTangent<'p>,
-        (part, k): (&SolvedPart, usize),
+        (part, jump, k): (&SolvedPart, Option<TimeJump>, usize),
         all: &mut [Covector],
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
         let (problem, t, h) = (self.problem, part.to.t, self.steps.h);
         let mut gradient = None;
+        let of_jump = match jump {
+            None => None,
+            Some(jump) => {
+                let moves = part.end != PartEnd::Break;
+                let of = self.jumps.derivatives(jump, &part.next, &self.parameters(), moves).map_err(failed)?;
+                for (covector, time) in all.iter_mut().zip(&mut *times) {
+                    *time += of.pull(covector);
+                }
+                Some(of)
+            }
+        };
         if let PartEnd::Switch { index, rising, passage } = part.end {
             let switch = Switch { problem, index, rising, at: &part.to, step: k, h };
             if let Some(change) = switch.passage(passage, &part.next)? {
@@ -108,7 +149,11 @@ impl<'p> PartCovectors<'_, 'p> {
             *time = of_start - of_length;
             match part.end {
                 PartEnd::Step => covector.add_time(of_end, k + 1),
-                PartEnd::Break => {}
+                PartEnd::Break => {
+                    if let Some(of) = &of_jump {
+                        of.add_time(covector, of_end);
+                    }
+                }
                 PartEnd::Division { fraction } => {
                     covector.add_time((1.0 - fraction) * of_end, k);
                     covector.add_time(fraction * of_end, k + 1);
@@ -140,7 +185,7 @@ impl<'p> PartCovectors<'_, 'p> {
                 self.tangent.pull(engine, self.problem, step, all)
             }
             None => {
-                let rates = part.from.rates(self.steps)?;
+                let rates = part.from.rates(self.jumps.after(part.from.t), self.steps)?;
                 all.iter_mut().for_each(|covector| covector.pull_at_once(&rates));
                 Ok(())
             }

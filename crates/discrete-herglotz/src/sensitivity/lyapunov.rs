@@ -199,7 +199,13 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         let mut frame = Frame {
             plan: &plan,
             logarithms: vec![0.0; columns.len()],
-            carried: CarriedColumns::new(&problem, &plan.steps, engine, columns, RowTimes::new(&[])),
+            carried: CarriedColumns::new(
+                &problem,
+                &plan.steps,
+                engine,
+                columns,
+                RowTimes::new(&[], (t0, plan.steps.t_end)),
+            ),
             middle: None,
             before: (t0, problem.problem.state.clone()),
             taken: 0,

@@ -41,6 +41,7 @@ pub(crate) mod step_tangent;
 mod switch;
 mod tangent;
 mod tangent_parts;
+mod time_jumps;
 mod variable;
 mod velocity_dependence;
 

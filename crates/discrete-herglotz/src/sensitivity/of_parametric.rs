@@ -13,6 +13,7 @@ use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::{Argument, moving_point};
 use crate::{Components, Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::SVector;
+use contact_geom::switching::BreakRate;
 use contact_geom::{ChartVector, Parametric};
 use pulp::{Simd, WithSimd};
 
@@ -129,6 +130,10 @@ impl<'a, L: Parametric<N>, const N: usize> ParametricSystem<'a> for OfParametric
         let (theta, t, x) = moving_point(along, &self.0.parameters(), t, x);
         let to = self.0.state_after_switch_at(&theta, index, t, &x)?;
         Some(Components { x: to.q.map(|x| x.d[0]).into(), y: to.v.map(|x| x.d[0]).into(), z: to.z.d[0] })
+    }
+
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        self.0.break_rates(parameter)
     }
 
     fn hamiltonian(&self) -> Option<Box<dyn CollocationSystem + 'a>> {

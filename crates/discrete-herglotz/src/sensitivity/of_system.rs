@@ -9,6 +9,7 @@ use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
 use crate::{Components, Point, SecondDerivatives, StepError, System, Vector};
+use contact_geom::switching::BreakRate;
 use pulp::{Simd, WithSimd};
 use std::rc::Rc;
 
@@ -51,6 +52,10 @@ impl<'a> ParametricSystem<'a> for OfSystem<'a> {
 
     fn state_after_switch_along(&self, _along: Argument, _index: usize, _t: f64, _x: &Point) -> Option<Components> {
         None
+    }
+
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        self.0.break_rates(parameter)
     }
 }
 

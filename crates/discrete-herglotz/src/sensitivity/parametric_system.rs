@@ -12,6 +12,7 @@ use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::step_maps::StepMaps;
 use crate::sensitivity::switch::Argument;
 use crate::{Components, Point, Problem, State, StepError, System, SystemProblem, Vector};
+use contact_geom::switching::BreakRate;
 use contact_geom::{Parametric, UnknownParameter};
 use std::rc::Rc;
 
@@ -116,6 +117,9 @@ pub(crate) trait ParametricSystem<'a> {
 
     /// The derivative of the `(q, v, z)` after a reset along an argument; `None` where it is not known.
     fn state_after_switch_along(&self, along: Argument, index: usize, t: f64, x: &Point) -> Option<Components>;
+
+    /// The times of kinks and jumps with their derivatives in a parameter; `None` where these are not known.
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>>;
 
     /// The contact Hamiltonian by which the Lagrangian is given, as collocation sees it; `None`, the default, for all others.
     fn hamiltonian(&self) -> Option<Box<dyn CollocationSystem + 'a>> {

@@ -2,24 +2,41 @@
 
 use crate::InputError;
 use crate::run::RunInfo;
+use contact_geom::numbers::max_or_nan;
 
-/// A distance in time that is round-off, relative to the time and to the step.
-const SAME_TIME: f64 = 4.0 * f64::EPSILON;
+/// The round-off of the ends of the steps of a run, relative to the largest of its times: they are sums of the start and of
+/// a multiple of the step size, which are rounded, also where they cancel.
+const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
 
-/// Whether a time is that of a step's end, up to round-off.
-pub(crate) fn is_same_time(t: f64, end: f64) -> bool {
-    (t - end).abs() <= SAME_TIME * end.abs().max(t.abs())
+/// Whether times are those of ends of steps, up to round-off.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SameTime {
+    round_off: f64,
+}
+
+impl SameTime {
+    /// For a run between two times.
+    pub fn of_span((t0, t_end): (f64, f64)) -> Self {
+        SameTime { round_off: ROUND_OFF * max_or_nan(t0.abs(), t_end.abs()) }
+    }
+
+    /// Whether a time is that of a step's end.
+    pub fn is(self, t: f64, end: f64) -> bool {
+        (t - end).abs() <= self.round_off
+    }
 }
 
 /// The times of rows, in the order of the run.
 pub(crate) struct RowTimes {
     times: Vec<f64>,
     passed: usize,
+    same: SameTime,
 }
 
 impl RowTimes {
-    pub fn new(times: &[f64]) -> Self {
-        RowTimes { times: times.to_vec(), passed: 0 }
+    /// The times of rows of a run between two times.
+    pub fn new(times: &[f64], span: (f64, f64)) -> Self {
+        RowTimes { times: times.to_vec(), passed: 0, same: SameTime::of_span(span) }
     }
 
     /// Checks the times for a run.
@@ -34,7 +51,7 @@ impl RowTimes {
     pub fn next_within(&mut self, (start, end): (f64, f64)) -> Option<f64> {
         let t = *self.times.get(self.passed)?;
         let passed = if end < start { t <= end } else { t >= end };
-        if is_same_time(t, end) || passed {
+        if self.same.is(t, end) || passed {
             return None;
         }
         self.passed += 1;
@@ -44,7 +61,7 @@ impl RowTimes {
     /// The next time, if it is that of the end of a step.
     pub fn next_at(&mut self, end: f64, last: bool) -> Option<f64> {
         let t = *self.times.get(self.passed)?;
-        if !(last || is_same_time(t, end)) {
+        if !(last || self.same.is(t, end)) {
             return None;
         }
         self.passed += 1;

@@ -1,7 +1,7 @@
 //! The tangent of the steps of a run, for every integrator that has one. Steps with several parts are those of
 //! [`tangent_parts`](crate::sensitivity::tangent_parts) and [`gradient_parts`](crate::sensitivity::gradient_parts).
 
-use crate::integration::{SolvedPart, StepEnds, WholeStep};
+use crate::integration::{PartPoint, SolvedPart, StepEnds, WholeStep};
 use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::{Column, Covector};
@@ -17,6 +17,27 @@ pub(crate) enum TakenStep {
     Whole(WholeStep),
     /// The parts of a step that ends parts at zeros of switching functions and at breaks.
     Parts(Vec<SolvedPart>),
+}
+
+impl TakenStep {
+    /// The time at its start.
+    pub fn start_time(&self) -> Option<f64> {
+        match self {
+            TakenStep::Whole(step) => Some(step.start().0),
+            TakenStep::Parts(parts) => parts.first().map(|part| part.from.t),
+        }
+    }
+
+    /// The point at its start, with a velocity near there.
+    pub fn start(&self) -> Option<PartPoint> {
+        match self {
+            TakenStep::Whole(step) => {
+                let (t, state) = step.start();
+                Some(PartPoint { t, state: state.clone(), v: step.velocity() })
+            }
+            TakenStep::Parts(parts) => parts.first().map(|part| part.from.clone()),
+        }
+    }
 }
 
 /// The tangent of the steps of an integrator, forward or as its adjoint.

@@ -236,7 +236,7 @@ pub(super) fn difference(
 }
 
 /// The derivative of a function of the system in a parameter, by differences.
-fn difference_in_parameter(
+pub(super) fn difference_in_parameter(
     problem: &Differentiable<'_>,
     k: usize,
     f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>,

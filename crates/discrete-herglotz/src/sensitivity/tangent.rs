@@ -110,7 +110,8 @@ impl Columns<'_, '_> {
                 row(problem, state, &self.carried.columns, |column| column.time_after(at.k))
             } else {
                 // The end of the step moves with the times of the run, but not the row.
-                let rates = self.plan.steps.rates(at.t, &at.state, Some(&v)).map_err(failed)?;
+                let t = self.carried.jumps.before(at.t);
+                let rates = self.plan.steps.rates(t, &at.state, Some(&v)).map_err(failed)?;
                 let columns: Vec<_> =
                     self.carried.columns.iter().map(|column| column.at_fixed_time(at.k, &rates)).collect();
                 row(problem, state, &columns, |_| 0.0)
@@ -223,7 +224,13 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         }
         let mut observer = Columns {
             plan: &plan,
-            carried: CarriedColumns::new(&problem, &plan.steps, engine, columns, RowTimes::new(times)),
+            carried: CarriedColumns::new(
+                &problem,
+                &plan.steps,
+                engine,
+                columns,
+                RowTimes::new(times, (problem.problem.t0, plan.steps.t_end)),
+            ),
             before: (problem.problem.t0, problem.problem.state.clone()),
             largest: 0.0,
             taken: 0,

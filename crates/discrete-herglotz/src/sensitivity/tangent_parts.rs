@@ -3,13 +3,15 @@
 //! A part ends at a time that may itself depend on the variables, so that its tangent is taken to a fixed time first, with
 //! the derivative in its length as one more column. At the zero of a switching function g the time has the derivative
 //! `dt = -dg / g'`, where dg is the derivative of g for a fixed time and g' its rate in the length of the part: that of
-//! the discrete motion. Then the reset follows, and the next part starts at this time.
+//! the discrete motion. Then the reset follows, and the next part starts at this time. So it is at the time of a kink or a
+//! jump, whose derivatives in the parameters are known.
 
 use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::switch::Switch;
 use crate::sensitivity::tangent::{SwitchTime, row};
+use crate::sensitivity::time_jumps::TimeJump;
 use crate::sensitivity::{MotionState, SensitivityError};
 use contact_geom::numbers::max_or_nan;
 
@@ -18,12 +20,12 @@ impl CarriedColumns<'_, '_> {
     pub(super) fn push_parts(&mut self, parts: &[SolvedPart], k: usize) -> Result<f64, SensitivityError> {
         // The derivatives of the time at the start of each part.
         let mut times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
-        for (i, part) in parts.iter().enumerate() {
-            self.push_part(part, (k, i + 1 == parts.len()), &mut times)?;
+        for ((i, part), jump) in parts.iter().enumerate().zip(self.jumps.in_parts(parts, k)) {
+            self.push_part((part, jump), (k, i + 1 == parts.len()), &mut times)?;
         }
         // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
-            let rates = last.next.rates(self.steps);
+            let rates = last.next.rates(self.jumps.before(last.next.t), self.steps);
             let rates = rates.map_err(|cause| SensitivityError::Step { step: k, cause })?;
             for (column, dt) in self.columns.iter_mut().zip(&times) {
                 let dh = column.time_after(k + 1) - dt;
@@ -35,7 +37,7 @@ impl CarriedColumns<'_, '_> {
 
     fn push_part(
         &mut self,
-        part: &SolvedPart,
+        (part, jump): (&SolvedPart, Option<TimeJump>),
         (k, is_last): (usize, bool),
         times: &mut [f64],
     ) -> Result<(), SensitivityError> {
@@ -50,7 +52,7 @@ impl CarriedColumns<'_, '_> {
         match &part.step {
             Some(step) => self.row_engine.push(&mut self.engine, problem, step, &mut fixed).map_err(failed)?,
             None => {
-                let rates = part.from.rates(steps).map_err(failed)?;
+                let rates = part.from.rates(self.jumps.after(part.from.t), steps).map_err(failed)?;
                 fixed.iter_mut().for_each(|column| column.push_at_once(&rates));
             }
         }
@@ -65,7 +67,16 @@ impl CarriedColumns<'_, '_> {
             PartEnd::Step => {
                 times.iter_mut().zip(&self.columns).for_each(|(dt, column)| *dt = column.time_after(k + 1))
             }
-            PartEnd::Break => times.fill(0.0),
+            PartEnd::Break => match jump {
+                None => times.fill(0.0),
+                Some(jump) => {
+                    let wanted: Vec<usize> = self.columns.iter().filter_map(|column| column.parameter).collect();
+                    let of = self.jumps.derivatives(jump, &part.next, &wanted, false).map_err(failed)?;
+                    for (dt, column) in times.iter_mut().zip(&fixed) {
+                        *dt = of.time(column)?;
+                    }
+                }
+            },
             PartEnd::Division { fraction } => times.iter_mut().zip(&self.columns).for_each(|(dt, column)| {
                 *dt = (1.0 - fraction) * column.time_after(k) + fraction * column.time_after(k + 1);
             }),
@@ -86,6 +97,9 @@ impl CarriedColumns<'_, '_> {
             let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
             column.set_state(state);
         }
-        Ok(())
+        match jump {
+            Some(jump) => self.push_over(jump, &part.next, times, k),
+            None => Ok(()),
+        }
     }
 }

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::StepError;
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::switching::BreakRate;
 use contact_geom::{Hints, Structure};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
@@ -134,6 +135,9 @@ impl System for Guarded<'_> {
     }
     fn breaks(&self) -> &[f64] {
         self.checked(|| self.system.breaks(), |_| true, || &[])
+    }
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        self.checked(|| self.system.break_rates(parameter), |_| true, || None)
     }
     fn value(&self, t: f64, x: &Point) -> f64 {
         self.checked(|| self.system.value(t, x), |_| true, || f64::NAN)

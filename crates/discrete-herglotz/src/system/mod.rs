@@ -23,6 +23,7 @@ pub use vector::Vector;
 
 use crate::StepError;
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::switching::BreakRate;
 use contact_geom::{Defect, Defects, GeometryError, Hints, Structure};
 use std::rc::Rc;
 
@@ -266,6 +267,14 @@ pub trait System {
     /// The times at which L or the applied force has a kink or a jump in time.
     fn breaks(&self) -> &[f64] {
         &[]
+    }
+
+    /// The same times with their derivatives in the parameter with this index. A time at which there are several kinks or
+    /// jumps that move differently occurs once for each of their rates. `None`, the default: the derivatives are found by
+    /// differences of the times for nearby values of the parameter.
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        let _ = parameter;
+        None
     }
 
     /// The rate `dt/dtau` of the time transformation.

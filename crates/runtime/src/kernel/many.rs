@@ -11,6 +11,7 @@ use crate::{
     RunMonitor, RuntimeError, Sensitivity, StepControl,
 };
 use contact_geom::nalgebra::DMatrix;
+use contact_geom::switching::BreakRate;
 use contact_geom::{Arguments, Hints, ScalarSystem, Slopes, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::sensitivity::Variable;
@@ -87,6 +88,9 @@ impl System for ManyCoordinates {
     }
     fn breaks(&self) -> &[f64] {
         self.0.breaks()
+    }
+    fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
+        Some(self.0.break_rates(parameter))
     }
     fn parameter_names(&self) -> Vec<String> {
         self.0.formula().parameters().map(|(name, _)| name.to_owned()).collect()

@@ -4,7 +4,7 @@ pub(crate) mod accumulation;
 pub(crate) mod evaluation_range;
 pub(crate) mod of_integrator;
 pub(crate) mod part_stepper;
-mod parts;
+pub(crate) mod parts;
 mod passage;
 mod run;
 mod solved_parts;
@@ -16,6 +16,7 @@ use crate::status::first;
 use crate::switching::stepper::accumulation::Accumulation;
 use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;
+use crate::switching::stepper::parts::time_spacing;
 use crate::switching::stepper::solved_parts::EndOfPart;
 use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
 use crate::{InputError, StepError, UnresolvedStep};
@@ -157,15 +158,17 @@ impl<'a> SwitchingStepper<'a> {
         }
     }
 
-    /// The first break after a time in the direction of the run, at a distance of more than `spacing`, or the end.
-    fn next_end(&self, t: f64, t_end: f64, spacing: f64) -> f64 {
+    /// The first break after a time in the direction of the run, at a distance from it and from the end that is not
+    /// round-off, or the end.
+    fn next_end(&self, t: f64, t_end: f64) -> f64 {
         let breaks = self.problem.system.breaks();
+        let [after, before] = [t, t_end].map(|t| time_spacing(t, self.h));
         let forward = t_end > t;
         let next = if forward {
-            breaks.get(breaks.partition_point(|b| *b <= t + spacing)).filter(|b| **b < t_end - spacing)
+            breaks.get(breaks.partition_point(|b| *b <= t + after)).filter(|b| **b < t_end - before)
         } else {
-            let before = breaks.partition_point(|b| *b < t - spacing);
-            before.checked_sub(1).and_then(|i| breaks.get(i)).filter(|b| **b > t_end + spacing)
+            let earlier = breaks.partition_point(|b| *b < t - after);
+            earlier.checked_sub(1).and_then(|i| breaks.get(i)).filter(|b| **b > t_end + before)
         };
         next.copied().unwrap_or(t_end)
     }

@@ -26,6 +26,11 @@ const FLIGHTS_PER_PART: f64 = 4.0;
 /// of the curve of the step.
 const MAX_NEWTON_ITERATIONS: usize = 8;
 
+/// A distance in time that is round-off, near a time in steps of length h.
+pub(crate) fn time_spacing(t: f64, h: f64) -> f64 {
+    4.0 * f64::EPSILON * max_or_nan(t.abs(), h.abs())
+}
+
 /// A piece of a step since the last reset.
 struct OpenPiece {
     from: TimedState,
@@ -70,7 +75,7 @@ impl<'a> SwitchingStepper<'a> {
                 self.end_piece(&mut piece, &at);
                 return Ok((at, sigma));
             }
-            let until = self.next_end(at.t, t_end, spacing);
+            let until = self.next_end(at.t, t_end);
             let plain_end = |t: f64| match t {
                 _ if t != until => PartEnd::Division { fraction: (t - from.t) / span },
                 _ if until == t_end => PartEnd::Step,
