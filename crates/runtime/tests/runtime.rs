@@ -3,10 +3,12 @@
 #![allow(missing_docs)]
 
 mod body;
+mod divided_steps;
 mod fit;
 mod jump_times;
 mod motions;
 mod pairs;
 mod path;
+mod rows_beside_kinks;
 mod sensitivity;
 mod sparse;

@@ -87,9 +87,11 @@ fn invalid_requests_are_errors_with_the_remedy() {
     assert_eq!(said(&good, "gama"), "there is no variable `gama`; did you mean `gamma`?");
     assert!(said(&good, "omega").ends_with("the variables are x, x', gamma, z, t0, t_end"));
     assert!(said(&good, "p_x").contains("not by its momentum"));
-    let by = "divided_gauss_8_1e-5".parse().unwrap();
+    let by = "midpoint".parse().unwrap();
     let split = Motion { step_control: StepControl::Steps { by, steps: Steps::Count(10) }, ..good.clone() };
-    assert!(said(&split, "gamma").contains("Gauss methods such as \"gauss_8\" have those in all variables"));
+    let kinked = System::parse("x'^2/2 - abs(x)", &["x"], &[]).unwrap();
+    let error = kinked.sensitivity(&split, &["x"], &[1.0], &mut ()).unwrap_err().to_string();
+    assert!(error.contains("Gauss methods such as \"gauss_8\" have those in all variables"), "{error}");
     let event = Event { terminal: true, ..Event::new(system.formula().expression("x").unwrap()) };
     assert!(said(&Motion { events: vec![event], ..good.clone() }, "gamma").contains("terminal event"));
     let undefined = system.formula().expression("sqrt(x - 10)").unwrap();

@@ -80,7 +80,8 @@ pub fn modified_defects<'a, L: Lagrangian<N>, const N: usize>(
     integrator.check(problem.lagrangian)?;
     let mut found = Vec::with_capacity(most * steps.len());
     for &h in steps {
-        let mut stepper = integrator.stepper(problem, h, StepperOptions { action: true, check_resolution: false })?;
+        let mut stepper =
+            integrator.stepper(problem, h, StepperOptions { action: true, ..StepperOptions::default() })?;
         let count = (span / h).abs().round();
         if count.is_nan() || count > MAX_STEPS as f64 {
             let (what, remedy) = ("the number of steps of the span", "take a shorter span or longer steps");

@@ -73,6 +73,9 @@ pub struct StepperOptions {
     /// [`RunSupport::unresolved`](crate::RunSupport::unresolved) and
     /// [`RunSupport::suspect_interval`](crate::RunSupport::suspect_interval).
     pub check_resolution: bool,
+    /// Whether the stages of the parts of divided steps are kept, for
+    /// [`StepDetails::solved_parts`](crate::StepDetails::solved_parts).
+    pub parts: bool,
 }
 
 /// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of
@@ -101,6 +104,20 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
+
+    /// The same for steps that are known to need no division: parts of steps, for an integrator that
+    /// [divides](MethodInfo::divides) its steps. By default it is [`stepper`](Self::stepper).
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper).
+    fn undivided_stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        self.stepper(problem, h, options)
+    }
 
     /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.

@@ -183,7 +183,7 @@ impl<'p, P> Run<'p, '_, P> {
                 hypothesis: "a run from its start, since a resumed run has no derivatives",
             });
         }
-        Ok(Run { needs: OutputRequest { action: true, ..self.needs }, ..self })
+        Ok(Run { needs: OutputRequest { action: true, derivatives: true, ..self.needs }, ..self })
     }
 
     /// Performs the run of a plan with one more observer, called after the others.

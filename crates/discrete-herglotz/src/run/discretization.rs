@@ -84,11 +84,16 @@ impl<'p> Discretization<'p> {
         h: f64,
         check_resolution: bool,
     ) -> Result<Box<dyn Stepper + 'p>, InputError> {
-        let options = StepperOptions { action: self.needs.action, check_resolution };
+        let options = self.options(check_resolution);
         if let Some(collocation) = self.parts.as_ref().filter(|_| self.switches && !self.info.divides) {
             return of_integrator(self.integrator.clone(), collocation.clone(), problem, h, options);
         }
         self.integrator.stepper(problem, h, options)
+    }
+
+    fn options(&self, check_resolution: bool) -> StepperOptions {
+        let OutputRequest { action, derivatives, .. } = self.needs;
+        StepperOptions { action, check_resolution, parts: derivatives }
     }
 
     /// A stepper that starts at a state with its velocity and has taken steps of size h: a given number of them, or
@@ -98,6 +103,20 @@ impl<'p> Discretization<'p> {
     /// without it, as with an ill-conditioned mass matrix.
     pub fn advanced(
         &self,
+        (t, from): (f64, &State),
+        v: &Vector,
+        h: f64,
+        (steps, t_end): (usize, f64),
+        guess: impl Fn(&mut dyn Stepper),
+    ) -> Result<Box<dyn Stepper + 'p>, StepError> {
+        let make = |problem: &SystemProblem<'p>, h: f64| self.stepper_of(problem, h, false);
+        self.advanced_by(&make, (t, from), v, h, (steps, t_end), guess)
+    }
+
+    /// The same with a stepper that is made by a function.
+    fn advanced_by(
+        &self,
+        make: &dyn Fn(&SystemProblem<'p>, f64) -> Result<Box<dyn Stepper + 'p>, InputError>,
         (t, from): (f64, &State),
         v: &Vector,
         h: f64,
@@ -120,7 +139,7 @@ impl<'p> Discretization<'p> {
                 interrupt: *interrupt,
             };
             let h = if self.info.in_transformed_time { self.h } else { h };
-            let mut stepper = self.stepper_of(&problem, h, false).map_err(step_error)?;
+            let mut stepper = make(&problem, h).map_err(step_error)?;
             guess(&mut *stepper);
             stepper.advance_until(steps, t_end).map_err(|failure| failure.cause)?;
             Ok(stepper)
@@ -156,11 +175,17 @@ impl<'p> Discretization<'p> {
         self.info.collocation.unwrap_or(1)
     }
 
-    /// The step from the start of a step to a time within it, with the state there and its velocity.
+    /// The step from the start of a step to a time within it, with the state there and its velocity. Nothing interrupts the
+    /// step, and nothing is looked for in its first part: at its start the motion may be on a surface, whose side it has
+    /// from the part of the step before.
     pub fn shortened(&self, step: &WholeStep, t: f64) -> Result<(WholeStep, State, Vector), StepError> {
         let (t0, start) = step.start();
         let at_start = self.velocity(t0, start, Some(&step.velocity()))?;
-        let stepper = self.advanced((t0, start), &at_start, t - t0, (1, t), |_| ())?;
+        let make = |problem: &SystemProblem<'p>, h: f64| match step {
+            WholeStep::Collocation(_) => self.integrator.undivided_stepper(problem, h, self.options(false)),
+            WholeStep::Flow(_) => self.stepper_of(problem, h, false),
+        };
+        let stepper = self.advanced_by(&make, (t0, start), &at_start, t - t0, (1, t), |_| ())?;
         let end = stepper.state();
         let v = self.velocity(t, &end, stepper.last_velocity().as_ref())?;
         let short = match step {

@@ -60,7 +60,7 @@ impl<'a> StepTangent<'a> {
     ) -> Result<Self, SensitivityError> {
         let info = &steps.info;
         let refused = |case| Err(SensitivityError::NoTangent { method: info.name.clone(), case });
-        if info.in_transformed_time || info.divides {
+        if info.in_transformed_time || info.divides && problem.is_hamiltonian() {
             return refused("");
         }
         // The steps of a Lagrangian that is given by a contact Hamiltonian have a formula.

@@ -45,7 +45,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        StepperOptions { action, check_resolution }: StepperOptions,
+        StepperOptions { action, check_resolution, .. }: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {

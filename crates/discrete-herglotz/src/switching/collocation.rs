@@ -152,7 +152,16 @@ impl<'a> BoundIntegrator<'a> for ByPoints {
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         Ok(match self.divided {
             Some(divided) => Box::new(divided.run(Arc::new(CollocationByPoints), problem, h, options)?),
-            None => Box::new(GaussStepper::by_points(problem, self.stages, h, options)?),
+            None => return self.undivided_stepper(problem, h, options),
         })
+    }
+
+    fn undivided_stepper(
+        &self,
+        problem: &SystemProblem<'a>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        Ok(Box::new(GaussStepper::by_points(problem, self.stages, h, options)?))
     }
 }

@@ -56,7 +56,7 @@ impl DividedGauss {
             collocation.stepper(problem, self.stages, h, options).map(PartStepper::Collocation)
         };
         let stepper = SwitchingStepper::new(problem, h, EvaluationRange::Within, Box::new(make))?;
-        Ok(stepper.dividing(self.max_defect))
+        Ok(stepper.dividing(self.max_defect, options.parts))
     }
 }
 
@@ -82,5 +82,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         Ok(Box::new(self.run(Arc::new(CollocationOf(problem.lagrangian)), &problem.of_system(), h, options)?))
+    }
+
+    fn undivided_stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        GaussCollocation { stages: self.stages }.stepper(problem, h, options)
     }
 }

@@ -45,7 +45,7 @@ impl<'r> Recorder<'r> {
         let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
         let needs = |of: Option<OutputRequest>| of.unwrap_or_default();
         let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
-        let of_all = OutputRequest { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
+        let of_all = OutputRequest { action: motion.nodes, saved: motion.resumable, ..OutputRequest::default() };
         Ok(Recorder {
             rows,
             columns,

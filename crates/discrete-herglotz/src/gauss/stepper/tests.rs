@@ -33,7 +33,7 @@ fn follow(spring: OneSided, stages: usize, set: Arch, route: GaussRoute) -> (usi
     let gauss = Gauss::new(&spring, stages, 0.2).unwrap();
     let problem = Problem::new(&spring, 0.0, PhasePoint::new([-0.4], [0.0], 0.0)).unwrap();
     let mut run =
-        GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, check_resolution: false }).unwrap();
+        GaussStepper::new(&problem, stages, 0.2, StepperOptions { action: true, ..StepperOptions::default() }).unwrap();
     assert_eq!(run.route(), route);
     run.steps.route.set_instructions(Instructions::only(set));
     let mut across = 0;
@@ -74,7 +74,7 @@ fn actions_that_follow_spare_iterations_and_change_nothing() {
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let [(with, a), (without, b)] = [true, false].map(|follows| {
             let mut run =
-                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, check_resolution: false })
+                GaussStepper::new(&problem, stages, h, StepperOptions { action: true, ..StepperOptions::default() })
                     .unwrap();
             assert_eq!(run.route(), GaussRoute::ConstantMass);
             if !follows {
@@ -106,7 +106,8 @@ fn lanes_have_no_value_to_branch_on() {
                 continue;
             }
             let mut run =
-                GaussStepper::new(&problem, 8, 0.2, StepperOptions { action: true, check_resolution: false }).unwrap();
+                GaussStepper::new(&problem, 8, 0.2, StepperOptions { action: true, ..StepperOptions::default() })
+                    .unwrap();
             run.steps.route.set_instructions(Instructions::only(set));
             assert_eq!(run.advance(3), Err(StepFailure { taken: 0, cause: StepError::Branched }), "{set:?}");
         }
@@ -121,7 +122,7 @@ fn a_state_saved_during_simplified_newton_iteration_is_restored() {
     let system = SphericalPendulum::default();
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
     for (stages, h) in [(1, 0.4), (2, 1.5), (8, 1.5)] {
-        let options = StepperOptions { action: true, check_resolution: true };
+        let options = StepperOptions { action: true, check_resolution: true, parts: false };
         let new = || GaussStepper::new(&problem, stages, h, options).unwrap();
         let (mut run, mut by_newton) = (new(), 0);
         for _ in 0..30 {
@@ -142,7 +143,7 @@ fn motion<const N: usize>(anharmonic: &impl Lagrangian<N>, stages: usize, h: f64
     let start = PhasePoint::new(std::array::from_fn(|i| 1.2 * (i == 0) as u8 as f64), [0.0; N], 0.0);
     let problem = Problem::new(anharmonic, 0.0, start).unwrap();
     let mut run =
-        GaussStepper::new(&problem, stages, h, StepperOptions { action: true, check_resolution: false }).unwrap();
+        GaussStepper::new(&problem, stages, h, StepperOptions { action: true, ..StepperOptions::default() }).unwrap();
     assert_eq!(run.route(), GaussRoute::Condensed);
     let steps = (100.0 / h).round() as usize;
     run.advance(steps).unwrap();
@@ -175,7 +176,7 @@ fn a_run_ends_before_the_step_that_has_no_solution() {
         let start = PhasePoint::new([1.0], [0.5], 0.2);
         let problem = Problem::new(&cubic, 0.0, ProblemStart::Momentum(start, [0.5].into())).unwrap();
         let mut run =
-            GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, check_resolution: false }).unwrap();
+            GaussStepper::new(&problem, 8, 5.0, StepperOptions { action: true, ..StepperOptions::default() }).unwrap();
         let halt = run.advance(3).unwrap_err();
         assert!(halt.taken == 0 && matches!(halt.cause, StepError::NotConverged { .. }), "{halt:?}");
         assert_eq!(run.state(), start);

@@ -25,7 +25,7 @@ impl<'p> Request<'p> {
             return None;
         }
         let h = self.span / first_guess(self, DEFAULT_STAGES, REST_SEARCH_ERROR) as f64;
-        let options = StepperOptions { action: self.needs.action, check_resolution: false };
+        let options = StepperOptions { action: self.needs.action, ..StepperOptions::default() };
         let mut stepper = collocation.stepper(problem, DEFAULT_STAGES, h, options).ok()?;
         for _ in 0..MAX_REST_SEARCH_STEPS / STEPS_BETWEEN_REST_CHECKS {
             stepper.advance(STEPS_BETWEEN_REST_CHECKS).ok()?;

@@ -90,9 +90,12 @@ pub(crate) fn select_within_budget<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result
 fn select_integrator<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
     let collocation = trials.collocation.clone();
     let hints = trials.request.problem.system.hints();
-    let divides = hints.proved || hints.switching_functions;
+    let derivatives = trials.request.needs.derivatives;
+    // Divided steps of a Hamiltonian and steps in transformed time have no derivatives.
+    let divides = (hints.proved || hints.switching_functions) && !(derivatives && hints.hamiltonian);
     let mut stages = stages_along(trials.request, trials.wanted);
-    trials.tests_transformation = hints.time_transformation && trials.request.problem.structure.autonomous;
+    let transforms = hints.time_transformation && !derivatives;
+    trials.tests_transformation = transforms && trials.request.problem.structure.autonomous;
     trials.tests_newton_steps = stages > DEFAULT_STAGES;
     // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
     // known.
@@ -123,7 +126,7 @@ fn select_integrator<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection
             _ => *refused,
         });
     }
-    if !hints.time_transformation {
+    if !transforms {
         return Ok(found?);
     }
     let Err(Ended::Switch { reason: SwitchReason::TimeTransformation, .. }) = found else { return Ok(found?) };

@@ -10,11 +10,15 @@ pub struct OutputRequest {
     pub conformal_factor: bool,
     /// Whether the stepper must support [saving](crate::RunSupport::save).
     pub saved: bool,
+    /// Whether the run is differentiated, so that an integrator with derivatives is selected for an accuracy, and the stages
+    /// of the parts of divided steps are kept.
+    pub derivatives: bool,
 }
 
 impl OutputRequest {
     /// The action alone.
-    pub const ACTION: OutputRequest = OutputRequest { action: true, conformal_factor: false, saved: false };
+    pub const ACTION: OutputRequest =
+        OutputRequest { action: true, conformal_factor: false, saved: false, derivatives: false };
 
     /// The quantities of both requests.
     pub fn and(self, other: Self) -> Self {
@@ -22,6 +26,7 @@ impl OutputRequest {
             action: self.action || other.action,
             conformal_factor: self.conformal_factor || other.conformal_factor,
             saved: self.saved || other.saved,
+            derivatives: self.derivatives || other.derivatives,
         }
     }
 }

@@ -50,6 +50,8 @@ pub(crate) struct SwitchingStepper<'a> {
     unresolved: Option<UnresolvedStep>,
     /// The steppers of the parts of the last step that had parts, if they are kept.
     parts: Option<Vec<PartStepper<'a>>>,
+    /// Whether the stages of parts are kept where their steppers are not.
+    keeps_stages: bool,
     /// The ends of these parts.
     ends: Vec<EndOfPart>,
     switched: bool,
@@ -87,6 +89,7 @@ impl<'a> SwitchingStepper<'a> {
             spent: 0,
             unresolved: None,
             parts: Some(Vec::new()),
+            keeps_stages: false,
             ends: Vec::new(),
             switched: false,
             resets: Vec::new(),
@@ -101,9 +104,10 @@ impl<'a> SwitchingStepper<'a> {
         SwitchingStepper { parts: Some(Vec::new()), ..self }
     }
 
-    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it, whose steppers are not kept.
-    pub fn dividing(self, max_defect: f64) -> Self {
-        SwitchingStepper { max_defect, parts: None, ..self }
+    /// The same, dividing a step whose defect exceeds this bound into parts that satisfy it, whose steppers are not kept,
+    /// but their stages if they are wanted.
+    pub fn dividing(self, max_defect: f64, keeps_stages: bool) -> Self {
+        SwitchingStepper { max_defect, keeps_stages, parts: None, ..self }
     }
 
     /// Whether a step is to be divided.

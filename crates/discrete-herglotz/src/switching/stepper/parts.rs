@@ -1,6 +1,6 @@
 //! The parts of a step that end on the zeros of switching functions, or whose defect is within a bound.
 
-use crate::integration::{PartEnd, Piece};
+use crate::integration::{PartEnd, Piece, SolvedStages};
 use crate::solve::roots::bracketed_root;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
@@ -103,10 +103,10 @@ impl<'a> SwitchingStepper<'a> {
             let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
                 piece.add(&stepper);
-                self.keep(stepper);
+                let stages = self.keep(stepper);
                 let StepCurve { to, .. } = curve;
                 let (next, end) = (to.clone(), plain_end(t));
-                self.ends.push(EndOfPart { from: at, to: to.clone(), next, has_stepper: true, end });
+                self.ends.push(EndOfPart { from: at, to: to.clone(), next, has_stepper: true, stages, end });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
@@ -115,7 +115,7 @@ impl<'a> SwitchingStepper<'a> {
                 longest = 0.5 * (t - at.t).abs();
                 continue;
             };
-            let mut has_stepper = stepper.is_some();
+            let (mut has_stepper, mut stages) = (stepper.is_some(), None);
             match stepper {
                 Some(stepper) if self.is_too_long(&stepper) => {
                     too_long = true;
@@ -125,7 +125,7 @@ impl<'a> SwitchingStepper<'a> {
                 Some(stepper) => {
                     sigma *= stepper.stepper().sigma();
                     piece.add(&stepper);
-                    self.keep(stepper);
+                    stages = self.keep(stepper);
                     changes_at_point = 0;
                 }
                 None => changes_at_point += 1,
@@ -147,8 +147,8 @@ impl<'a> SwitchingStepper<'a> {
                 let Passed { to: next, factor, passage } = self.through(at.clone(), index, span, spacing)?;
                 let end = PartEnd::Switch { index, rising, passage };
                 // Further passages at the same point are ends of parts of length zero.
-                let has_stepper = std::mem::take(&mut has_stepper);
-                self.ends.push(EndOfPart { from: start, to: at.clone(), next: next.clone(), has_stepper, end });
+                let (has_stepper, stages) = (std::mem::take(&mut has_stepper), stages.take());
+                self.ends.push(EndOfPart { from: start, to: at.clone(), next: next.clone(), has_stepper, stages, end });
                 if self.resets.len() > resets {
                     self.end_piece(&mut piece, &at);
                     piece = OpenPiece { from: next.clone(), parts: 0, dense: None };
@@ -163,9 +163,15 @@ impl<'a> SwitchingStepper<'a> {
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
     }
 
-    fn keep(&mut self, stepper: PartStepper<'a>) {
-        if let Some(parts) = &mut self.parts {
-            parts.push(stepper);
+    /// Keeps the stepper of a part, if such are kept; otherwise returns its stages, if these are.
+    fn keep(&mut self, stepper: PartStepper<'a>) -> Option<SolvedStages> {
+        match &mut self.parts {
+            Some(parts) => {
+                parts.push(stepper);
+                None
+            }
+            None if self.keeps_stages => stepper.stepper().solved_stages(),
+            None => None,
         }
     }
 

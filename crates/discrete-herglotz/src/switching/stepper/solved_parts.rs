@@ -1,7 +1,7 @@
 //! The parts of the last step with their stages and with what happened at their ends, for derivatives.
 
 use crate::integration::WholeStep;
-use crate::integration::{PartEnd, PartPoint, SolvedPart};
+use crate::integration::{PartEnd, PartPoint, SolvedPart, SolvedStages};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::surfaces::TimedState;
 
@@ -15,18 +15,22 @@ pub(crate) struct EndOfPart {
     pub next: TimedState,
     /// Whether the part has a stepper; otherwise its length is zero.
     pub has_stepper: bool,
+    /// The stages of this stepper, if it is not kept but they are.
+    pub stages: Option<SolvedStages>,
     pub end: PartEnd,
 }
 
 impl SwitchingStepper<'_> {
     /// The parts of the last step, if it had parts and their steppers are kept.
     pub(super) fn parts_with_stages(&self) -> Vec<SolvedPart> {
-        let (true, Some(steppers)) = (self.switched, &self.parts) else { return Vec::new() };
-        let mut steppers = steppers.iter();
+        if !self.switched {
+            return Vec::new();
+        }
+        let mut steppers = self.parts.iter().flatten();
         let point = |at: &TimedState| PartPoint { t: at.t, state: at.state.clone(), v: at.v.clone() };
         let part = |of: &EndOfPart| {
-            let stages = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
-            let step = stages.map(WholeStep::Collocation);
+            let kept = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
+            let step = kept.or_else(|| of.stages.clone()).map(WholeStep::Collocation);
             let known = step.is_some() || !of.has_stepper;
             known.then(|| SolvedPart {
                 step,
