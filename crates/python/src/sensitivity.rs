@@ -5,7 +5,9 @@ use crate::motion::Motion;
 use crate::signals::Signals;
 use herglotz_runtime::{EndCovector, Expression, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status};
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::ops::ControlFlow;
 
 /// Ends a run at a signal.
@@ -120,6 +122,10 @@ pub fn lyapunov_exponents(py: Python<'_>, motion: &Motion) -> PyResult<Exponents
     let found = detached(py, motion, |monitor| motion.system.lyapunov_exponents(&motion.motion, monitor))?;
     if found.status != Status::Completed {
         return Err(value_error(format!("the motion has no exponents, since it was not completed: {}", found.status)));
+    }
+    if let Some(contradiction) = found.contradiction() {
+        let message = CString::new(contradiction)?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 2)?;
     }
     let pairs = matrix(py, found.pairs.into_iter().flatten().collect(), 2)?;
     let (exponents, second) = (vector(py, found.exponents), vector(py, found.of_second_half));

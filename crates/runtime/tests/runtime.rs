@@ -6,6 +6,7 @@ mod body;
 mod divided_steps;
 mod fit;
 mod jump_times;
+mod lyapunov_of_impacts;
 mod motions;
 mod pairs;
 mod path;

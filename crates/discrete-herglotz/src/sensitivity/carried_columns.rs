@@ -6,6 +6,7 @@ use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
+use crate::sensitivity::stretching::Stretching;
 use crate::sensitivity::tangent::{SwitchTime, TangentRow, row};
 use crate::sensitivity::time_jumps::{TimeJump, TimeJumps};
 use crate::sensitivity::{MotionState, SensitivityError};
@@ -22,6 +23,8 @@ pub(super) struct CarriedColumns<'r, 'p> {
     pub times: RowTimes,
     pub rows: Vec<TangentRow>,
     pub switches: Vec<SwitchTime>,
+    /// The stretching of the columns as a frame, which is then made orthonormal after each part of a step too.
+    pub stretching: Option<Stretching>,
 }
 
 impl<'r, 'p> CarriedColumns<'r, 'p> {
@@ -33,7 +36,18 @@ impl<'r, 'p> CarriedColumns<'r, 'p> {
         times: RowTimes,
     ) -> Self {
         let (rows, switches, jumps) = (Vec::new(), Vec::new(), TimeJumps::new(problem, steps));
-        CarriedColumns { problem, steps, engine, row_engine: RowTangent::new(), columns, jumps, times, rows, switches }
+        CarriedColumns {
+            problem,
+            steps,
+            engine,
+            row_engine: RowTangent::new(),
+            columns,
+            jumps,
+            times,
+            rows,
+            switches,
+            stretching: None,
+        }
     }
 
     /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.

@@ -9,8 +9,9 @@ use crate::sensitivity::parametric_system::DifferentiableProblem;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::StepTangent;
+use crate::sensitivity::stretching::Stretching;
 use crate::sensitivity::tangent::no_tangent;
-use crate::{InputError, State, StepError, Vector};
+use crate::{InputError, State, Vector};
 use contact_geom::numbers::max_abs_or_nan;
 use std::ops::ControlFlow;
 
@@ -29,7 +30,8 @@ pub struct LyapunovExponents {
     /// The `2n + 1` exponents, in descending order; NaN if no step was taken.
     pub exponents: Vec<f64>,
     /// The same of the second half of the run, in the same order: its difference is an estimate of the error of a run
-    /// of finite length, and it does not depend on the initial directions.
+    /// of finite length, and it does not depend on the initial directions. The halves meet at the end of a step, or of a part
+    /// of one; where there is none within the run, these are the exponents themselves.
     pub of_second_half: Vec<f64>,
     /// The exponents of the n pairs of directions `q_i` and `p_i` with which the frame starts. If `L_z` is constant and no
     /// force is applied, the sum of each pair is the rate, to round-off.
@@ -51,14 +53,11 @@ impl LyapunovExponents {
     }
 }
 
-/// A frame of tangents that is carried along a run, and made orthonormal after each step.
+/// A frame of tangents that is carried along a run, and made orthonormal after each step and after each part of one: a
+/// single step may span many impacts, after which all directions would be parallel.
 struct Frame<'r, 'p> {
     plan: &'r Plan<'p>,
     carried: CarriedColumns<'r, 'p>,
-    /// The logarithms of the factors by which the frame was stretched.
-    logarithms: Vec<f64>,
-    /// The time and the logarithms in the middle of the run.
-    middle: Option<(f64, Vec<f64>)>,
     before: (f64, State),
     taken: usize,
     failure: Option<SensitivityError>,
@@ -78,27 +77,6 @@ fn initial_frame(n: usize, dimension: usize) -> Vec<Column> {
     std::iter::once(Column::new(zero(), zero(), 1.0)).chain(positions).chain(momenta).collect()
 }
 
-/// Makes columns orthonormal, in their order, and adds the logarithms of their lengths; a second pass makes them orthogonal to
-/// round-off.
-fn orthonormalise(columns: &mut [Column], logarithms: &mut [f64]) -> Result<(), StepError> {
-    for (i, logarithm) in logarithms.iter_mut().enumerate() {
-        let (before, rest) = columns.split_at_mut(i);
-        let Some(column) = rest.first_mut() else { return Ok(()) };
-        for _ in 0..2 {
-            for other in before.iter() {
-                column.add_multiple(-column.dot(other), other);
-            }
-        }
-        let length = column.dot(column).sqrt();
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(StepError::NonFinite);
-        }
-        *logarithm += length.ln();
-        column.scale(1.0 / length);
-    }
-    Ok(())
-}
-
 impl Frame<'_, '_> {
     fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
@@ -108,10 +86,14 @@ impl Frame<'_, '_> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
         self.carried.push(&step, at.t, k)?;
         self.carried.switches.clear();
-        orthonormalise(&mut self.carried.columns, &mut self.logarithms).map_err(failed)?;
         self.taken = at.k;
-        if 2 * at.k >= self.plan.count() && self.middle.is_none() {
-            self.middle = Some((at.t, self.logarithms.clone()));
+        let CarriedColumns { columns, stretching, .. } = &mut self.carried;
+        if let Some(stretching) = stretching {
+            let mut times = vec![0.0; columns.len()];
+            stretching.orthonormalise(columns, &mut times).map_err(failed)?;
+            if 2 * at.k >= self.plan.count() && at.k < self.plan.count() {
+                stretching.note_end(at.t);
+            }
         }
         Ok(())
     }
@@ -144,7 +126,8 @@ impl Observer for Frame<'_, '_> {
 
 impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
     /// Performs the run and computes its Lyapunov exponents by the method of Benettin and others (1980): the tangent of
-    /// the discrete run, made orthonormal after each step.
+    /// the discrete run, made orthonormal after each step, and after each of its parts where it ends parts at kinks, jumps
+    /// and resets.
     ///
     /// ```
     /// use contact_examples::systems::Duffing;
@@ -196,28 +179,25 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         let engine = StepTangent::new(&problem, &plan.steps, Direction::Forward)?;
         let columns = initial_frame(coordinates, dimension);
         let t0 = problem.problem.t0;
+        let span = (t0, plan.steps.t_end);
+        let stretching = Stretching::new(columns.len(), span);
+        let carried = CarriedColumns::new(&problem, &plan.steps, engine, columns, RowTimes::new(&[], span));
         let mut frame = Frame {
             plan: &plan,
-            logarithms: vec![0.0; columns.len()],
-            carried: CarriedColumns::new(
-                &problem,
-                &plan.steps,
-                engine,
-                columns,
-                RowTimes::new(&[], (t0, plan.steps.t_end)),
-            ),
-            middle: None,
+            carried: CarriedColumns { stretching: Some(stretching), ..carried },
             before: (t0, problem.problem.state.clone()),
             taken: 0,
             failure: None,
         };
         let outcome = run.observed(&plan, &mut frame)?;
-        let Frame { logarithms, middle, before: (t, _), failure, .. } = frame;
+        let Frame { carried: CarriedColumns { stretching, .. }, before: (t, _), failure, .. } = frame;
         if let Some(failure) = failure {
             return Err(failure);
         }
-        let (t_middle, until_middle) = middle.unwrap_or((t0, vec![0.0; logarithms.len()]));
-        let all: Vec<[f64; 2]> = logarithms
+        let Some(stretching) = stretching else { return Err(no_tangent(&plan, "")) };
+        let (t_middle, until_middle) = stretching.middle(t0, t);
+        let all: Vec<[f64; 2]> = stretching
+            .logarithms
             .iter()
             .zip(&until_middle)
             .map(|(whole, first)| [whole / (t - t0), (whole - first) / (t - t_middle)])

@@ -38,6 +38,7 @@ mod stage_kernel;
 mod stage_matrix;
 mod step_maps;
 pub(crate) mod step_tangent;
+mod stretching;
 mod switch;
 mod tangent;
 mod tangent_parts;

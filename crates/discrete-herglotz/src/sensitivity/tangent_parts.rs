@@ -6,6 +6,7 @@
 //! the discrete motion. Then the reset follows, and the next part starts at this time. So it is at the time of a kink or a
 //! jump, whose derivatives in the parameters are known.
 
+use crate::StepError;
 use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
@@ -97,9 +98,26 @@ impl CarriedColumns<'_, '_> {
             let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
             column.set_state(state);
         }
-        match jump {
-            Some(jump) => self.push_over(jump, &part.next, times, k),
-            None => Ok(()),
+        if let Some(jump) = jump {
+            self.push_over(jump, &part.next, times, k)?;
         }
+        if is_last { Ok(()) } else { self.stretch(part, times).map_err(failed) }
+    }
+
+    /// Makes the columns orthonormal at the end of a part, at its fixed time, if they are a frame; `times` are the
+    /// derivatives of the time at which they are.
+    fn stretch(&mut self, part: &SolvedPart, times: &mut [f64]) -> Result<(), StepError> {
+        let Some(stretching) = &mut self.stretching else { return Ok(()) };
+        let t = part.next.t;
+        let rates = part.next.rates(self.jumps.after(t), self.steps)?;
+        for (column, dt) in self.columns.iter_mut().zip(&*times) {
+            column.set_state(column.state().minus(&rates.scale(*dt)));
+        }
+        stretching.orthonormalise(&mut self.columns, times)?;
+        for (column, dt) in self.columns.iter_mut().zip(&*times) {
+            column.set_state(column.state().plus(&rates.scale(*dt)));
+        }
+        stretching.note_within(t, self.steps.h < 0.0);
+        Ok(())
     }
 }

@@ -34,10 +34,11 @@ pub(crate) fn in_words(found: &LyapunovExponents) -> String {
         pairs.extend(found.pairs.iter().map(row));
         parts.push(format!("{}\nthe sums of the pairs are ln(sigma_d)/h to {defect:.1e}", table(&pairs)));
     } else {
-        parts.push(format!("ln(sigma_d)/h is {rate}; pairs have this sum only for constant L_z and without a force"));
+        parts.push(format!("ln(sigma_d)/h is {rate}; pairs have this sum only for constant L_z, without a force and with contact resets"));
     }
     if let Some(defect) = found.volume_defect {
         parts.push(format!("the sum of all is n + 1 times ln(sigma_d)/h to {defect:.1e}"));
     }
+    parts.extend(found.contradiction().map(|contradiction| format!("warning: {contradiction}")));
     parts.join("\n")
 }

@@ -47,8 +47,9 @@ class LyapunovExponents(NamedTuple):
 
     ``pairs`` has those of the directions of the position and the momentum of each coordinate; with ``rate``, the mean of
     ln(sigma_d)/h, they are all exponents where L_z is constant. ``pairing_defect`` is the largest distance of the sum of a
-    pair from the rate, or None where L_z is not constant or a force acts; ``volume_defect`` is that of the sum of all from
-    n + 1 times the rate, or None where a force acts. Both are round-off.
+    pair from the rate, or None where L_z is not constant, a force acts, or a reset is not contact; ``volume_defect`` is that
+    of the sum of all from n + 1 times the rate, or None where a force acts or a reset is not contact. Both are round-off;
+    where the first is not, a warning says so.
     """
 
     exponents: np.ndarray  # (2n + 1,), in descending order

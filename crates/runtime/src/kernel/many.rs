@@ -306,7 +306,8 @@ impl Kernel for ManyCoordinates {
     ) -> Result<LyapunovExponents, RuntimeError> {
         let until = Until::Time(motion.end);
         self.observed(&unobserved(motion), monitor, |run| {
-            Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), self.0.has_force()))
+            let has_noncontact_resets = self.0.formula().has_noncontact_resets();
+            Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), self.0.has_force(), has_noncontact_resets))
         })
     }
 

@@ -82,7 +82,7 @@ pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: u
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
     let found = run.lyapunov_exponents_within(n, Until::Time(motion.end))?;
-    Ok(exponents_of(found, &system.0.structure(), system.0.has_force()))
+    Ok(exponents_of(found, &system.0.structure(), system.0.has_force(), system.0.formula().has_noncontact_resets()))
 }
 
 /// The exponents of a system with this structure.
@@ -90,14 +90,16 @@ pub(super) fn exponents_of(
     found: discrete_herglotz::sensitivity::LyapunovExponents,
     structure: &Structure,
     has_force: bool,
+    has_noncontact_resets: bool,
 ) -> LyapunovExponents {
-    let is_paired = structure.has_constant_rate() && !has_force;
+    let is_of_contact = !has_force && !has_noncontact_resets;
+    let is_paired = structure.has_constant_rate() && is_of_contact;
     LyapunovExponents {
         status: found.outcome.status,
         t: found.outcome.t,
         steps: found.outcome.steps,
         pairing_defect: is_paired.then(|| found.pairing_defect()),
-        volume_defect: (!has_force).then(|| found.volume_defect()),
+        volume_defect: is_of_contact.then(|| found.volume_defect()),
         exponents: found.exponents,
         of_second_half: found.of_second_half,
         pairs: found.pairs,
