@@ -102,8 +102,8 @@ impl Case {
                     }
                     let mut loss = |_: &[_]| (0.0, covectors.clone());
                     let gradient = system.gradient(&motion, &times, &mut loss, &mut ()).unwrap().loss.unwrap().1;
-                    let all = gradient.parameters.iter().copied().chain([gradient.t0, gradient.t_end]);
-                    let backward = all.skip(k).next().unwrap();
+                    let mut all = gradient.parameters.iter().copied().chain([gradient.t0, gradient.t_end]);
+                    let backward = all.nth(k).unwrap();
                     // Both are derivatives of the same steps.
                     let error = (forward[i] - backward).abs();
                     assert!(error <= 1e-12 * size, "{place}, backward: {backward} for {}", forward[i]);
@@ -146,8 +146,13 @@ fn jumps_at_ends_of_steps_have_derivatives() {
         of("x'^2/2 - k*x^2/2", jump).with_force("sign(t - T)").over([2.0, 0.0], 20).check();
         of("x'^2/2 - k*x^2/2 - 0.1*z", jump).with_force("sign(t - T)*x'").over([0.0, 2.1], 21).check();
     }
-    // A time that is no parameter.
-    of("x'^2/2 - k*x^2/2 + if(t > 1, T, 0)*x", 1.0).over([0.0, 2.0], 40).check();
+    // A time that is no parameter, with a row there.
+    for steps in [20, 21, 40] {
+        let fixed = of("x'^2/2 - k*x^2/2 + if(t > 1, T, 0)*x", 1.0).over([0.0, 2.0], steps);
+        fixed.clone().check();
+        fixed.clone().rows_at(&[0.5, 1.0]).check();
+        fixed.over([2.0, 0.0], steps).rows_at(&[1.0, 0.5]).check();
+    }
 }
 
 #[test]

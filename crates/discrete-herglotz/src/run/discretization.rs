@@ -22,6 +22,9 @@ const MAX_UNKNOWNS_OF_SMALL_MATRIX: usize = 32;
 /// computed: it costs as much as so many steps.
 const CUBED_UNKNOWNS_PER_STEP: usize = 1024;
 
+/// Makes a stepper for a problem and a step size.
+type MakeStepper<'f, 'p> = dyn Fn(&SystemProblem<'p>, f64) -> Result<Box<dyn Stepper + 'p>, InputError> + 'f;
+
 /// A problem with the integrator and the steps that are selected for it.
 pub(crate) struct Discretization<'p> {
     pub problem: SystemProblem<'p>,
@@ -116,7 +119,7 @@ impl<'p> Discretization<'p> {
     /// The same with a stepper that is made by a function.
     fn advanced_by(
         &self,
-        make: &dyn Fn(&SystemProblem<'p>, f64) -> Result<Box<dyn Stepper + 'p>, InputError>,
+        make: &MakeStepper<'_, 'p>,
         (t, from): (f64, &State),
         v: &Vector,
         h: f64,
