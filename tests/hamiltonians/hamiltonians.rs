@@ -5,4 +5,5 @@ mod derivatives;
 mod modified;
 mod runs;
 mod steps;
+mod switches;
 mod systems;

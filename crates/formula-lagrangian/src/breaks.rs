@@ -214,10 +214,6 @@ impl Formula {
         if let Some(time) = times.iter().find(|t| !t.is_finite()) {
             return Err(FormulaError::Break { time: *time });
         }
-        if !times.is_empty() {
-            let remedy = "end the run at each of the times and start the next one there, or give a Lagrangian";
-            self.check_is_lagrangian("breaks", remedy)?;
-        }
         let mut formula = self.clone();
         formula.breaks.extend(times);
         Ok(formula)

@@ -209,6 +209,16 @@ impl Derived {
         formula.graph.constants(&formula.values).get(rate.index()).copied()
     }
 
+    /// Appends the values of the switching functions at a point.
+    pub fn switching_functions(&self, at: At<'_, f64>, values: &mut Vec<f64>) {
+        let (tape, first) = (&self.switching, values.len());
+        if !tape.results.is_empty() {
+            values.resize(first + tape.results.len(), 0.0);
+            let results = values.get_mut(first..).unwrap_or(&mut []);
+            tape.evaluate::<f64, 0>(at, &mut [results]);
+        }
+    }
+
     /// All second derivatives at a point of N coordinates.
     #[inline(always)]
     pub fn hessian<T: Scalar, const N: usize>(&self, at: At<'_, T>) -> Hessian<N, T> {

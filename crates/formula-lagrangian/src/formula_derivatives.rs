@@ -105,12 +105,7 @@ impl FormulaDerivatives {
 
     /// See [`FormulaLagrangian`](crate::FormulaLagrangian): the functions of kinks, then those of resets.
     pub fn switching_functions(&self, t: f64, q: &[f64], v: &[f64], z: f64, values: &mut Vec<f64>) {
-        let (tape, first) = (&self.derived.switching, values.len());
-        if !tape.results.is_empty() {
-            values.resize(first + tape.results.len(), 0.0);
-            let results = values.get_mut(first..).unwrap_or(&mut []);
-            tape.evaluate::<f64, 0>(At { t, q, v, z }, &mut [results]);
-        }
+        self.derived.switching_functions(At { t, q, v, z }, values);
     }
 
     /// Replaces a state `(q, v, z)` by that after the reset or the impact to which a switching function belongs; `None` if

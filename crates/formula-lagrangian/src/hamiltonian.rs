@@ -11,7 +11,7 @@ use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianStructure, Hessia
 /// structure. All formulas of one dimension have the same type. It is evaluated like a
 /// [`FormulaLagrangian`](crate::FormulaLagrangian), with p in the place of v.
 ///
-/// Kinks and jumps of H are not located: a step that crosses one has a lower order.
+/// The zeros of its switching functions are those of the arguments of `abs` and `sign`, and so on, as for a Lagrangian.
 ///
 /// ```
 /// use contact_geom::{ContactHamiltonian, HamiltonianDerivatives, PhasePoint};
@@ -106,6 +106,7 @@ impl<const N: usize> FormulaHamiltonian<N> {
 impl<const N: usize> ContactHamiltonian<N> for FormulaHamiltonian<N> {
     const PROVED: bool = true;
     const INTERPRETED: bool = true;
+    const SWITCHING: bool = true;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
@@ -131,5 +132,15 @@ impl<const N: usize> ContactHamiltonian<N> for FormulaHamiltonian<N> {
     #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &PhasePoint<N, T>) -> Option<Hessian<N, T>> {
         Some(self.derived.hessian(At::new(t, &x.q, &x.p, x.z)))
+    }
+
+    /// As those of a [`FormulaLagrangian`](crate::FormulaLagrangian).
+    fn switching_functions(&self, t: f64, x: &PhasePoint<N>, values: &mut Vec<f64>) {
+        self.derived.switching_functions(At { t, q: x.q.as_slice(), v: x.p.as_slice(), z: x.z }, values);
+    }
+
+    /// As those of a [`FormulaLagrangian`](crate::FormulaLagrangian).
+    fn breaks(&self) -> &[f64] {
+        &self.derived.breaks
     }
 }

@@ -195,6 +195,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         interpreted: true,
         forced: true,
         over_slices: true,
+        resets: true,
         ..Hints::NONE
     };
 

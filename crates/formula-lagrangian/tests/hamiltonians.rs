@@ -192,12 +192,12 @@ fn invalid_input_is_refused_with_the_remedy() -> Result<(), FormulaError> {
         h.lagrangian::<1>().map(drop),
         h.with_force("x", "1").map(drop),
         h.with_rayleigh("x").map(drop),
-        h.with_breaks(&[1.0]).map(drop),
         h.with_reset(reset).map(drop),
     ];
     for refusal in refusals {
         assert!(matches!(refusal, Err(FormulaError::IsHamiltonian { .. })), "{refusal:?}");
     }
+    assert_eq!(h.with_breaks(&[2.0, 1.0])?.hamiltonian::<1>()?.breaks(), [1.0, 2.0]);
     let l = Formula::parse("x'^2/2", &["x"], &[])?;
     assert_eq!(l.hamiltonian::<1>().map(drop), Err(FormulaError::IsLagrangian));
     assert_eq!(h.hamiltonian::<2>().map(drop), Err(FormulaError::OtherDimension { found: 1, asked: 2 }));

@@ -250,7 +250,6 @@ fn invalid_scenes_are_refused_with_the_remedy() {
         ("l = 2.0", "v = 2.0", "unknown name `v` in the start"),
         ("accuracy = 1e-9", "integrator = \"midpoint\"\nstep = 0.1", "a Hamiltonian runs by `gauss_1` to `gauss_16`"),
         ("[run]", "[force]\nx = \"1\"\n[run]", "the formula is a Hamiltonian, which has no forces"),
-        ("time = 2.0", "time = 2.0\nbreaks = [1.0]", "the formula is a Hamiltonian, which has no breaks"),
         ("\"x' - 2*l\"", "\"x\", then = { x = \"1\" }", "the formula is a Hamiltonian, which has no resets"),
         ("coordinates = [\"x\", \"y\"]", "catalogue = \"pendulum\"", "give a `catalogue` or a `lagrangian`"),
     ];

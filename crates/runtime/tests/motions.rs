@@ -10,6 +10,8 @@ mod constraints;
 mod dimensions;
 #[path = "motions/ensembles.rs"]
 mod ensembles;
+#[path = "motions/hamiltonians.rs"]
+mod hamiltonians;
 
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};

@@ -25,7 +25,7 @@ fn one() -> Start<1> {
 }
 
 /// The start of a motion with two coordinates.
-fn two() -> Start<2> {
+pub(super) fn two() -> Start<2> {
     Start::Momentum(PhasePoint::new([0.4, -0.2], [0.7, 0.5], 0.3), [0.0, 0.0].into())
 }
 
@@ -60,10 +60,10 @@ fn largest<'a>(of: impl IntoIterator<Item = &'a f64>) -> f64 {
 }
 
 /// A run of seven steps over the span (0.2, 1.6).
-struct Case<'a, L, const N: usize> {
-    lagrangian: &'a L,
-    start: Start<N>,
-    stages: usize,
+pub(super) struct Case<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub start: Start<N>,
+    pub stages: usize,
 }
 
 const SPAN: (f64, f64) = (0.2, 1.6);
@@ -114,7 +114,7 @@ impl<L: Parametric<N>, const N: usize> Case<'_, L, N> {
 
     /// Forward derivatives, adjoint ones and differences, in all variables. Forward and adjoint derivatives are sums of the
     /// same products in another order; the bound is some hundred units of round-off.
-    fn compare(&self, name: &str) {
+    pub fn compare(&self, name: &str) {
         let problem = self.problem();
         let variables = Variable::all(&problem);
         assert_eq!(variables.len(), 2 * N + 1 + self.lagrangian.parameter_count() + 2);

@@ -234,7 +234,7 @@ impl<L, S> Impacts<L, S> {
 }
 
 impl<const N: usize, L: Lagrangian<N>, S: Surface<N>> Lagrangian<N> for Impacts<L, S> {
-    const HINTS: Hints = Hints { switching_functions: true, over_slices: false, ..L::HINTS };
+    const HINTS: Hints = Hints { switching_functions: true, resets: true, over_slices: false, ..L::HINTS };
 
     forward_lagrangian!(of_value, self => self.lagrangian);
     forward_lagrangian!(of_force, self => self.lagrangian);

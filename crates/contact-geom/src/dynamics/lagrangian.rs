@@ -31,6 +31,9 @@ pub struct Hints {
     pub hamiltonian: bool,
     /// Whether it is written over slices: [`Lagrangian::over_slices`] is overridden.
     pub over_slices: bool,
+    /// Whether states may be replaced: [`Lagrangian::at_switch`] is overridden. One that is given by a contact Hamiltonian
+    /// is then refused.
+    pub resets: bool,
 }
 
 impl Hints {
@@ -43,6 +46,7 @@ impl Hints {
         forced: false,
         hamiltonian: false,
         over_slices: false,
+        resets: false,
     };
 
     /// What may be relied on for a Lagrangian that is one of several, as in [`lagrangian_enum`](crate::lagrangian_enum).
@@ -60,14 +64,23 @@ impl Hints {
         let mut any = Hints { proved: !several.is_empty(), ..Hints::NONE };
         let mut i = 0;
         while i < several.len() {
-            let Hints { time_transformation, switching_functions, proved, interpreted, forced, hamiltonian, .. } =
-                several[i];
+            let Hints {
+                time_transformation,
+                switching_functions,
+                proved,
+                interpreted,
+                forced,
+                hamiltonian,
+                resets,
+                ..
+            } = several[i];
             assert!(!hamiltonian, "a Lagrangian that is given by a contact Hamiltonian needs a type of its own");
             any.time_transformation |= time_transformation;
             any.switching_functions |= switching_functions;
             any.proved &= proved;
             any.interpreted |= interpreted;
             any.forced |= forced;
+            any.resets |= resets;
             i += 1;
         }
         any
@@ -187,6 +200,9 @@ pub trait Lagrangian<const N: usize> {
     ///
     /// Set [`Hints::switching_functions`] as well. For example, a spring that only pushes,
     /// `q.if_less(0, q^2/2, 0)`, has the single switching function q.
+    ///
+    /// For a Lagrangian that is given by a contact Hamiltonian, they are functions of `(t, q, p, z)`, and the point has the
+    /// momentum in the place of the velocity, which may jump where they are zero.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
 
     /// What happens at a zero of the switching function with this index, at a point of the motion; `rising` is whether

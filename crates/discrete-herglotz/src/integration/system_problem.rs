@@ -173,8 +173,8 @@ impl<'a> SystemProblem<'a> {
 
     /// The problem of a Lagrangian that is given by a contact Hamiltonian.
     fn given_by_hamiltonian(system: Rc<dyn System + 'a>, t0: f64, start: InitialState) -> Result<Self, InputError> {
-        if system.hints().switching_functions {
-            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since steps end at switches";
+        if system.hints().resets {
+            let hypothesis = "a Lagrangian that is not given by a contact Hamiltonian, since its states are replaced";
             return Err(InputError::Hypothesis { hypothesis });
         }
         let (state, from_momentum) = match start {

@@ -58,6 +58,17 @@ impl Switch<'_, '_> {
         let mut sum = OneSided { v: zero.x.clone(), gradient: zero, time: 0.0, parameters: vec![0.0; of.count()] };
         for (weight, k) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
             let (t, state) = (self.at.t, State { q: q + toward * k, p: p.clone(), z: *z });
+            if self.problem.is_hamiltonian() {
+                // The derivatives of L are those of -H.
+                let (_, d) = system.hamiltonian_with_gradient(t, &state).ok_or(StepError::NonFinite)?;
+                sum.v += &d.y * weight;
+                sum.gradient = sum.gradient.plus(&Components { y: Vector::zeros(q.len()), ..d }.scale(-weight));
+                sum.time -= weight * of.of_hamiltonian(Quantity::Time, t, &state).l;
+                for (index, parameter) in sum.parameters.iter_mut().enumerate() {
+                    *parameter -= weight * of.of_hamiltonian(Quantity::Parameter(index), t, &state).l;
+                }
+                continue;
+            }
             let x = system.legendre_inverse(t, &state, guess)?;
             sum.v += &x.v * weight;
             sum.gradient = sum.gradient.plus(&system.gradient(t, &x).scale(weight));

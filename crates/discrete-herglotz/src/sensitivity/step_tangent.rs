@@ -68,8 +68,8 @@ impl<'a> StepTangent<'a> {
             let engine = Engine::new(problem, steps.stages(), steps.h, direction);
             return Ok(StepTangent::Collocation(Box::new(engine)));
         }
-        // Its steps near a surface would be those of another method.
-        if steps.switches {
+        // Its steps near a surface would be those of another method, except for those of a contact Hamiltonian.
+        if steps.switches && !(problem.is_hamiltonian() && info.collocation.is_some()) {
             return refused(" for Lagrangians with switching functions");
         }
         match steps.integrator.step_formula() {
@@ -86,17 +86,19 @@ impl<'a> StepTangent<'a> {
 
     /// The last step of a stepper, which started at the given time and state; `None` where its stages are not known.
     pub fn taken(&self, stepper: &dyn Stepper, h: f64, (t, start): (f64, State)) -> Option<TakenStep> {
+        let parts = || {
+            let parts = stepper.last_step().map(|step| step.solved_parts());
+            parts.filter(|parts| !parts.is_empty()).map(TakenStep::Parts)
+        };
         match self {
             StepTangent::Collocation(_) => match stepper.solved_stages() {
                 Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(stages))),
-                None => stepper
-                    .last_step()
-                    .map(|step| step.solved_parts())
-                    .filter(|parts| !parts.is_empty())
-                    .map(TakenStep::Parts),
+                None => parts(),
             },
             StepTangent::Flow(_) => {
-                Some(TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() })))
+                Some(parts().unwrap_or_else(|| {
+                    TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() }))
+                }))
             }
         }
     }

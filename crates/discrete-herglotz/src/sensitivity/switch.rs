@@ -6,6 +6,7 @@ use crate::sensitivity::corner_derivatives::CornerDerivatives;
 use crate::sensitivity::parametric_system::{Differentiable, Quantity};
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, SensitivityError};
+use crate::switching::{phase_point, rates_along_motion};
 use crate::system::products::times;
 use crate::system::ridders;
 use crate::{AtSwitch, Components, Point, SecondDerivatives, StepError, System, Vector};
@@ -99,9 +100,10 @@ impl Switch<'_, '_> {
         SensitivityError::Passage { t: self.at.t, index: self.index, cause }
     }
 
-    /// The point of the motion.
+    /// The point of the motion at which switching functions are evaluated, with the momentum in the place of the velocity
+    /// for a contact Hamiltonian.
     pub(super) fn point(&self) -> Point {
-        self.at.point()
+        if self.problem.is_hamiltonian() { phase_point(&self.at.state) } else { self.at.point() }
     }
 
     /// The arguments.
@@ -111,7 +113,7 @@ impl Switch<'_, '_> {
 
     /// The dependence of the velocity on the state there.
     fn velocity_dependence(&self) -> Result<VelocityDependence, SensitivityError> {
-        VelocityDependence::at(self.problem, self.at.t, &self.point(), &self.at.state.p)
+        VelocityDependence::at(self.problem, self.at.t, &self.at.point(), &self.at.state.p)
             .map_err(|cause| self.failed(cause))
     }
 
@@ -158,15 +160,16 @@ impl Switch<'_, '_> {
                 Argument::Parameter(_) => explicit.push(g),
             }
         }
-        let (field, _) = problem.system().rates(t, &x).map_err(|_| self.failed(StepError::NonFinite))?;
+        let field = rates_along_motion(problem.system(), t, &x).ok_or_else(|| self.failed(StepError::NonFinite))?;
+        let min_rate = MIN_RATE * terms(&of, (t, &x), &field, self.h) / self.h.abs();
+        if problem.is_hamiltonian() {
+            // The function depends on the momentum itself.
+            let state = Components { x: of.q, y: of.v, z: of.z };
+            return Ok(SwitchGradient { state, parameters: explicit, time: of.t, min_rate });
+        }
         let (state, mut parameters, time) = self.velocity_dependence()?.pull(&of);
         parameters.iter_mut().zip(explicit).for_each(|(sum, explicit)| *sum += explicit);
-        Ok(SwitchGradient {
-            state,
-            parameters,
-            time,
-            min_rate: MIN_RATE * terms(&of, (t, &x), &field, self.h) / self.h.abs(),
-        })
+        Ok(SwitchGradient { state, parameters, time, min_rate })
     }
 
     /// The state after a reset, moving along an argument: `(q, v, z)`.
@@ -267,7 +270,7 @@ pub(crate) fn terms(of: &EndCovector, (t, x): (f64, &Point), field: &Components,
     let max = |of: f64, x: f64, y: f64| of.abs() * max_or_nan(x.abs(), y.abs());
     let mut sum = max(of.t, t, h) + max(of.z, x.z, field.z * h);
     for i in 0..x.q.len() {
-        sum += max(of.q[i], max_or_nan(x.q[i].abs(), (x.v[i] * h).abs()), field.y[i] * h * h);
+        sum += max(of.q[i], max_or_nan(x.q[i].abs(), (field.x[i] * h).abs()), field.y[i] * h * h);
         sum += max(of.v[i], x.v[i], field.y[i] * h);
     }
     sum

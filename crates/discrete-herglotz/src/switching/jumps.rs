@@ -27,8 +27,8 @@ fn jumps(system: &dyn System, from: (f64, &Point), to: (f64, &Point)) -> bool {
         v: x.v.clone(),
         rests: StepStart::zeros(x.q.len()),
     };
-    let curve = StepCurve { from: of(from.0, from.1), to: of(to.0, to.1), dense: None };
-    let mut surfaces = Surfaces::at(system, from.0, from.1, curve.span());
+    let curve = StepCurve::new(system, [of(from.0, from.1), of(to.0, to.1)], None);
+    let mut surfaces = Surfaces::at(system, from.0, &curve.from.argument(system), curve.span());
     let max_displacement = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
     let parts = curve.parts();
     for part in 1..=parts {
@@ -39,8 +39,10 @@ fn jumps(system: &dyn System, from: (f64, &Point), to: (f64, &Point)) -> bool {
             if surfaces.side(index) * after < 0.0 {
                 let estimate = surfaces.change(system, &curve, index, ends).estimate;
                 let (t, x) = curve.at(estimate);
-                if !matches!(corner(system, &mut surfaces, index, &of(t, &x), max_displacement), Ok(Corner::Continuous))
-                {
+                if !matches!(
+                    corner(system, &mut surfaces, index, &TimedState::of_argument(system, t, &x), max_displacement),
+                    Ok(Corner::Continuous)
+                ) {
                     return true;
                 }
             }

@@ -10,10 +10,13 @@ mod collocation;
 mod corner;
 mod divided;
 mod jumps;
+mod local_motion;
+mod one_sided;
 pub(crate) mod stepper;
 mod surfaces;
 
 pub(crate) use collocation::{Collocation, CollocationByPoints, CollocationOf, CollocationSteppers};
 pub use divided::DividedGauss;
 pub use jumps::jumps_between;
+pub(crate) use local_motion::{phase_point, rates_along_motion};
 pub(crate) use surfaces::has_switching_functions;

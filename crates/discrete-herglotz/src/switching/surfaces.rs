@@ -1,10 +1,11 @@
 //! The switching functions of a Lagrangian along a step.
 
 use crate::gauss::StepStart;
-use crate::integration::hermite;
+use crate::integration::{hermite, state_at};
 use crate::solve::chebyshev::{Samples, node};
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
+use crate::switching::local_motion::{LocalMotion, phase_point, rates_along_motion};
 use crate::{DenseStep, InputError, Point, State, System, Vector};
 use std::convert::Infallible;
 
@@ -65,8 +66,28 @@ pub(super) struct TimedState {
 }
 
 impl TimedState {
+    /// The point `(q, v, z)`.
     pub fn point(&self) -> Point {
         Point { q: self.state.q.clone(), v: self.v.clone(), z: self.state.z }
+    }
+
+    /// The motion at a point at which switching functions are evaluated; 0 in the place of a velocity that is not defined.
+    pub fn of_argument(system: &dyn System, t: f64, x: &Point) -> Self {
+        let n = x.q.len();
+        let (state, v) = match system.hints().hamiltonian {
+            true => {
+                let v = rates_along_motion(system, t, x).map_or_else(|| Vector::zeros(n), |rates| rates.x);
+                (State { q: x.q.clone(), p: x.v.clone(), z: x.z }, v)
+            }
+            false => (state_at(system, t, x), x.v.clone()),
+        };
+        TimedState { t, state, v, rests: StepStart::zeros(n) }
+    }
+
+    /// The point at which switching functions are evaluated: `(q, v, z)`, or `(q, p, z)` with the momentum in the place of
+    /// the velocity for a system that is given by a contact Hamiltonian.
+    pub fn argument(&self, system: &dyn System) -> Point {
+        if system.hints().hamiltonian { phase_point(&self.state) } else { self.point() }
     }
 }
 
@@ -75,10 +96,26 @@ impl TimedState {
 pub(super) struct StepCurve {
     pub from: TimedState,
     pub to: TimedState,
-    pub dense: Option<DenseStep>,
+    dense: Option<DenseStep>,
+    /// For a system that is given by a contact Hamiltonian the derivatives of the momenta at both ends, where they are
+    /// interpolated, and otherwise nothing.
+    forces: Option<[Vector; 2]>,
+    is_hamiltonian: bool,
 }
 
 impl StepCurve {
+    /// The curve of a step of a system, with its dense output if it has one.
+    pub fn new(system: &dyn System, [from, to]: [TimedState; 2], dense: Option<DenseStep>) -> Self {
+        let is_hamiltonian = system.hints().hamiltonian;
+        let forces = (is_hamiltonian && dense.is_none()).then(|| {
+            [&from, &to].map(|at| {
+                let field = rates_along_motion(system, at.t, &phase_point(&at.state));
+                field.map_or_else(|| Vector::zeros(at.v.len()), |field| field.y)
+            })
+        });
+        StepCurve { from, to, dense, forces, is_hamiltonian }
+    }
+
     pub(super) fn parts(&self) -> usize {
         DEFAULT_PARTS
     }
@@ -89,26 +126,39 @@ impl StepCurve {
         self.collocation().map_or(DEFAULT_DEGREE, |dense| dense.sampling_degree() - 1)
     }
 
-    /// The collocation polynomial, if it is the more accurate curve.
+    /// The collocation polynomial, if it is the more accurate curve. It always is for a contact Hamiltonian, whose
+    /// velocities may jump at the ends of a step.
     fn collocation(&self) -> Option<&DenseStep> {
-        self.dense.as_ref().filter(|dense| dense.stages() > MAX_HERMITE_STAGES)
+        self.dense.as_ref().filter(|dense| dense.stages() > MAX_HERMITE_STAGES || self.is_hamiltonian)
+    }
+
+    /// The interpolant through both ends, extrapolated outside of the step.
+    fn between_ends(&self, fraction: f64) -> Point {
+        let (span, [from, to]) = (self.span(), [&self.from, &self.to]);
+        let x = hermite(&from.point(), &to.point(), span, fraction * span);
+        let Some([at_start, at_end]) = &self.forces else { return x };
+        let momenta = |at: &TimedState, rate: &Vector| Point { q: at.state.p.clone(), v: rate.clone(), z: at.state.z };
+        let p = hermite(&momenta(from, at_start), &momenta(to, at_end), span, fraction * span).q;
+        Point { v: p, ..x }
     }
 
     pub fn span(&self) -> f64 {
         self.to.t - self.from.t
     }
 
+    /// The time and the point, for switching functions, at a fraction of the step.
     pub(super) fn at(&self, fraction: f64) -> (f64, Point) {
         let t = self.from.t + fraction * self.span();
         if fraction == 1.0 {
-            return (self.to.t, self.to.point());
+            return (self.to.t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
         }
         let x = match self.collocation() {
+            Some(dense) if self.is_hamiltonian => phase_point(&dense.at_fraction(fraction)),
             Some(dense) => {
                 let x = dense.at_fraction(fraction);
                 Point { q: x.q, v: dense.velocity(t), z: x.z }
             }
-            None => hermite(&self.from.point(), &self.to.point(), self.span(), fraction * self.span()),
+            None => self.between_ends(fraction),
         };
         (t, x)
     }
@@ -185,13 +235,15 @@ impl Surfaces {
             let there = self.value(system, index, (t, x));
             if there.is_finite() { (there - here).abs() } else { 0.0 }
         };
-        let acceleration = system.rates(t, x).map_or_else(|_| Vector::zeros(n), |(field, _)| field.y);
+        let rates = rates_along_motion(system, t, x);
+        let acceleration = rates.as_ref().map_or_else(|| Vector::zeros(n), |rates| rates.y.clone());
+        let velocity = rates.map_or_else(|| x.v.clone(), |rates| rates.x);
         let dt = POINT_ROUND_OFF * t.abs().max(h.abs());
         let v = POINT_ROUND_OFF * x.v.amax().max((&acceleration * h).amax());
-        let q = POINT_ROUND_OFF * x.q.amax().max((&x.v * h).amax());
+        let q = POINT_ROUND_OFF * x.q.amax().max((&velocity * h).amax());
         let mut moved = Point { z: x.z * (1.0 + POINT_ROUND_OFF), ..x.clone() };
         let mut sum =
-            change(t + dt, &Point { q: &x.q + &x.v * dt, v: &x.v + acceleration * dt, z: x.z }) + change(t, &moved);
+            change(t + dt, &Point { q: &x.q + velocity * dt, v: &x.v + acceleration * dt, z: x.z }) + change(t, &moved);
         moved.z = x.z;
         for i in 0..n {
             moved.q[i] = x.q[i] + q;
@@ -213,8 +265,10 @@ impl Surfaces {
         let here = self.values.clone();
         let dt = DEPARTURE * h;
         let grown = 1.0 + POINT_ROUND_OFF;
+        let velocity =
+            if system.hints().hamiltonian { rates_along_motion(system, t, x).map(|rates| rates.x) } else { None };
         let points = [
-            (t + dt, Point { q: &x.q + &x.v * dt, ..x.clone() }),
+            (t + dt, Point { q: &x.q + velocity.as_ref().unwrap_or(&x.v) * dt, ..x.clone() }),
             (t, Point { q: &x.q * grown, v: &x.v * grown, z: x.z * grown }),
         ];
         let mut changes = vec![0.0; here.len()];
@@ -259,7 +313,7 @@ impl Surfaces {
         let others = (0..self.sides.len()).filter(|i| *i != change.index);
         let changed =
             |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(system, i, (t, &end))) < 0.0;
-        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.point()), h)).collect()
+        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.argument(system)), h)).collect()
     }
 
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
@@ -276,14 +330,8 @@ impl Surfaces {
         if here.is_nan() || here.abs() > tolerance {
             return None;
         }
-        let (a, l) = match system.rates(t, x) {
-            Ok((field, _)) => (field.y, field.z),
-            Err(_) => (Vector::zeros(x.q.len()), 0.0),
-        };
-        let mut after = |dt: f64| {
-            let later = Point { q: &x.q + (&x.v + &a * (0.5 * dt)) * dt, v: &x.v + &a * dt, z: x.z + l * dt };
-            self.value(system, index, (t + dt, &later)) - here
-        };
+        let motion = LocalMotion::at(system, t, x);
+        let mut after = |dt: f64| self.value(system, index, (t + dt, &motion.after(dt))) - here;
         let dt = DEPARTURE * h;
         let (later, earlier) = (after(dt), after(-dt));
         let (odd, even) = (0.5 * (later - earlier), 0.5 * (later + earlier));
@@ -317,10 +365,9 @@ impl Surfaces {
     /// curve is extrapolated. An integrator that evaluates L there, or at the ends, may evaluate it on the other side.
     pub fn are_near(&mut self, system: &dyn System, curve: &StepCurve, extension: f64) -> bool {
         [-extension, 1.0 + extension].into_iter().any(|fraction| {
-            let span = curve.span();
-            let x = hermite(&curve.from.point(), &curve.to.point(), span, fraction * span);
+            let x = curve.between_ends(fraction);
             self.values.clear();
-            system.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
+            system.switching_functions(curve.from.t + fraction * curve.span(), &x, &mut self.values);
             // A surface on which the motion starts counts as near.
             self.sides.iter().zip(&self.values).any(|(side, value)| *side == 0.0 || side * sign(*value) < 0.0)
         })

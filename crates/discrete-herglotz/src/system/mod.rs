@@ -247,7 +247,8 @@ pub trait System {
         None
     }
 
-    /// Appends the values of the switching functions at a point.
+    /// Appends the values of the switching functions at a point `(q, v, z)`; for a Lagrangian that is given by a contact
+    /// Hamiltonian, at a point `(q, p, z)`, with the momentum in the place of the velocity.
     fn switching_functions(&self, t: f64, x: &Point, values: &mut Vec<f64>) {
         let _ = (t, x, values);
     }

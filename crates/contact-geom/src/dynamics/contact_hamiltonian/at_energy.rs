@@ -48,6 +48,7 @@ impl<H> AtEnergy<H> {
 impl<const N: usize, H: ContactHamiltonian<N>> ContactHamiltonian<N> for AtEnergy<H> {
     const PROVED: bool = H::PROVED;
     const INTERPRETED: bool = H::INTERPRETED;
+    const SWITCHING: bool = H::SWITCHING;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
@@ -66,6 +67,14 @@ impl<const N: usize, H: ContactHamiltonian<N>> ContactHamiltonian<N> for AtEnerg
 
     fn closed_hessian<T: Scalar>(&self, t: T, x: &PhasePoint<N, T>) -> Option<Hessian<N, T>> {
         self.hamiltonian.closed_hessian(t, x)
+    }
+
+    fn switching_functions(&self, t: f64, x: &PhasePoint<N>, values: &mut Vec<f64>) {
+        self.hamiltonian.switching_functions(t, x, values);
+    }
+
+    fn breaks(&self) -> &[f64] {
+        self.hamiltonian.breaks()
     }
 }
 

@@ -32,6 +32,7 @@ pub struct TimesRate<K, G> {
 
 impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> ContactHamiltonian<N> for TimesRate<K, G> {
     const INTERPRETED: bool = K::INTERPRETED || G::INTERPRETED;
+    const SWITCHING: bool = K::SWITCHING || G::SWITCHING;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
@@ -48,6 +49,13 @@ impl<const N: usize, K: ContactHamiltonian<N>, G: ContactHamiltonian<N>> Contact
             degree: k.degree.zip(g.degree).map(|(a, b)| a + b),
             ..HamiltonianStructure::default()
         }
+    }
+
+    /// Those of both, and the time since each of their breaks.
+    fn switching_functions(&self, t: f64, x: &PhasePoint<N>, values: &mut Vec<f64>) {
+        self.hamiltonian.switching_functions(t, x, values);
+        self.rate.switching_functions(t, x, values);
+        values.extend(self.hamiltonian.breaks().iter().chain(self.rate.breaks()).map(|at| t - at));
     }
 }
 
@@ -87,6 +95,7 @@ impl<H: ContactHamiltonian<N>, G: ContactHamiltonian<N>, const N: usize, const M
     for InTransformedTime<H, G, N>
 {
     const INTERPRETED: bool = H::INTERPRETED || G::INTERPRETED;
+    const SWITCHING: bool = H::SWITCHING || G::SWITCHING;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, _tau: T, q: &SVector<T, M>, p: &SVector<T, M>, z: T) -> T {
@@ -104,6 +113,15 @@ impl<H: ContactHamiltonian<N>, G: ContactHamiltonian<N>, const N: usize, const M
             constant_rate: z_free,
             ..HamiltonianStructure::default()
         }
+    }
+
+    /// Those of both, and the time, which is a coordinate, since each of their breaks.
+    fn switching_functions(&self, _tau: f64, x: &PhasePoint<M>, values: &mut Vec<f64>) {
+        let [(q, t), (p, _)] = [split_last::<f64, N, M>(&x.q), split_last::<f64, N, M>(&x.p)];
+        let x = PhasePoint { q, p, z: x.z };
+        self.hamiltonian.switching_functions(t, &x, values);
+        self.rate.switching_functions(t, &x, values);
+        values.extend(self.hamiltonian.breaks().iter().chain(self.rate.breaks()).map(|at| t - at));
     }
 }
 

@@ -51,6 +51,8 @@ pub trait ContactHamiltonian<const N: usize> {
     const PROVED: bool = false;
     /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
     const INTERPRETED: bool = false;
+    /// Whether it has [switching functions](Self::switching_functions) or [breaks](Self::breaks).
+    const SWITCHING: bool = false;
 
     /// The value `H(t, q, p, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T;
@@ -72,11 +74,29 @@ pub trait ContactHamiltonian<const N: usize> {
     fn closed_hessian<T: Scalar>(&self, _t: T, _x: &PhasePoint<N, T>) -> Option<Hessian<N, T>> {
         None
     }
+
+    /// The switching functions `g_i(t, q, p, z)`, at whose zeros H has a kink or a jump: appends their values at a state,
+    /// always in the same number and order. A run ends a step at each zero that its motion crosses, so that integrators
+    /// keep their order. There q, p and z are continuous, unless H itself jumps across a surface in the positions: then
+    /// the momentum changes along the normal so that H does not change, or the motion is reflected, as in
+    /// [`Lagrangian::switching_functions`](crate::Lagrangian::switching_functions). By default there are none: H is
+    /// smooth.
+    ///
+    /// Set [`SWITCHING`](Self::SWITCHING) as well. For example, `H = p_x v - |p_v|`, a time-optimal control, has the
+    /// single switching function `p_v`.
+    fn switching_functions(&self, _t: f64, _x: &PhasePoint<N>, _values: &mut Vec<f64>) {}
+
+    /// The times at which H has a kink or a jump in time, in ascending order: steps end there. Set
+    /// [`SWITCHING`](Self::SWITCHING) as well. By default there are none.
+    fn breaks(&self) -> &[f64] {
+        &[]
+    }
 }
 
 impl<const N: usize, H: ContactHamiltonian<N>> ContactHamiltonian<N> for &H {
     const PROVED: bool = H::PROVED;
     const INTERPRETED: bool = H::INTERPRETED;
+    const SWITCHING: bool = H::SWITCHING;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
@@ -91,6 +111,12 @@ impl<const N: usize, H: ContactHamiltonian<N>> ContactHamiltonian<N> for &H {
     }
     fn closed_hessian<T: Scalar>(&self, t: T, x: &PhasePoint<N, T>) -> Option<Hessian<N, T>> {
         (**self).closed_hessian(t, x)
+    }
+    fn switching_functions(&self, t: f64, x: &PhasePoint<N>, values: &mut Vec<f64>) {
+        (**self).switching_functions(t, x, values);
+    }
+    fn breaks(&self) -> &[f64] {
+        (**self).breaks()
     }
 }
 

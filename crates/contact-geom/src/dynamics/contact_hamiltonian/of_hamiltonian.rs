@@ -47,7 +47,13 @@ fn phase_point<H: ContactHamiltonian<N>, T: Scalar, const N: usize>(
 }
 
 impl<const N: usize, H: ContactHamiltonian<N>> Lagrangian<N> for OfHamiltonian<H> {
-    const HINTS: Hints = Hints { hamiltonian: true, proved: H::PROVED, interpreted: H::INTERPRETED, ..Hints::NONE };
+    const HINTS: Hints = Hints {
+        hamiltonian: true,
+        proved: H::PROVED,
+        interpreted: H::INTERPRETED,
+        switching_functions: H::SWITCHING,
+        ..Hints::NONE
+    };
 
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let x = phase_point(&self.0, t, &VelocityPoint { q: *q, v: *v, z });
@@ -106,6 +112,15 @@ impl<const N: usize, H: ContactHamiltonian<N>> Lagrangian<N> for OfHamiltonian<H
 
     fn hamiltonian_defect(&self, t: f64, x: &PhasePoint<N>) -> Option<crate::Defect> {
         if const { H::PROVED } { None } else { self.0.structure().defect(&self.0, t, x) }
+    }
+
+    /// Those of the Hamiltonian, with p in the place of v.
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        self.0.switching_functions(t, &PhasePoint { q: x.q, p: x.v, z: x.z }, values);
+    }
+
+    fn breaks(&self) -> &[f64] {
+        self.0.breaks()
     }
 }
 

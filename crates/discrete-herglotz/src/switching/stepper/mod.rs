@@ -73,6 +73,7 @@ impl<'a> SwitchingStepper<'a> {
         let (state, v) = (problem.state.clone(), problem.start.v.clone());
         let rests = StepStart::zeros(v.len());
         let here = TimedState { t: problem.t0, state, v, rests };
+        let surfaces = Surfaces::at(&*problem.system, problem.t0, &here.argument(&*problem.system), h);
         Ok(SwitchingStepper {
             problem: problem.clone(),
             make,
@@ -83,7 +84,7 @@ impl<'a> SwitchingStepper<'a> {
             origin: here.clone(),
             before: 0,
             here,
-            surfaces: Surfaces::at(&*problem.system, problem.t0, &problem.start, h),
+            surfaces,
             max_defect: f64::INFINITY,
             sigma: 1.0,
             spent: 0,
@@ -188,8 +189,8 @@ impl<'a> SwitchingStepper<'a> {
             && self.base.stepper_mut().advance(1).is_ok()
             && let Ok(to) = self.reached(&self.base, t, &from)
         {
-            let curve = StepCurve { from: from.clone(), to, dense: self.base.stepper().dense() };
             let (system, surfaces) = (&*self.problem.system, &mut self.surfaces);
+            let curve = StepCurve::new(system, [from.clone(), to], self.base.stepper().dense());
             let quiet = match self.range {
                 EvaluationRange::Within => true,
                 EvaluationRange::Extended(part) => !surfaces.are_near(system, &curve, part),

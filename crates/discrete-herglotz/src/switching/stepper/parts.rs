@@ -93,7 +93,7 @@ impl<'a> SwitchingStepper<'a> {
                     continue;
                 }
             };
-            let curve = StepCurve { from: at.clone(), to, dense: stepper.stepper().dense() };
+            let curve = StepCurve::new(&*self.problem.system, [at.clone(), to], stepper.stepper().dense());
             let change = self.surfaces.first_change(&*self.problem.system, &curve);
             too_long = change.is_none() && self.is_too_long(&stepper);
             if too_long {
@@ -137,9 +137,8 @@ impl<'a> SwitchingStepper<'a> {
             let mut start = std::mem::replace(&mut at, to);
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
-                if index != change.index
-                    && !self.surfaces.is_on(&*self.problem.system, index, (at.t, &at.point()), self.h)
-                {
+                let system = &*self.problem.system;
+                if index != change.index && !self.surfaces.is_on(system, index, (at.t, &at.argument(system)), self.h) {
                     continue;
                 }
                 let resets = self.resets.len();
@@ -198,7 +197,7 @@ impl<'a> SwitchingStepper<'a> {
                 return Some(at_start());
             }
             let (stepper, to) = self.part(from, from.t + length).ok()?;
-            let value = self.surfaces.value(&*system, index, (to.t, &to.point()));
+            let value = self.surfaces.value(&*system, index, (to.t, &to.argument(&*system)));
             if let Some((l, g)) = last
                 && l != length
                 && (value - g) / (length - l) * slope > 0.0
@@ -225,7 +224,7 @@ impl<'a> SwitchingStepper<'a> {
                 return Ok(f64::MIN_POSITIVE);
             }
             let (_, to) = self.part(from, from.t + fraction * span)?;
-            Ok(side * self.surfaces.value(&*system, index, (to.t, &to.point())))
+            Ok(side * self.surfaces.value(&*system, index, (to.t, &to.argument(&*system))))
         };
         let [before, after] = [toward(ends[0]).ok()?, toward(ends[1]).ok()?];
         if before.is_nan() || after.is_nan() || before <= 0.0 || after >= 0.0 {

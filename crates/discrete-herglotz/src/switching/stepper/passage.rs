@@ -29,7 +29,7 @@ impl SwitchingStepper<'_> {
         let max_displacement = max_abs_or_nan(at.v.iter().map(|v| v * span));
         let system = self.problem.system.clone();
         let rising = self.surfaces.side(index) < 0.0;
-        if let AtSwitch::Replace { to, factor } = system.at_switch(index, at.t, &at.point(), rising) {
+        if let AtSwitch::Replace { to, factor } = system.at_switch(index, at.t, &at.argument(&*system), rising) {
             let (to, passage) = self.reset(at, index, (to, factor), spacing)?;
             return Ok(Passed { to, factor: factor.unwrap_or(1.0), passage });
         }

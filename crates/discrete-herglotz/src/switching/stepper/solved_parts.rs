@@ -1,7 +1,6 @@
 //! The parts of the last step with their stages and with what happened at their ends, for derivatives.
 
-use crate::integration::WholeStep;
-use crate::integration::{PartEnd, PartPoint, SolvedPart, SolvedStages};
+use crate::integration::{PartEnd, PartPoint, SolvedPart, SolvedStages, StepEnds, WholeStep};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::surfaces::TimedState;
 
@@ -27,10 +26,20 @@ impl SwitchingStepper<'_> {
             return Vec::new();
         }
         let mut steppers = self.parts.iter().flatten();
+        let is_hamiltonian = self.problem.system.hints().hamiltonian;
         let point = |at: &TimedState| PartPoint { t: at.t, state: at.state.clone(), v: at.v.clone() };
         let part = |of: &EndOfPart| {
             let kept = if of.has_stepper { steppers.next().and_then(|s| s.stepper().solved_stages()) } else { None };
-            let step = kept.or_else(|| of.stages.clone()).map(WholeStep::Collocation);
+            let step = match kept.or_else(|| of.stages.clone()) {
+                // The derivatives of a step of a contact Hamiltonian are those of a sub-flow.
+                Some(_) if is_hamiltonian => Some(WholeStep::Flow(StepEnds {
+                    t: of.from.t,
+                    h: of.to.t - of.from.t,
+                    start: of.from.state.clone(),
+                    end: of.to.state.clone(),
+                })),
+                stages => stages.map(WholeStep::Collocation),
+            };
             let known = step.is_some() || !of.has_stepper;
             known.then(|| SolvedPart {
                 step,
