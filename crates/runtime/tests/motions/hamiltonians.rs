@@ -127,3 +127,30 @@ fn breaks_of_a_hamiltonian_end_steps() {
         assert!((found.q[0] + 1.0).abs() + found.p[0].abs() < 1e-8, "{control:?}: {:?}, {:?}", found.q, found.p);
     }
 }
+
+/// Where H is linear in p its value, and with it `p . v`, may vanish or decay while momenta do not: the action has the
+/// round-off of the terms of `p . v`. The bound is that of the reference, by given steps.
+#[test]
+fn the_accuracy_of_a_hamiltonian_that_is_linear_in_momenta() {
+    let cases: [(&str, [f64; 2], [f64; 2], f64); 3] = [
+        // Van der Pol, where H decays as e^-t; a rotation with H = 0; a lift that is not damped, whose momenta grow.
+        ("p_x*y + p_y*((1 - x^2)*y - x) + z", [2.0, 0.0], [1.0, 0.5], 100.0),
+        ("p_x*y - p_y*x + z", [2.0, 0.0], [1.0, 0.0], 30.0),
+        ("p_x*y + p_y*((1 - x^2)*y - x)", [2.0, 0.0], [1.0, 0.5], 40.0),
+    ];
+    for (text, q, p, t) in cases {
+        let h = formula(text, &["x", "y"]);
+        let reference = run(&h, &q, &p, t, by_gauss(12, 0.02));
+        for error in [1e-3, 1e-6, 1e-9] {
+            let found = run(&h, &q, &p, t, accurate(error));
+            for (found, expected) in [(&found.q, &reference.q), (&found.p, &reference.p)] {
+                let size = expected.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+                let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+                assert!(
+                    off.fold(0.0, f64::max) < error.max(1e-11) * size,
+                    "{text}, {error}: {found:?} for {expected:?}"
+                );
+            }
+        }
+    }
+}

@@ -67,12 +67,17 @@ impl WithSimd for Compare<'_> {
                 };
                 size = size.max(p.abs()).max(force.abs());
                 all += of_force * 0.0 + of_momentum * 0.0;
-                work = p.mul_add(v, work);
+                // The terms of `p . v` may cancel: where H decays, as by `H_z > 0`, and is linear in p, `p . v` decays with
+                // it while the momenta do not. The action of a Hamiltonian has the round-off of the terms.
+                work = if hamiltonian { work + (p * v).abs() } else { p.mul_add(v, work) };
             }
             let apart = sample.l.block::<S>(r) * slower - value;
             of_value = of_value.max(apart.abs());
             kinetic = kinetic.max(work.abs() + (slope * at_z).abs());
             largest_l = largest_l.max(value.abs());
+            if hamiltonian {
+                largest_l = largest_l.max(work);
+            }
             all += apart * 0.0;
             if curve.acts {
                 of_z = of_z.max((apart * long).abs());
