@@ -1,5 +1,6 @@
 //! Expressions in addition to the Lagrangian: output columns and events.
 
+use crate::breaks::Kinks;
 use crate::evaluation::At;
 use crate::formula::index;
 use crate::limits::MOST_NODES;
@@ -134,6 +135,16 @@ impl Expression {
     /// Whether the expression depends on the action.
     pub fn has_action(&self) -> bool {
         self.inputs.meets(Inputs::ACTION)
+    }
+
+    /// The times of kinks and jumps that are known from the text, in ascending order, as 5 in `if(t > 5, 1, 0)`.
+    ///
+    /// # Errors
+    /// [`FormulaError::TableOfState`].
+    pub fn breaks(&self) -> Result<Vec<f64>, FormulaError> {
+        let mut graph = self.graph.clone();
+        let kinks = Kinks::of(&mut graph, &[self.root])?;
+        Ok(kinks.times(&graph, &graph.constants(&self.values), &[]))
     }
 
     /// Sets the value of a parameter, without parsing the text again.

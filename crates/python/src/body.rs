@@ -199,8 +199,9 @@ pub fn run_rigid_body(
     sensitivity: bool,
 ) -> PyResult<BodyRecord> {
     let body = body_of(&body)?;
-    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
     let signals = Signals::new();
+    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
+    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
     let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone() };
     let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
     let outcome = outcome.map_err(value_error)?;
@@ -212,6 +213,11 @@ pub fn run_rigid_body(
         let steps = StepControl::Steps { by: outcome.by, steps: Steps::Count(outcome.steps) };
         let motion = BodyMotion { step_control: steps, ..motion };
         let found: Result<BodyDerivatives, RuntimeError> = py.detach(|| body.derivatives(&motion));
+        if let Some(raised) = signals.take() {
+            // The motion is known, and its derivatives are not.
+            record.interrupted = Some(raised.into_value(py).into_any());
+            return Ok(record);
+        }
         let BodyDerivatives { in_start, in_parameters, log_factor, contact_defect } = found.map_err(value_error)?;
         record.derivatives = Some((by_rows(py, &in_start)?, by_rows(py, &in_parameters)?, log_factor, contact_defect));
     }
@@ -229,12 +235,18 @@ pub fn rigid_body_between(
     to: Bound<'_, PyAny>,
 ) -> PyResult<[f64; 3]> {
     let body = body_of(&body)?;
+    let signals = Signals::new();
     let motion = motion_of(&start, crate::motion::times(&t)?, None, step_control(way)?, Vec::new())?;
+    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
     let to = numbers("to", &to)?;
     let count = to.len();
     let to = <[f64; 4]>::try_from(to)
         .map_err(|_| value_error(format!("`to` has {count} numbers; it must be a quaternion (w, x, y, z)")))?;
-    py.detach(|| body.between(&motion, to)).map_err(value_error)
+    let found = py.detach(|| body.between(&motion, to));
+    match signals.take() {
+        Some(raised) => Err(raised),
+        None => found.map_err(value_error),
+    }
 }
 
 /// Runs many motions of rigid bodies on several threads with the interpreter lock released: one record for each, or the

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
+#[path = "body/accuracy.rs"]
+mod accuracy;
 #[path = "body/ensembles.rs"]
 mod ensembles;
 #[path = "body/plans.rs"]

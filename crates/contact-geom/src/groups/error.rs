@@ -135,6 +135,22 @@ pub enum GroupError {
         /// The final time.
         to: f64,
     },
+    /// The trial runs for an accuracy take too many steps.
+    #[error(
+        "the accuracy {requested:e} is not reached: two runs with up to {steps} steps differ by {reached:e}, and the number \
+         of steps of trial runs is bounded; request a larger error, choose a shorter time, or give the steps"
+    )]
+    Budget {
+        /// The accuracy that was requested.
+        requested: f64,
+        /// The smallest difference of two runs; infinite if there is none.
+        reached: f64,
+        /// The number of steps of the last run.
+        steps: usize,
+    },
+    /// The computation was interrupted.
+    #[error("the computation was interrupted")]
+    Interrupted,
     /// An accuracy is not positive, or is not reached.
     #[error(
         "the accuracy {requested:e} is not reached{}; it must be a positive number above round-off", if *steps > 0 {

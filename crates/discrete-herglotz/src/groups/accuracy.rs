@@ -19,6 +19,10 @@ pub struct GroupSteps {
 /// The largest number of steps of a trial run.
 const MAX_STEPS: usize = 1 << 24;
 
+/// The number of steps of all trial runs, some seconds, beyond which they are continued only where the accuracy is expected
+/// to be reached: where the differences of two runs fall.
+const BUDGET: usize = 1 << 20;
+
 /// The distance of two states: the larger of the chart vector `log(g_a^-1 g_b)`, by its norm, and the difference of the
 /// spatial momenta relative to their size. NaN if a state is not finite.
 pub fn group_distance<G: LieGroup<N>, const N: usize>(a: &GroupState<G, N>, b: &GroupState<G, N>) -> f64 {
@@ -33,9 +37,12 @@ pub fn group_distance<G: LieGroup<N>, const N: usize>(a: &GroupState<G, N>, b: &
 /// two runs differ by at most `accuracy`, and by at most half as much as the two runs before: steps that are too long for
 /// the motion may agree by chance. A step that fails is divided like one that is not accurate.
 ///
+/// The runs may take 2^20 steps together, and more where their differences fall such that they are expected to reach the
+/// accuracy with at most 2^24.
+///
 /// # Errors
-/// [`GroupError::Accuracy`] where it is below the round-off of the runs, or takes more than 2^24 steps; the last error
-/// of a step where no run succeeds.
+/// [`GroupError::Accuracy`] where it is below the round-off of the runs; [`GroupError::Budget`] where it takes too many steps;
+/// the last error of a step where no run succeeds; [`GroupError::Interrupted`] of a step.
 pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
     start: &GroupMotion<G, N>,
     span: f64,
@@ -49,19 +56,33 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
     let mut last: Result<GroupState<G, N>, GroupError> = Err(GroupError::Step { h: span });
     // The difference before is not a number for the first two runs, and after one that failed.
     let (mut smallest, mut stagnant, mut best, mut before) = (f64::INFINITY, 0, 0, f64::NAN);
-    let mut count = steps.max(1);
-    while count <= MAX_STEPS {
+    let (mut count, mut spent) = (steps.max(1), 0usize);
+    // Whether the accuracy is expected to be reached.
+    let mut promising = false;
+    while count <= MAX_STEPS && (promising || spent + count <= BUDGET) {
         let h = span / count as f64;
         let method = integrator(h)?;
         let mut motion = start.clone();
         let end = motion.advance(&method, count).map(|()| motion.state());
+        if let Err(GroupError::Interrupted) = end {
+            return Err(GroupError::Interrupted);
+        }
+        spent += count;
+        promising = false;
         match (&last, &end) {
             (Ok(coarse), Ok(fine)) => {
                 // Two runs may agree in all digits, but their round-off is not 0.
                 let error = max_or_nan(group_distance(coarse, fine), f64::EPSILON);
+                let last_difference = before;
                 let falls = error <= 0.5 * before || max_or_nan(error, before) <= 0.01 * accuracy;
+                // The number of doublings after which the differences, which fall by this factor, are small enough.
+                let doublings = ((error / accuracy).ln() / (before / error).ln()).ceil();
+                promising = error <= 0.5 * before && count as f64 * doublings.exp2() <= MAX_STEPS as f64;
                 before = error;
-                if error <= accuracy && falls {
+                // Where the differences have stopped falling, they are round-off that the motion has enlarged, and one of
+                // them may be small by chance.
+                let certain = stagnant == 0 || max_or_nan(error, last_difference) <= 0.1 * accuracy;
+                if error <= accuracy && falls && certain {
                     return Ok(GroupSteps { steps: count, h, error });
                 }
                 stagnant = if error < 0.5 * smallest { 0 } else { stagnant + 1 };
@@ -73,11 +94,14 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
                     return Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best });
                 }
             }
-            (_, Err(error)) if count > MAX_STEPS / 2 => return Err(*error),
             _ => before = f64::NAN,
         }
         last = end;
         count = count.saturating_mul(2);
     }
-    last.and(Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best }))
+    // Where no run succeeded, a step failed.
+    match last {
+        Err(error) if smallest == f64::INFINITY => Err(error),
+        _ => Err(GroupError::Budget { requested: accuracy, reached: smallest, steps: count / 2 }),
+    }
 }

@@ -1,7 +1,7 @@
 //! Derivatives of motions on Lie groups in the start and in parameters.
 
-use super::{GroupGauss, GroupIntegrator, GroupState, GroupStep};
-use contact_geom::groups::{GroupError, LieGroup, ParametricGroupLagrangian};
+use super::{GroupIntegrator, GroupState, GroupStep, ParametricGroupIntegrator};
+use contact_geom::groups::{GroupError, LieGroup};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::{ChartVector, Dual, Scalar};
@@ -121,22 +121,21 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
-    pub fn with_parameters<L: ParametricGroupLagrangian<G, N>>(
-        integrator: &GroupGauss<L>,
+    pub fn with_parameters(
+        integrator: &impl ParametricGroupIntegrator<G, N>,
         t0: f64,
         start: &GroupState<G, N>,
         steps: usize,
     ) -> Result<Self, GroupError> {
         let mut found = Self::new(integrator, t0, start, steps)?;
-        let h = GroupIntegrator::<G, N>::step_size(integrator);
-        let parameters = integrator.lagrangian().parameters();
+        let (h, parameters) = (integrator.step_size(), integrator.parameters());
         let velocity = integrator.velocity(t0, start)?;
         found.in_parameters = DMatrix::zeros(2 * N + 1, parameters.len());
         for first in (0..parameters.len()).step_by(2 * N + 1) {
             let direction = |k: usize| (first..=first + 2 * N).contains(&k).then(|| k - first);
             let theta: Vec<_> = parameters.iter().enumerate().map(|(k, x)| seeded::<N>(*x, direction(k))).collect();
             let (end, _) = after_steps(lifted(start, false), velocity, steps, |k, state, velocity| {
-                integrator.step_at(&theta, t0 + k as f64 * h, state, velocity)
+                integrator.step_at(&theta, (h, t0 + k as f64 * h), state, velocity)
             })?;
             for (i, row) in rows(&end)?.1.iter().enumerate() {
                 for k in first..parameters.len().min(first + 2 * N + 1) {
@@ -162,7 +161,7 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
     }
 
     /// The same for `Phi* eta - sigma eta + work`, with the virtual work of a force: round-off for that of a step,
-    /// [`GroupGauss::virtual_work`].
+    /// [`GroupGauss::virtual_work`](super::GroupGauss::virtual_work).
     pub fn contact_defect_beside(&self, work: &ChartVector<N>) -> f64 {
         let form = |at: &GroupState<G, N>| ChartVector { x: -at.momentum, y: SVector::zeros(), z: 1.0 };
         let (pullback, _) = self.gradients(&form(&self.end));

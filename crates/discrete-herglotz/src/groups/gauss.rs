@@ -2,7 +2,7 @@
 
 use super::derivatives::{Along, check, lifted};
 use super::stages::{AtParameters, AtStages, Factors, Given, Own, Stages, Table};
-use super::{GroupIntegrator, GroupState, GroupStep};
+use super::{GroupIntegrator, GroupState, GroupStep, ParametricGroupIntegrator};
 use crate::gauss::MAX_STAGES;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::extent::extent;
@@ -122,25 +122,31 @@ impl<G: LieGroup<N>, L: GroupLagrangian<G, N>, const N: usize> GroupIntegrator<G
     }
 }
 
-impl<L> GroupGauss<L> {
-    /// The step from a state, for values of the parameters of the Lagrangian.
-    pub(super) fn step_at<G: LieGroup<N>, const N: usize, T: Scalar>(
-        &self,
-        theta: &[T],
-        t: f64,
-        from: &GroupState<G, N, T>,
-        velocity: &SVector<T, N>,
-    ) -> Result<GroupStep<N, T>, GroupError>
-    where
-        L: ParametricGroupLagrangian<G, N>,
-    {
-        let rate = self.lagrangian.constant_rate_at(theta);
-        let constant = rate.map(|gamma| constant_factors(gamma, self.h, &self.table));
-        let lagrangian = &AtParameters { lagrangian: &self.lagrangian, theta };
-        let given = self.given(lagrangian, constant, (self.h, t), from);
-        self.end(&given, self.solve(&given, velocity)?)
+impl<G, L, const N: usize> ParametricGroupIntegrator<G, N> for GroupGauss<L>
+where
+    G: LieGroup<N>,
+    L: ParametricGroupLagrangian<G, N>,
+{
+    fn parameters(&self) -> Vec<f64> {
+        self.lagrangian.parameters()
     }
 
+    fn step_at<T: Scalar>(
+        &self,
+        theta: &[T],
+        (h, t): (f64, f64),
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError> {
+        let rate = self.lagrangian.constant_rate_at(theta);
+        let constant = rate.map(|gamma| constant_factors(gamma, h, &self.table));
+        let lagrangian = &AtParameters { lagrangian: &self.lagrangian, theta };
+        let given = self.given(lagrangian, constant, (h, t), from);
+        self.end(&given, self.solve(&given, velocity)?)
+    }
+}
+
+impl<L> GroupGauss<L> {
     /// The virtual work `h sum_j b_j R_j f_j . (g_j^-1 dg_j)` of the applied force in a step from a state, a covector in body
     /// coordinates at the state: the contact form is multiplied by `sigma_d` up to it, `Phi* eta = sigma_d eta - work`.
     ///

@@ -22,6 +22,7 @@
 
 mod accuracy;
 mod boundary;
+mod breaks;
 mod dense;
 mod derivatives;
 mod events;
@@ -34,6 +35,7 @@ mod state;
 
 pub use accuracy::{GroupSteps, group_distance, group_steps};
 pub use boundary::{GroupEnds, MotionBetween};
+pub use breaks::GroupBreaks;
 pub use dense::DenseGroupMotion;
 pub use derivatives::GroupDerivatives;
 pub use events::GroupEvent;
@@ -41,4 +43,4 @@ pub use gauss::GroupGauss;
 pub use motion::GroupMotion;
 pub use run::{GroupObserver, GroupRows, GroupRun, GroupStatus};
 pub use splitting::RigidBodySplitting;
-pub use state::{GroupIntegrator, GroupState, GroupStep};
+pub use state::{GroupIntegrator, GroupState, GroupStep, ParametricGroupIntegrator};

@@ -74,6 +74,23 @@ pub struct GroupStep<const N: usize, T = f64> {
     pub velocity: SVector<T, N>,
 }
 
+impl<const N: usize, T: Scalar> GroupStep<N, T> {
+    /// This step and the next one as one step; its increment must be in the chart.
+    pub(super) fn followed_by<G: LieGroup<N>>(&self, next: &Self) -> Self {
+        let [f, g] = [self, next].map(|step| G::exp(&step.increment));
+        // The second impulse acts in the body after the first step.
+        let second = G::coadjoint(&G::inverse(&f), &next.impulse);
+        let (first, factor) = (self.sigma_minus_one, next.sigma_minus_one);
+        GroupStep {
+            increment: G::log(&G::compose(&f, &g)),
+            impulse: self.impulse + self.impulse * factor + second,
+            sigma_minus_one: first + factor + first * factor,
+            action: self.action + next.action,
+            velocity: next.velocity,
+        }
+    }
+}
+
 /// An integrator of a Lagrangian on a Lie group, with a step of its own.
 pub trait GroupIntegrator<G: LieGroup<N>, const N: usize> {
     /// The step h.
@@ -111,4 +128,23 @@ pub trait GroupIntegrator<G: LieGroup<N>, const N: usize> {
     /// # Errors
     /// [`GroupError::Singular`], [`GroupError::NotConverged`] where the momentum belongs to no velocity.
     fn velocity(&self, t: f64, from: &GroupState<G, N>) -> Result<SVector<f64, N>, GroupError>;
+}
+
+/// An integrator whose steps are known for other values of the parameters of its Lagrangian.
+pub trait ParametricGroupIntegrator<G: LieGroup<N>, const N: usize>: GroupIntegrator<G, N> {
+    /// The values of the parameters.
+    fn parameters(&self) -> Vec<f64>;
+
+    /// A step of the length h from a state at the time t, for other values of the parameters; see
+    /// [`step_by`](GroupIntegrator::step_by).
+    ///
+    /// # Errors
+    /// Those of the method.
+    fn step_at<T: Scalar>(
+        &self,
+        theta: &[T],
+        step: (f64, f64),
+        from: &GroupState<G, N, T>,
+        velocity: &SVector<T, N>,
+    ) -> Result<GroupStep<N, T>, GroupError>;
 }

@@ -158,7 +158,8 @@ def rigid_body(
         The rate of the drag, negative for dissipation.
     torque : sequence of three str, optional
         A torque that has no potential: its components along the axes of the body, such as ``("-0.1*omega1", "0", "0")``,
-        in the names t, q_w, q_x, q_y, q_z, omega1 to omega3, z. It takes a Gauss method.
+        in the names t, q_w, q_x, q_y, q_z, omega1 to omega3, z. It takes a Gauss method. Steps end at kinks and jumps at
+        times that the texts name, as at those of ``"if(t > 2, if(t < 2.1, 50, 0), 0)"``.
     attitude : array of shape (4,)
         The initial attitude, a unit quaternion (w, x, y, z) that takes the body to space.
     omega : array of shape (3,)
@@ -170,7 +171,8 @@ def rigid_body(
         number is the final time of a motion from 0.
     accuracy : float, optional
         The error of the attitude (in radians) and of the momentum (relative) at the end; 1e-9 by default, where no steps
-        are given. The number of steps is doubled until two runs differ by at most this.
+        are given. The number of steps is doubled until two runs differ by at most this; a motion that takes too many is
+        refused.
     integrator : str, optional
         A splitting such as "sofroniou_spaletta_10" (the default), for which fast rotation costs no steps, or a Gauss
         method such as "gauss_4", whose steps turn the body by less than pi.
@@ -214,7 +216,12 @@ def rigid_body(
         integrator = "gauss_4"
     way = accuracy, integrator, step, steps
     record = _core.run_rigid_body(body, start, copied(t), every, way, events, bool(sensitivity))
-    sol = RigidBodySolution(record, len(events))
+    return _solution(record, len(events))
+
+
+def _solution(record, events=0):
+    """The solution of a record, unless a signal ended the run."""
+    sol = RigidBodySolution(record, events)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(sol)
@@ -283,7 +290,7 @@ def rigid_body_between(
     way = None, integrator, step, steps
     found = _core.rigid_body_between(body, start, copied(t), way, copied(to))
     start = start[0], np.array(found), start[2]
-    return RigidBodySolution(_core.run_rigid_body(body, start, copied(t), None, way, [], False))
+    return _solution(_core.run_rigid_body(body, start, copied(t), None, way, [], False))
 
 
 def rigid_bodies(

@@ -59,7 +59,9 @@ impl Body {
             taken = next;
             let (t, from) = (state.t(), state.state());
             let step = GroupDerivatives::new(&integrator, t, &from, 1).map_err(of)?;
-            if let Some(work) = integrator.virtual_work(t, &from) {
+            // The work is that of a step without parts.
+            let whole = !integrator.divides(t, step_size);
+            if let Some(work) = integrator.integrator().integrator.virtual_work(t, &from).filter(|_| whole) {
                 residuals.push(step.contact_defect_beside(&work.map_err(of)?));
             }
             let mut reference = GroupMotion::<Rotations, 3>::new(t, from).map_err(of)?;

@@ -1,10 +1,11 @@
 //! Derivatives of motions of rigid bodies.
 
-use super::integrator::{BodyIntegrator, ForcedBody};
+use super::integrator::{BodyIntegrator, BodyMethod, ForcedBody, with_ends};
 use super::run::Prepared;
 use super::steps::of_integrator;
 use super::{Body, BodyMotion};
 use crate::RuntimeError;
+use contact_geom::groups::Rotations;
 use contact_geom::nalgebra::{DMatrix, Matrix3, Vector3};
 use discrete_herglotz::AnyIntegrator;
 use discrete_herglotz::groups::{GroupDerivatives, GroupGauss};
@@ -76,7 +77,9 @@ impl Body {
             return Err(RuntimeError::argument("integrator", why));
         };
         let body = ForcedBody { lagrangian: rows.lagrangian, force: self.torque.clone() };
-        let gauss = GroupGauss::new(body, stages, step_size).map_err(|error| of_integrator(&error))?;
+        let gauss = GroupGauss::new::<Rotations, 3>(body.clone(), stages, step_size);
+        let gauss = gauss.and_then(|gauss| with_ends(gauss, &body, motion.interrupt.as_ref()));
+        let gauss = gauss.map_err(|error| of_integrator(&error))?;
         let found = GroupDerivatives::with_parameters(&gauss, motion.t, &state.state(), steps);
         let found = found.map_err(|error| of_integrator(&error))?;
         let omega = Vector3::from(motion.omega);
@@ -129,7 +132,7 @@ impl Body {
     /// The integrator of a motion with the step of another one, by which it is compared.
     pub(super) fn with_step(&self, by: AnyIntegrator, h: f64) -> Result<BodyIntegrator, RuntimeError> {
         let body = ForcedBody { lagrangian: self.lagrangian()?, force: self.torque.clone() };
-        BodyIntegrator::new(&body, by, h).map_err(|error| of_integrator(&error))
+        BodyMethod::integrator(&body, by, h, None).map_err(|error| of_integrator(&error))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Many motions of rigid bodies.
 
-use super::integrator::BodyIntegrator;
+use super::integrator::BodyMethod;
 use super::{Body, BodyMotion, BodyOutcome};
 use crate::{Crossing, Interrupt, RunMonitor, RuntimeError, StepControl};
 use discrete_herglotz::ensemble::{EnsembleError, Tally};
@@ -99,10 +99,10 @@ impl BodyEnsemble<'_> {
         let (body, motion) = (self.member)(0);
         let is_forced = body.torque.is_some();
         let by = match motion.step_control {
-            StepControl::Accuracy { by, .. } => by.unwrap_or(BodyIntegrator::default_for(is_forced)),
+            StepControl::Accuracy { by, .. } => by.unwrap_or(BodyMethod::default_for(is_forced)),
             StepControl::Steps { by, .. } => by,
         };
-        BodyIntegrator::check(by, is_forced)?;
+        BodyMethod::check(by, is_forced)?;
         let (mut tally, mut first) = (Tally::default(), 0);
         while first < self.count {
             let members = first..self.count.min(first + MEMBERS_PER_THREAD * threads);
@@ -156,6 +156,8 @@ impl BodyEnsemble<'_> {
 
     fn run_member(&self, index: usize) -> BodyMember {
         let (body, motion) = (self.member)(index);
+        // The trial runs of the member are interrupted too.
+        let motion = BodyMotion { interrupt: self.interrupt.clone().or(motion.interrupt.clone()), ..motion };
         let mut record = Record { rows: Vec::new(), crossings: Vec::new(), interrupt: self.interrupt.as_ref() };
         let outcome = body.run(&motion, &mut record);
         BodyMember { index, outcome, rows: record.rows, crossings: record.crossings }

@@ -5,6 +5,7 @@ mod check;
 mod derivatives;
 mod ensemble;
 mod integrator;
+mod interruptible;
 mod momenta;
 mod motion;
 mod observer;

@@ -1,6 +1,6 @@
 //! Requests for motions of rigid bodies.
 
-use crate::{Body, Direction, OutputTimes, RuntimeError, StepControl};
+use crate::{Body, Direction, Interrupt, OutputTimes, RuntimeError, StepControl};
 use formula_lagrangian::{Expression, Formula};
 
 /// The names of the coordinates of an event function: the columns between the time and the energy.
@@ -84,11 +84,15 @@ pub struct BodyMotion {
     pub rows: Option<OutputTimes>,
     /// The events to be located.
     pub events: Vec<BodyEvent>,
+    /// When to interrupt the trial runs for an accuracy, the derivatives and the search of a motion between two attitudes;
+    /// the motion itself is ended by its [`RunMonitor`](crate::RunMonitor).
+    pub interrupt: Option<Interrupt>,
 }
 
 impl BodyMotion {
     /// From an attitude and an angular velocity at t = 0, recording the final state only.
     pub fn new(attitude: [f64; 4], omega: [f64; 3], end: f64, step_control: StepControl) -> Self {
-        BodyMotion { t: 0.0, attitude, omega, z: 0.0, end, step_control, rows: None, events: Vec::new() }
+        let (rows, events, interrupt) = (None, Vec::new(), None);
+        BodyMotion { t: 0.0, attitude, omega, z: 0.0, end, step_control, rows, events, interrupt }
     }
 }

@@ -36,6 +36,31 @@ pub struct BodyOutcome {
 }
 
 impl BodyOutcome {
+    /// From the integrator, the length of a step and their number, and the [columns](crate::Body::COLUMNS) of the state.
+    pub(super) fn new(
+        status: GroupStatus,
+        (by, step_size, steps): (AnyIntegrator, f64, usize),
+        row: &[f64; 19],
+        error_estimate: Option<f64>,
+    ) -> Self {
+        let [t, w, x, y, zz, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, energy, z] = *row;
+        BodyOutcome {
+            status,
+            by,
+            step_size,
+            steps,
+            t,
+            attitude: [w, x, y, zz],
+            momentum: [p1, p2, p3],
+            omega: [o1, o2, o3],
+            spatial_momentum: [m1, m2, m3],
+            tip: [tx, ty, tz],
+            energy,
+            z,
+            error_estimate,
+        }
+    }
+
     /// The [columns](crate::Body::COLUMNS) of the state that was reached.
     pub fn row(&self) -> [f64; 19] {
         let ([w, x, y, z], [p1, p2, p3], [o1, o2, o3]) = (self.attitude, self.momentum, self.omega);

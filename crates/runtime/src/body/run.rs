@@ -1,6 +1,6 @@
 //! Runs of rigid bodies.
 
-use super::integrator::{BodyIntegrator, ForcedBody};
+use super::integrator::{BodyIntegrator, BodyMethod, ForcedBody};
 use super::observer::{EventValues, Halt, Observer, Rows};
 use super::steps::of_integrator;
 use super::{Body, BodyMotion, BodyOutcome};
@@ -34,7 +34,8 @@ impl Body {
         let body = ForcedBody { lagrangian, force: self.torque.clone() };
         let (by, steps, error_estimate) = motion.steps(&body, &state)?;
         let step_size = (motion.end - motion.t) / steps as f64;
-        let integrator = BodyIntegrator::new(&body, by, step_size).map_err(|error| of_integrator(&error))?;
+        let integrator = BodyMethod::integrator(&body, by, step_size, motion.interrupt.as_ref());
+        let integrator = integrator.map_err(|error| of_integrator(&error))?;
         // A step that turns the body beyond the chart is refused before work starts.
         if let Err(error @ GroupError::BeyondChart { .. }) = state.clone().advance(&integrator, 1) {
             return Err(of_integrator(&error));
@@ -47,6 +48,7 @@ impl Body {
     /// angular velocity and the momentum in the body as position, velocity and momentum. A failure of a step is reported
     /// in the status of the outcome.
     ///
+    /// Where the interrupt of the motion ends the trial runs, the outcome is that of a motion that was stopped at its start.
     /// A motion that [`RunMonitor::poll`] ends is passed to [`RunMonitor::body_interrupted`], and checkpoints to
     /// [`RunMonitor::body_checkpoint`].
     ///
@@ -79,7 +81,14 @@ impl Body {
         from: Option<BodyResumeState>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<BodyOutcome, RuntimeError> {
-        let Prepared { rows, mut state, by, steps, step_size, integrator, error_estimate } = self.prepare(motion)?;
+        let prepared = match self.prepare(motion) {
+            // The trial runs were interrupted: the motion is at its start.
+            Err(RuntimeError::Input(InputError::Interrupted)) => return self.at_start(motion),
+            prepared => prepared?,
+        };
+        let Prepared { rows, mut state, by, steps, step_size, error_estimate, .. } = prepared;
+        // The monitor ends the motion itself.
+        let integrator = self.with_step(by, step_size)?;
         let of_run = fingerprint(self, motion, by, steps);
         let mut before = (0, 0);
         if let Some(from) = from {
@@ -140,23 +149,20 @@ impl Body {
             status => status,
         };
         let t = if status == GroupStatus::Completed { motion.end } else { state.t() };
-        let at = state.state();
-        let [_, w, x, y, zz, p1, p2, p3, o1, o2, o3, m1, m2, m3, tx, ty, tz, energy, z] = rows.row(t, &at);
-        Ok(BodyOutcome {
-            status,
-            by,
-            step_size,
-            steps: observer.taken,
-            t,
-            attitude: [w, x, y, zz],
-            momentum: [p1, p2, p3],
-            omega: [o1, o2, o3],
-            spatial_momentum: [m1, m2, m3],
-            tip: [tx, ty, tz],
-            energy,
-            z,
-            error_estimate,
-        })
+        let (row, taken) = (rows.row(t, &state.state()), observer.taken);
+        Ok(BodyOutcome::new(status, (by, step_size, taken), &row, error_estimate))
+    }
+
+    /// The outcome of a motion that ends before its first step.
+    fn at_start(&self, motion: &BodyMotion) -> Result<BodyOutcome, RuntimeError> {
+        let lagrangian = self.lagrangian()?;
+        let state = motion.start(&lagrangian)?;
+        let by = match motion.step_control {
+            StepControl::Accuracy { by, .. } => by.unwrap_or(BodyMethod::default_for(self.torque.is_some())),
+            StepControl::Steps { by, .. } => by,
+        };
+        let row = Rows { lagrangian, tip: self.tip() }.row(motion.t, &state.state());
+        Ok(BodyOutcome::new(GroupStatus::Stopped { t: motion.t }, (by, 0.0, 0), &row, None))
     }
 
     /// Runs a motion and keeps its rows.
@@ -175,7 +181,7 @@ fn fingerprint(body: &Body, motion: &BodyMotion, by: AnyIntegrator, count: usize
     let mut digest = Digest::new();
     // The steps may be given, or have been found for an accuracy.
     let steps = StepControl::Steps { by, steps: Steps::Count(count) };
-    let BodyMotion { t, attitude, omega, z, end, step_control: _, rows, events } = motion;
+    let BodyMotion { t, attitude, omega, z, end, step_control: _, rows, events, interrupt: _ } = motion;
     // An expression has no text that is the same in all processes.
     let events: Vec<_> = events.iter().map(|event| (event.direction, event.terminal)).collect();
     // Writing to a digest does not fail.

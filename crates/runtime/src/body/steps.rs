@@ -1,7 +1,7 @@
 //! The steps and the start of a motion of a rigid body.
 
 use super::BodyMotion;
-use super::integrator::{BodyIntegrator, ForcedBody};
+use super::integrator::{BodyMethod, ForcedBody};
 use crate::{RuntimeError, StepControl};
 use contact_geom::groups::{GroupError, GroupForce, RigidBody, Rotation, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
@@ -29,25 +29,27 @@ impl BodyMotion {
         }
         match self.step_control {
             StepControl::Accuracy { error, by } => {
-                let by = by.unwrap_or(BodyIntegrator::default_for(is_forced));
-                BodyIntegrator::check(by, is_forced)?;
+                let by = by.unwrap_or(BodyMethod::default_for(is_forced));
+                BodyMethod::check(by, is_forced)?;
                 if !(error > 0.0 && error.is_finite()) {
                     return Err(RuntimeError::argument(
                         "accuracy",
                         format!("is {error}; it must be a positive number"),
                     ));
                 }
-                let method = |h: f64| BodyIntegrator::new(body, by, h);
+                let method = |h: f64| BodyMethod::integrator(body, by, h, self.interrupt.as_ref());
                 let found = group_steps(start, span, error, FIRST_STEPS, method);
                 let found = found.map_err(|error| match error {
-                    GroupError::Accuracy { .. } => RuntimeError::argument("accuracy", format!("is refused: {error}")),
+                    GroupError::Accuracy { .. } | GroupError::Budget { .. } => {
+                        RuntimeError::argument("accuracy", format!("is refused: {error}"))
+                    }
                     error => of_integrator(&error),
                 })?;
                 Ok((by, found.steps, Some(found.error)))
             }
             StepControl::Steps { steps: Steps::Count(0), .. } => Err(InputError::NoSteps.into()),
             StepControl::Steps { by, steps } => {
-                BodyIntegrator::check(by, is_forced)?;
+                BodyMethod::check(by, is_forced)?;
                 let count = match steps {
                     Steps::Count(count) => count as f64,
                     Steps::Size(h) if h > 0.0 && h.is_finite() => {
@@ -93,6 +95,7 @@ impl BodyMotion {
 /// The error of an integrator or of its step.
 pub(super) fn of_integrator(error: &GroupError) -> RuntimeError {
     let argument = match error {
+        GroupError::Interrupted => return InputError::Interrupted.into(),
         GroupError::NeedsComposition { .. } | GroupError::Stages { .. } => "integrator",
         _ => "step",
     };

@@ -21,7 +21,10 @@ const NAMES: [&str; 7] = ["q_w", "q_x", "q_y", "q_z", "omega1", "omega2", "omega
 /// # Ok::<(), herglotz_runtime::RuntimeError>(())
 /// ```
 #[derive(Clone)]
-pub struct BodyTorque(Arc<[(String, Expression); 3]>);
+pub struct BodyTorque(Arc<Components>);
+
+/// The components with their texts, and the times of their kinks and jumps.
+struct Components([(String, Expression); 3], Vec<f64>);
 
 impl BodyTorque {
     /// The torque whose components along the axes of the body are expressions in the time t, the attitude q_w, q_x, q_y,
@@ -29,7 +32,8 @@ impl BodyTorque {
     ///
     /// # Errors
     /// [`RuntimeError::Formula`] with the position in the text; [`RuntimeError::Argument`] for derivatives and quantities
-    /// that a torque has not.
+    /// that a torque has not. Steps end at its kinks and jumps at times that the text names, as at those of
+    /// `if(t > 2, if(t < 2.1, 50, 0), 0)`.
     pub fn parse(components: [&str; 3]) -> Result<Self, RuntimeError> {
         let names = Formula::parse("0", &NAMES, &[])?;
         let parsed = |text: &str| -> Result<(String, Expression), RuntimeError> {
@@ -49,12 +53,22 @@ impl BodyTorque {
             }
         };
         let [a, b, c] = components;
-        Ok(BodyTorque(Arc::new([parsed(a)?, parsed(b)?, parsed(c)?])))
+        let components = [parsed(a)?, parsed(b)?, parsed(c)?];
+        let mut breaks = Vec::new();
+        for (_, component) in &components {
+            breaks.extend(component.breaks()?);
+        }
+        Ok(BodyTorque(Arc::new(Components(components, breaks))))
+    }
+
+    /// The times of kinks and jumps that the text names.
+    pub(super) fn breaks(&self) -> &[f64] {
+        &self.0.1
     }
 
     /// The three components, as they are written.
     pub fn text(&self) -> [&str; 3] {
-        self.0.each_ref().map(|(text, _)| text.as_str())
+        self.0.0.each_ref().map(|(text, _)| text.as_str())
     }
 }
 
@@ -76,7 +90,7 @@ impl GroupForce<Rotations, 3> for BodyTorque {
     fn value<T: Scalar>(&self, t: T, g: &Rotation<T>, omega: &SVector<T, 3>, z: T) -> SVector<T, 3> {
         let q = [g.w, g.u[0], g.u[1], g.u[2], omega[0], omega[1], omega[2]];
         let rest = [T::zero(); NAMES.len()];
-        let [a, b, c] = self.0.each_ref().map(|(_, function)| function.at(t, &q, &rest, z));
+        let [a, b, c] = self.0.0.each_ref().map(|(_, function)| function.at(t, &q, &rest, z));
         SVector::from([a, b, c])
     }
 }
