@@ -114,7 +114,8 @@ impl BodyScene {
             return Err(SceneError::at(text, scales.span(), message));
         }
         if let Some(breaks) = &run.breaks {
-            let message = "a rigid body has no formula that could jump in time; remove `breaks`";
+            let message = "steps of a rigid body end at the times that its `torque` names, as in `if(t > 2, 50, 0)`; \
+                           remove `breaks`";
             return Err(SceneError::at(text, breaks.span(), message));
         }
         let end = finite(text, &run.time, "time")?;
