@@ -320,7 +320,7 @@ fn ensemble(problem: &Problem, system: &System, name: &str, bound: f64) -> Resul
     let members: Vec<Problem> = values.iter().map(|value| problem.with(name, *value)).collect();
     let truths: Option<Vec<_>> = members.iter().map(|member| conditioned(member, &[])).collect();
     let Some(truths) = truths else { return Err(Sensitive) };
-    let start = |_: usize| problem.motion(system).start;
+    let start = |i: usize| members[i].motion(system).start;
     let of_member = |i: usize| vec![values[i]];
     let names = [name];
     let request = Ensemble {
