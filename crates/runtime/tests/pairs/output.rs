@@ -268,7 +268,7 @@ fn slopes(problem: &Problem, name: &str, times: &[f64]) -> Option<Vec<f64>> {
     // Differences of two lengths agree where nothing in between is touched.
     let wide: Vec<f64> = a.iter().zip(&d).map(|(a, d)| (d - a) / (4.0 * h)).collect();
     let narrow: Vec<f64> = b.iter().zip(&c).map(|(b, c)| (c - b) / (2.0 * h)).collect();
-    let close = wide.iter().zip(&narrow).all(|(a, b)| (a - b).abs() < 2e-5 * (1.0 + a.abs()));
+    let close = wide.iter().zip(&narrow).all(|(a, b)| (a - b).abs() < 1e-5 * (1.0 + a.abs()));
     close.then(|| wide.iter().zip(&narrow).map(|(wide, narrow)| (4.0 * narrow - wide) / 3.0).collect())
 }
 
