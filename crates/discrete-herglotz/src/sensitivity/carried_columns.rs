@@ -52,17 +52,15 @@ impl<'r, 'p> CarriedColumns<'r, 'p> {
 
     /// Carries the columns over a step, the k-th of the run, which ends at the time `end`; returns their largest component.
     pub fn push(&mut self, step: &TakenStep, end: f64, k: usize) -> Result<f64, SensitivityError> {
-        if let Some(jump) = step.start_time().and_then(|t| self.jumps.at_start(t, k))
-            && let Some(at) = step.start()
-        {
-            let times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
-            self.push_over(jump, &at, &times, k)?;
-        }
         match step {
-            TakenStep::Whole(step) => {
-                self.rows_within(step, end, None, k)?;
+            TakenStep::Whole(whole) => {
+                if let (Some(jump), Some(at)) = (self.jumps.at_start(whole.start().0, k), step.start()) {
+                    let times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
+                    self.push_over(jump, &at, &times, k)?;
+                }
+                self.rows_within(whole, end, None, k)?;
                 let failed = |cause| SensitivityError::Step { step: k, cause };
-                self.engine.push(step, k, &mut self.columns).map_err(failed)
+                self.engine.push(whole, k, &mut self.columns).map_err(failed)
             }
             TakenStep::Parts(parts) => self.push_parts(parts, k),
         }

@@ -12,7 +12,7 @@ use crate::sensitivity::linear_stages::{
     Inhomogeneity, LinearStages, StageTangent, add_product, product, subtract_product,
 };
 use crate::sensitivity::parametric_system::{Differentiable, Quantities, Quantity};
-use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value};
+use crate::sensitivity::stage_derivatives::{StageDerivatives, end_value, stage_values};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
 use crate::{Point, StepError};
 use contact_geom::numbers::max_or_nan;
@@ -35,6 +35,8 @@ pub(crate) struct Engine<'a> {
     /// The map of the actions of the stages forward, for constant rate.
     actions: Option<StageMap>,
     arch: Instructions,
+    /// Whether the steps are shortened ones or parts, which may have any length.
+    is_part: bool,
 }
 
 impl<'a> Engine<'a> {
@@ -54,6 +56,7 @@ impl<'a> Engine<'a> {
             of_parameters: problem.stages.quantities(),
             timed: !structure.autonomous,
             arch: Instructions::new(),
+            is_part: false,
             problem: problem.clone(),
         }
     }
@@ -68,6 +71,7 @@ impl<'a> Engine<'a> {
         let engine = engine.get_or_insert_with(|| Engine::new(problem, step.s, step.h, direction));
         engine.forward = StepMaps::new(step.s, step.h, Direction::Forward);
         engine.maps = StepMaps::new(step.s, step.h, direction);
+        engine.is_part = true;
         engine.linear.forget();
         engine.actions = None;
         engine
@@ -134,13 +138,27 @@ impl<'a> Engine<'a> {
         if fraction != 0.0 {
             given.has_r = true;
             let (at_q, l_v, q0, p0) = (&at.q[..n], &at.l_v[..n], &step.start.q[..n], &step.start.p[..n]);
-            for i in 0..s {
+            if self.is_part {
+                // A part may be so short that the state changes by its round-off: the changes are those by the rates.
+                let (v, force) = (&at.v[..n], &step.force[..n]);
+                let change = |rates: &Stages| stage_values::<S>(&self.forward, rates, 0.0);
                 for d in 0..n {
-                    given_q[d].0[i] += fraction * (at_q[d].0[i] - q0[d]);
-                    given_p[d].0[i] += fraction * (at.rho.0[i] * l_v[d].0[i] - p0[d]);
+                    let (of_q, of_p) = (change(&v[d]), change(&force[d]));
+                    given_q[d] = of_q.map(|x| q[d] + fraction * x);
+                    given_p[d] = of_p.map(|x| p[d] + fraction * x);
                 }
-                given.z.0[i] += fraction * (at.z.0[i] - step.start.z);
-                given.r.0[i] = fraction * (at.rho.0[i] - 1.0);
+                let of_z = change(&at.l);
+                given.z = of_z.map(|x| column.z + fraction * x);
+                given.r = change(&step.rate).map(|fallen| -fraction * fallen);
+            } else {
+                for i in 0..s {
+                    for d in 0..n {
+                        given_q[d].0[i] += fraction * (at_q[d].0[i] - q0[d]);
+                        given_p[d].0[i] += fraction * (at.rho.0[i] * l_v[d].0[i] - p0[d]);
+                    }
+                    given.z.0[i] += fraction * (at.z.0[i] - step.start.z);
+                    given.r.0[i] = fraction * (at.rho.0[i] - 1.0);
+                }
             }
         }
         if column.warm {
@@ -148,7 +166,9 @@ impl<'a> Engine<'a> {
         }
         self.linear.solve::<S>(&self.maps, &self.given, &mut column.rates)?;
         let (rates, maps) = (&column.rates, &self.maps);
-        let (rho, scaled) = (self.at.end_rho, end_value::<S>(maps, &rates.r_rate) + fraction * (self.at.end_rho - 1.0));
+        let rho = self.at.end_rho;
+        let grown = if self.is_part { -end_value::<S>(&self.forward, &step.rate) } else { rho - 1.0 };
+        let scaled = end_value::<S>(maps, &rates.r_rate) + fraction * grown;
         let (q, p, end_p) = (&mut column.q[..n], &mut column.p[..n], &self.at.end_p[..n]);
         let (of_q, of_p, v, force) = (&rates.v[..n], &rates.p_rate[..n], &step.v[..n], &step.force[..n]);
         for d in 0..n {

@@ -5,7 +5,7 @@
 //! the derivative in the time of the end, which is passed on: to the times of the run, or at the zero of a switching
 //! function to the function, as a multiple of its own derivatives carried back over the same part.
 
-use crate::integration::{PartEnd, SolvedPart};
+use crate::integration::{PartEnd, PartPoint, SolvedPart};
 use crate::run::discretization::Discretization;
 use crate::sensitivity::SensitivityError;
 use crate::sensitivity::columns::Covector;
@@ -46,11 +46,16 @@ impl<'p> PartCovectors<'_, 'p> {
                 *time = -along;
             }
         }
-        let jumps = self.jumps.in_parts(parts, k);
-        for ((i, part), jump) in parts.iter().enumerate().zip(jumps).rev() {
+        let passed = self.jumps.passed(parts, k);
+        let after = |i: Option<usize>| passed.iter().filter(move |(place, _)| *place == i).map(|(_, jump)| *jump);
+        for (i, part) in parts.iter().enumerate().rev() {
+            for jump in after(Some(i)) {
+                self.pull_over_jump(jump, &part.next, all, &mut times).map_err(failed)?;
+            }
+            let at_end = after(Some(i)).next().filter(|_| part.end == PartEnd::Break);
             // A row at the end of a part is one before the passage there, at a fixed time.
             let row = if i + 1 < parts.len() { rows.take_at(&part.to).map_err(failed)? } else { None };
-            self.pull_part(engine, (part, jump, k), all, &mut times)?;
+            self.pull_part(engine, (part, at_end, k), all, &mut times)?;
             let (Some(first), Some(time)) = (all.first_mut(), times.first_mut()) else { continue };
             if let Some(mut row) = row {
                 self.pull_over(engine, part, std::slice::from_mut(&mut row)).map_err(failed)?;
@@ -62,14 +67,17 @@ impl<'p> PartCovectors<'_, 'p> {
                 *time += rows.add_within(engine, step, first).map_err(failed)?;
             }
         }
+        if let Some(first) = parts.first() {
+            after(None).try_for_each(|jump| self.pull_over_jump(jump, &first.from, all, &mut times)).map_err(failed)?;
+        }
         for (covector, time) in all.iter_mut().zip(&times) {
             covector.add_time(*time, k);
         }
         Ok(())
     }
 
-    /// Carries covectors at the start of a step, the k-th of the run, over a jump in time there, and adds that of a row
-    /// before it.
+    /// Carries covectors at the start of a step, the k-th of the run, over a jump in time there, unless the step has parts,
+    /// and adds that of a row before it.
     pub fn pull_at_start(
         &self,
         step: &TakenStep,
@@ -78,19 +86,30 @@ impl<'p> PartCovectors<'_, 'p> {
         rows: &mut RowCovectors<'_, 'p>,
     ) -> Result<(), StepError> {
         let Some(t) = step.start_time() else { return Ok(()) };
-        let jump = self.jumps.at_start(t, k);
+        let jump = self.jumps.at_start(t, k).filter(|_| matches!(step, TakenStep::Whole(_)));
         let Some(at) = step.start().filter(|_| jump.is_some() || rows.is_next(t)) else { return Ok(()) };
         if let Some(jump) = jump {
-            let of = self.jumps.derivatives(jump, &at, &self.parameters(), true)?;
-            for covector in all.iter_mut() {
-                let of_time = of.pull(covector);
-                covector.add_time(of_time, k);
-            }
+            let mut times = vec![0.0; all.len()];
+            self.pull_over_jump(jump, &at, all, &mut times)?;
+            all.iter_mut().zip(times).for_each(|(covector, time)| covector.add_time(time, k));
         }
         match all.first_mut() {
             Some(first) => rows.add_at_start(&at, k, first),
             None => Ok(()),
         }
+    }
+
+    /// Carries covectors back over a jump in time at a point; `times` are their derivatives in the time of this point.
+    fn pull_over_jump(
+        &self,
+        jump: TimeJump,
+        at: &PartPoint,
+        all: &mut [Covector],
+        times: &mut [f64],
+    ) -> Result<(), StepError> {
+        let of = self.jumps.derivatives(jump, at, &self.parameters(), true)?;
+        all.iter_mut().zip(times).for_each(|(covector, time)| *time += of.pull(covector));
+        Ok(())
     }
 
     /// The indices of all parameters.
@@ -109,17 +128,8 @@ impl<'p> PartCovectors<'_, 'p> {
         let failed = |cause| SensitivityError::Step { step: k, cause };
         let (problem, t, h) = (self.problem, part.to.t, self.steps.h);
         let mut gradient = None;
-        let of_jump = match jump {
-            None => None,
-            Some(jump) => {
-                let moves = part.end != PartEnd::Break;
-                let of = self.jumps.derivatives(jump, &part.next, &self.parameters(), moves).map_err(failed)?;
-                for (covector, time) in all.iter_mut().zip(&mut *times) {
-                    *time += of.pull(covector);
-                }
-                Some(of)
-            }
-        };
+        let of_jump = jump.map(|jump| self.jumps.derivatives(jump, &part.next, &self.parameters(), false));
+        let of_jump = of_jump.transpose().map_err(failed)?;
         if let PartEnd::Switch { index, rising, passage } = part.end {
             let switch = Switch { problem, index, rising, at: &part.to, step: k, h };
             if let Some(change) = switch.passage(passage, &part.next)? {
@@ -178,14 +188,14 @@ impl<'p> PartCovectors<'_, 'p> {
         part: &SolvedPart,
         all: &mut [Covector],
     ) -> Result<(), StepError> {
-        match &part.step {
+        match part.step.as_ref().filter(|_| !self.jumps.is_at_once(part)) {
             Some(step) => {
                 // The rates of the step after it are those of another length.
                 all.iter_mut().for_each(|covector| covector.set_state(covector.state()));
                 self.tangent.pull(engine, self.problem, step, all)
             }
             None => {
-                let rates = part.from.rates(self.jumps.after(part.from.t), self.steps)?;
+                let rates = self.jumps.rates_at_once(part)?;
                 all.iter_mut().for_each(|covector| covector.pull_at_once(&rates));
                 Ok(())
             }

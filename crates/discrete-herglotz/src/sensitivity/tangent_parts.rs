@@ -21,8 +21,19 @@ impl CarriedColumns<'_, '_> {
     pub(super) fn push_parts(&mut self, parts: &[SolvedPart], k: usize) -> Result<f64, SensitivityError> {
         // The derivatives of the time at the start of each part.
         let mut times: Vec<f64> = self.columns.iter().map(|column| column.time_after(k)).collect();
-        for ((i, part), jump) in parts.iter().enumerate().zip(self.jumps.in_parts(parts, k)) {
-            self.push_part((part, jump), (k, i + 1 == parts.len()), &mut times)?;
+        let passed = self.jumps.passed(parts, k);
+        let after = |i: Option<usize>| passed.iter().filter(move |(place, _)| *place == i).map(|(_, jump)| *jump);
+        if let Some(first) = parts.first() {
+            after(None).try_for_each(|jump| self.push_over(jump, &first.from, &times, k))?;
+        }
+        for (i, part) in parts.iter().enumerate() {
+            // The part ends at the time of the jump, unless parts without a length follow.
+            let at_end = after(Some(i)).next().filter(|_| part.end == PartEnd::Break);
+            self.push_part((part, at_end), (k, i + 1 == parts.len()), &mut times)?;
+            after(Some(i)).try_for_each(|jump| self.push_over(jump, &part.next, &times, k))?;
+            if i + 1 < parts.len() {
+                self.stretch(part, &mut times).map_err(|cause| SensitivityError::Step { step: k, cause })?;
+            }
         }
         // Where something happens at the end of the step itself, the state after it is that at the time of the passage.
         if let Some(last) = parts.last().filter(|last| last.end != PartEnd::Step) {
@@ -50,10 +61,10 @@ impl CarriedColumns<'_, '_> {
         let mut fixed: Vec<Column> =
             self.columns.iter().zip(&*times).map(|(column, dt)| column.to_fixed_time(*dt)).collect();
         fixed.push(Column::of_length(problem.dimension()));
-        match &part.step {
+        match part.step.as_ref().filter(|_| !self.jumps.is_at_once(part)) {
             Some(step) => self.row_engine.push(&mut self.engine, problem, step, &mut fixed).map_err(failed)?,
             None => {
-                let rates = part.from.rates(self.jumps.after(part.from.t), steps).map_err(failed)?;
+                let rates = self.jumps.rates_at_once(part).map_err(failed)?;
                 fixed.iter_mut().for_each(|column| column.push_at_once(&rates));
             }
         }
@@ -98,10 +109,7 @@ impl CarriedColumns<'_, '_> {
             let state = change.as_ref().map_or_else(|| fixed.state(), |change| change.along(&fixed, *dt));
             column.set_state(state);
         }
-        if let Some(jump) = jump {
-            self.push_over(jump, &part.next, times, k)?;
-        }
-        if is_last { Ok(()) } else { self.stretch(part, times).map_err(failed) }
+        Ok(())
     }
 
     /// Makes the columns orthonormal at the end of a part, at its fixed time, if they are a frame; `times` are the
@@ -109,7 +117,7 @@ impl CarriedColumns<'_, '_> {
     fn stretch(&mut self, part: &SolvedPart, times: &mut [f64]) -> Result<(), StepError> {
         let Some(stretching) = &mut self.stretching else { return Ok(()) };
         let t = part.next.t;
-        let rates = part.next.rates(self.jumps.after(t), self.steps)?;
+        let rates = part.next.rates(t, self.steps)?;
         for (column, dt) in self.columns.iter_mut().zip(&*times) {
             column.set_state(column.state().minus(&rates.scale(*dt)));
         }

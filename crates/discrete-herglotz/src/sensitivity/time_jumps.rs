@@ -29,6 +29,10 @@ const SAME_RATE: f64 = 1e-9;
 /// three such rates are extrapolated to the time 0 to round-off.
 const APART: f64 = 1e-6;
 
+/// The distance in time of the first of three points from which rates are extrapolated to a surface, in units of a step:
+/// the motion between them is straight to round-off.
+const SHORTLY: f64 = 1e-7;
+
 /// The smallest change of a parameter for this, relative to its value: a multiple of its round-off.
 const LEAST_CHANGE: f64 = 1e-11;
 
@@ -104,7 +108,7 @@ impl<'r, 'p> TimeJumps<'r, 'p> {
     }
 
     /// Those at the ends of the parts of a step, the k-th of the run, without those at its start and at its end.
-    pub fn in_parts(&self, parts: &[SolvedPart], k: usize) -> Vec<Option<TimeJump>> {
+    fn in_parts(&self, parts: &[SolvedPart], k: usize) -> Vec<Option<TimeJump>> {
         let Some(start) = parts.first().map(|part| part.from.t).filter(|_| !self.problem.system().breaks().is_empty())
         else {
             return parts.iter().map(|_| None).collect();
@@ -131,10 +135,45 @@ impl<'r, 'p> TimeJumps<'r, 'p> {
         self.at_start(t, 1).map_or(t, |jump| jump.first - self.ahead(SIDE_DISTANCE * self.spacing(t)))
     }
 
-    /// The time at which the rates over a part of length zero are evaluated: after a jump there, over which it was carried
-    /// before.
-    pub fn after(&self, t: f64) -> f64 {
-        self.at_start(t, 1).map_or(t, |jump| jump.last + self.ahead(SIDE_DISTANCE * self.spacing(t)))
+    /// The jumps in the parts of a step, the k-th of the run, each with the number of the part after whose end it is passed;
+    /// `None` for one at the start, before all parts. Where parts without a length follow, it is passed after them.
+    pub fn passed(&self, parts: &[SolvedPart], k: usize) -> Vec<(Option<usize>, TimeJump)> {
+        let ends = self.in_parts(parts, k).into_iter().enumerate().map(|(i, jump)| (Some(i), jump));
+        let start = parts.first().and_then(|first| self.at_start(first.from.t, k));
+        let all = [(None, start)].into_iter().chain(ends).filter_map(|(place, jump)| Some((place, jump?)));
+        let delayed = |place: Option<usize>| {
+            let next = place.map_or(0, |i| i + 1);
+            let at_once = parts.iter().skip(next).take_while(|part| self.is_at_once(part)).count();
+            (next + at_once).checked_sub(1)
+        };
+        all.map(|(place, jump)| (delayed(place), jump)).collect()
+    }
+
+    /// Whether a part has the length zero, or one that is round-off: its tangent is that of the rates at its start.
+    pub fn is_at_once(&self, part: &SolvedPart) -> bool {
+        let longest = self.spacing(part.from.t).max(self.spacing(part.to.t));
+        part.step.is_none() || (part.to.t - part.from.t).abs() <= 2.0 * longest
+    }
+
+    /// The rates over such a part, on the side of the surfaces through its point on which the motion is: before one that it
+    /// passes at its end, otherwise after those that it has passed. A jump in time there is passed after such parts.
+    pub fn rates_at_once(&self, part: &SolvedPart) -> Result<Components, StepError> {
+        let at = &part.from;
+        let direction = match part.end {
+            PartEnd::Switch { .. } => -1.0,
+            _ if self.at_start(at.t, 1).is_some() => return at.rates(self.before(at.t), self.steps),
+            _ => 1.0,
+        };
+        let here = at.rates(at.t, self.steps)?;
+        let mut sum = Components::zeros(self.problem.dimension());
+        for (weight, times) in WEIGHTS.into_iter().zip([1.0, 2.0, 3.0]) {
+            let by = direction * times * SHORTLY * self.steps.h;
+            let State { q, p, z } = &at.state;
+            let state = State { q: q + &here.x * by, p: p + &here.y * by, z: z + here.z * by };
+            let moved = PartPoint { t: at.t + by, state, v: at.v.clone() };
+            sum = sum.plus(&moved.rates(moved.t, self.steps)?.scale(weight));
+        }
+        Ok(sum)
     }
 
     /// Their derivatives in some parameters at a point of the motion, with the change of the rates where it is wanted.
