@@ -29,7 +29,7 @@ fn check(formula: &Formula, parameter: &str, value: f64, motion: &Motion, tolera
         let system = system.with_parameters(&[(parameter, value)]).unwrap();
         system.sensitivity(&motion, &["x"], &times, &mut ()).unwrap().states
     };
-    for k in 0..names.len() {
+    for (k, name) in names.iter().enumerate() {
         let h = if k == 2 { 1e-3 * value } else { 1e-4 };
         let [a, b, c, d] = [-2.0 * h, -h, h, 2.0 * h].map(|by| states(k, by));
         for i in 0..times.len() {
@@ -37,7 +37,7 @@ fn check(formula: &Formula, parameter: &str, value: f64, motion: &Motion, tolera
             let of_v = (a[i].v[0] - 8.0 * b[i].v[0] + 8.0 * c[i].v[0] - d[i].v[0]) / (12.0 * h);
             let (column, size) = (&found.rows[i][k], of_x.abs().max(of_v.abs()).max(1.0));
             let error = (column.q[0] - of_x).abs().max((column.v[0] - of_v).abs());
-            assert!(error <= tolerance * size, "d{i}/d{}: {column:?} for {of_x}, {of_v}", names[k]);
+            assert!(error <= tolerance * size, "d{i}/d{name}: {column:?} for {of_x}, {of_v}");
         }
     }
     let mut loss = |_: &[_]| {
