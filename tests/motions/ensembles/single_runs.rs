@@ -37,8 +37,9 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
             }
             let problem = Problem::new(lagrangian, 0.0, start(member.index)).unwrap();
             let h = 5.0 / steps as f64;
-            let mut own =
-                integrator.stepper(&problem, h, StepperOptions { action: true, check_resolution: false }).unwrap();
+            let mut own = integrator
+                .stepper(&problem, h, StepperOptions { action: true, check_resolution: false, parts: false })
+                .unwrap();
             own.advance(steps).unwrap();
             let ending = member.ending.as_ref().unwrap();
             assert_eq!((ending.status, ending.steps, ending.t), (Status::Completed, steps, own.time()), "{name}");

@@ -30,17 +30,21 @@ fn by_gauss(stages: usize, h: f64) -> StepControl {
     StepControl::Steps { by: AnyIntegrator::Gauss { stages }, steps: Steps::Size(h) }
 }
 
+/// The text of a Hamiltonian, with q and p at the start, the final time, and q and p there.
+type HamiltonianCase = (&'static str, &'static [f64], &'static [f64], f64, &'static [f64], &'static [f64]);
+
 /// By steps and by accuracy, against exact motions.
 #[test]
 fn kinks_and_jumps_of_a_hamiltonian_are_located() {
-    let c = 0.4_f64.sqrt();
-    let r = std::f64::consts::SQRT_2;
+    // The root of 0.4.
+    const C: f64 = 0.632_455_532_033_675_9;
+    const R: f64 = std::f64::consts::SQRT_2;
     // A jump of the potential, over which H is conserved; a wall that is too high; a kink; a switch of a time-optimal
     // control, whose H is linear in p on each side; jumps and kinks in time.
-    let cases: [(&str, &[f64], &[f64], f64, &[f64], &[f64]); 7] = [
-        ("p_x^2/2 + if(x > 0.5, 0.3, 0)", &[0.0], &[1.0], 2.0, &[0.5 + 1.5 * c], &[c]),
+    let cases: [HamiltonianCase; 7] = [
+        ("p_x^2/2 + if(x > 0.5, 0.3, 0)", &[0.0], &[1.0], 2.0, &[0.5 + 1.5 * C], &[C]),
         ("p_x^2/2 + if(x > 0.5, 0.8, 0)", &[0.0], &[1.0], 2.0, &[-1.0], &[-1.0]),
-        ("p_x^2/2 + abs(x)", &[-1.0], &[0.0], 1.5 * r, &[0.75], &[0.5 * r]),
+        ("p_x^2/2 + abs(x)", &[-1.0], &[0.0], 1.5 * R, &[0.75], &[0.5 * R]),
         ("p_x*y - abs(p_y)", &[1.0, 0.0], &[1.0, 1.0], 2.0, &[0.0, 0.0], &[1.0, -1.0]),
         ("p_x*if(x > 1, 0.5, 1)", &[0.0], &[1.0], 2.0, &[1.5], &[2.0]),
         ("p_x^2/2 - x*if(t > 0.37, if(t < 0.371, 1000, 0), 0)", &[0.0], &[0.0], 1.0, &[0.6295], &[1.0]),

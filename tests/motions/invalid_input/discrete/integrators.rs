@@ -100,7 +100,7 @@ fn integrators(report: &mut Report) {
         report.check(same || !constant_rate, || format!("{}: another rate", info.name));
     }
     let rule = Rule::MIDPOINT;
-    for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true }] {
+    for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true, parts: false }] {
         one(report, &rule, options);
         one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), options);
         for by in BY.into_iter().flatten() {
@@ -135,8 +135,15 @@ fn orders(report: &mut Report) {
 fn saved(report: &mut Report) {
     let start: PhasePoint<1> = *tame().state();
     for by in BY.into_iter().flatten() {
-        let stepper =
-            || Integrator::stepper(&by, &tame(), 0.1, StepperOptions { action: true, check_resolution: true }).unwrap();
+        let stepper = || {
+            Integrator::stepper(
+                &by,
+                &tame(),
+                0.1,
+                StepperOptions { action: true, check_resolution: true, parts: false },
+            )
+            .unwrap()
+        };
         let restores =
             |stepper: &mut Box<dyn Stepper>, words: &[u64]| stepper.run_support_mut().unwrap().restore(words);
         let mut first = stepper();

@@ -253,9 +253,13 @@ fn odd_observers(report: &mut Report) {
     report.check(last.1 == [outcome.steps] && outcome.status == Status::Completed, || format!("{outcome:?}"));
     let all = [(false, false), (false, true), (true, false), (true, true)];
     for (a, b) in all.into_iter().flat_map(|a| all.map(|b| (a, b))) {
-        let [of_a, of_b] =
-            [a, b].map(|(action, conformal_factor)| OutputRequest { action, conformal_factor, saved: false });
-        let both = OutputRequest { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false };
+        let [of_a, of_b] = [a, b].map(|(action, conformal_factor)| OutputRequest {
+            action,
+            conformal_factor,
+            saved: false,
+            derivatives: false,
+        });
+        let both = OutputRequest { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false, derivatives: false };
         report.check(of_a.and(of_b) == both, || format!("{of_a:?} and {of_b:?}"));
     }
 }
