@@ -2,17 +2,20 @@
 
 use crate::arrays::{matrix, numbers, value_error, vector};
 use crate::ensemble::{GivenStarts, Members};
+use crate::events::GivenEvent;
 use crate::motion::{self, GivenStepControl};
 use crate::sensitivity::loss_of;
 use crate::signals::with_signals;
 use crate::system::System;
-use herglotz_runtime::{EndCovector, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, Status};
+use herglotz_runtime::{
+    EndCovector, Ensemble, Event, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, Status,
+};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::sync::atomic::Ordering;
 
 /// The arguments of `ensemble` that members have in common: the system, the starts, the times of the rows, the step
-/// control, the parameters that vary and their values, and the number of threads.
+/// control, the parameters that vary and their values, the number of threads, and the events.
 type Given<'py> = (
     GivenStarts<'py>,
     Bound<'py, PyAny>,
@@ -20,13 +23,30 @@ type Given<'py> = (
     Vec<String>,
     Vec<Bound<'py, PyAny>>,
     Option<Bound<'py, PyAny>>,
+    Vec<GivenEvent<'py>>,
 );
 
-fn members(system: &System, given: Given<'_>) -> PyResult<(Members, Vec<f64>)> {
-    let (start, t, step_control, names, values, threads) = given;
-    let times = motion::times(&t)?;
-    let members = Members::new(system, start, &times, &step_control, names, &values, threads)?;
-    Ok((members, times))
+/// The members of a system with the resets of the events.
+struct Request {
+    members: Members,
+    times: Vec<f64>,
+    system: herglotz_runtime::System,
+    events: Vec<Event>,
+}
+
+impl Request {
+    fn new(system: &System, given: Given<'_>) -> PyResult<Self> {
+        let (start, t, step_control, names, values, threads, events) = given;
+        let times = motion::times(&t)?;
+        let members = Members::new(system, start, &times, &step_control, names, &values, threads)?;
+        let (system, events) = crate::events::events(events, system)?;
+        Ok(Request { members, times, system, events })
+    }
+
+    /// Calls a function with the system with the resets, and the ensemble with the events.
+    fn with<R>(&self, then: impl FnOnce(&herglotz_runtime::System, &Ensemble<'_>) -> R) -> R {
+        self.members.ensemble(|ensemble| then(&self.system, &Ensemble { events: &self.events, ..ensemble }))
+    }
 }
 
 /// Performs a computation with the interpreter lock released, and an interrupt that signals set.
@@ -44,7 +64,7 @@ fn interruptible<T: Send>(
     }
 }
 
-/// The reasons why members have no derivatives, by the index of the member.
+/// The reasons why members have no derivatives, or why these may be wrong, by the index of the member.
 type Troubles = Vec<(usize, String)>;
 
 /// The values of the losses; the gradients in q0, in v0 or p0, in z0, in the parameters, in t0 and in the final time; the
@@ -65,7 +85,8 @@ fn gradients(py: Python<'_>, system: &System, found: Vec<Result<LossGradient, Ru
     let (mut q, mut velocity, mut parameters, mut troubles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (index, member) in found.into_iter().enumerate() {
         match member {
-            Ok(LossGradient { loss: Some((value, gradient)), .. }) => {
+            Ok(LossGradient { loss: Some((value, gradient)), unresolved, .. }) => {
+                troubles.extend(unresolved.map(|unresolved| (index, unresolved.to_string())));
                 values.push(value);
                 q.extend(&gradient.q);
                 velocity.extend(&gradient.rate);
@@ -103,8 +124,8 @@ pub fn ensemble_pullback(
     parts: [Bound<'_, PyAny>; 3],
     z: Bound<'_, PyAny>,
 ) -> PyResult<Gradients> {
-    let (members, times) = members(system, given)?;
-    let (n, k) = (system.inner.dimension(), times.len());
+    let request = Request::new(system, given)?;
+    let (n, k) = (system.inner.dimension(), request.times.len());
     let [q, v, p] = &parts;
     let (q, v, p, z) = (numbers("q", q)?, numbers("v", v)?, numbers("p", p)?, numbers("z", &z)?);
     let loss = |index: usize, states: &[MotionState]| {
@@ -122,7 +143,7 @@ pub fn ensemble_pullback(
         (0.0, (0..states.len()).map(covector).collect())
     };
     let found = interruptible(py, |interrupt| {
-        members.ensemble(|ensemble| system.inner.ensemble_gradient(&ensemble, &times, &loss, Some(interrupt)))
+        request.with(|system, ensemble| system.ensemble_gradient(ensemble, &request.times, &loss, Some(interrupt)))
     })?;
     gradients(py, system, found)
 }
@@ -135,10 +156,10 @@ pub fn ensemble_value_and_gradient(
     given: Given<'_>,
     loss: &str,
 ) -> PyResult<Gradients> {
-    let (members, _) = members(system, given)?;
+    let request = Request::new(system, given)?;
     let expression = loss_of(&system.inner, loss)?;
     let found = interruptible(py, |interrupt| {
-        members.ensemble(|ensemble| system.inner.ensemble_end_gradient(&ensemble, &expression, Some(interrupt)))
+        request.with(|system, ensemble| system.ensemble_end_gradient(ensemble, &expression, Some(interrupt)))
     })?;
     gradients(py, system, found)
 }
@@ -155,17 +176,18 @@ pub fn ensemble_sensitivity(
     given: Given<'_>,
     variables: Vec<String>,
 ) -> PyResult<Sensitivities> {
-    let (members, times) = members(system, given)?;
+    let request = Request::new(system, given)?;
     let names: Vec<&str> = variables.iter().map(String::as_str).collect();
     let found = interruptible(py, |interrupt| {
-        members.ensemble(|ensemble| system.inner.ensemble_sensitivity(&ensemble, &names, &times, Some(interrupt)))
+        request.with(|system, ensemble| system.ensemble_sensitivity(ensemble, &names, &request.times, Some(interrupt)))
     })?;
-    let (n, rows) = (system.inner.dimension(), times.len() * names.len());
+    let (n, rows) = (system.inner.dimension(), request.times.len() * names.len());
     let (mut parts, mut z) = ([const { Vec::new() }; 3], Vec::new());
     let (mut growths, mut troubles) = (Vec::new(), Vec::new());
     for (index, member) in found.into_iter().enumerate() {
         match member {
-            Ok(Sensitivity { status: Status::Completed, rows, growth, .. }) => {
+            Ok(Sensitivity { status: Status::Completed, rows, growth, unresolved, .. }) => {
+                troubles.extend(unresolved.map(|unresolved| (index, unresolved.to_string())));
                 for state in rows.iter().flatten() {
                     for (all, x) in parts.iter_mut().zip([&state.q, &state.v, &state.p]) {
                         all.extend_from_slice(x);

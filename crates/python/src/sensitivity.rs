@@ -3,7 +3,7 @@
 use crate::arrays::{matrix, named, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use herglotz_runtime::{EndCovector, Expression, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status};
+use herglotz_runtime::{EndCovector, Expression, Gradient, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -59,14 +59,17 @@ pub fn sensitivity(py: Python<'_>, motion: &Motion, variables: Vec<String>, time
     Ok((parts, matrix(py, z, names.len())?, found.growth))
 }
 
-/// A gradient: in q0, in v0 or p0, in z0, in the parameters, in t0 and in the final time; and the growth.
-type Slopes = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, f64, Vec<f64>, f64, f64, f64);
+/// A gradient: in q0, in v0 or p0, in z0, in the parameters, in t0 and in the final time; the growth; and
+/// the reason why the steps do not resolve the motion.
+type Slopes = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, f64, Vec<f64>, f64, f64, f64, Option<String>);
 
 /// The value and the gradient of a completed motion.
 fn slopes(py: Python<'_>, found: LossGradient) -> PyResult<(f64, Slopes)> {
     let Some((value, gradient)) = found.loss else { return Err(not_completed(&found.status)) };
     let (q, velocity) = (vector(py, gradient.q.to_vec()), vector(py, gradient.rate.to_vec()));
-    Ok((value, (q, velocity, gradient.z, gradient.parameters, gradient.t0, gradient.t_end, gradient.growth)))
+    let unresolved = found.unresolved.map(|unresolved| unresolved.to_string());
+    let Gradient { z, parameters, t0, t_end, growth, .. } = gradient;
+    Ok((value, (q, velocity, z, parameters, t0, t_end, growth, unresolved)))
 }
 
 /// The gradient of a number with given partial derivatives in q, v, p and z at some times, row by row.

@@ -53,6 +53,23 @@ def test_a_batch_loss():
     assert abs(slopes.parameters["gamma"].sum() - (near[0] - near[1]) / 2e-5) <= 1e-7 * np.abs(slopes.parameters["gamma"]).sum()
 
 
+def test_resets_are_those_of_members():
+    given = dict(coordinates=["x"], accuracy=1e-9, events=hz.Event("x", "falling", reset={"x'": "-e*x'"}))
+    q, e = np.array([[1.0], [0.9], [0.8]]), np.array([0.8, 0.7, 0.6])
+    ball, start = "x'^2/2 - 9.81*x", (q, 0 * q, 1.0)
+    many = hz.ensemble(ball, *start, parameters={"e": e}, **given)
+    values, slopes = hz.ensemble_value_and_grad("x")(ball, *start, parameters={"e": e}, **given)
+    pulled, along = many.pullback(q=np.ones((3, 1))), many.sensitivity(["x", "e"])
+    assert slopes.troubles == pulled.troubles == along.troubles == {}
+    for i in range(3):
+        one = hz.solve(ball, q[i], [0.0], 1.0, parameters={"e": e[i]}, **given)
+        value, expected = hz.value_and_grad("x")(ball, q[i], [0.0], 1.0, parameters={"e": e[i]}, **given)
+        assert values[i] == value == one.q[-1, 0] and slopes.q0[i] == pulled.q0[i] == expected.q0
+        assert slopes.parameters["e"][i] == pulled.parameters["e"][i] == expected.parameters["e"]
+        # Forward derivatives are those of the adjoint to round-off.
+        assert np.allclose(along.q[i, -1, 0], [expected.q0[0], expected.parameters["e"]], rtol=1e-12, atol=0)
+
+
 def test_momenta_and_no_parameters():
     many = hz.ensemble("x'^2/2 - x^2/2 - z/10", Q, None, 2.0, p0=V, **GIVEN)
     slopes = many.pullback(q=np.ones((M, 1)))
@@ -70,8 +87,11 @@ def test_members_that_fail_have_a_reason():
 
 
 SAID = {
-    "a terminal event": (lambda: ensemble(events=hz.Event("x", terminal=True)).sensitivity("x"), "terminal or changes the state"),
-    "a reset": (lambda: ensemble(events=hz.Event("x", reset={"x'": "-x'"})).pullback(z=np.ones(M)), "terminal or changes the state"),
+    "a terminal event": (lambda: ensemble(events=hz.Event("x", terminal=True)).sensitivity("x"), "has a terminal event"),
+    "a terminal event of a loss": (
+        lambda: hz.ensemble_value_and_grad("x")(L, Q, V, 1.0, parameters=PARAMETERS, events=hz.Event("x", terminal=True), **GIVEN),
+        "has a terminal event",
+    ),
     "an unknown variable": (lambda: ensemble().sensitivity("kk"), "no variable `kk`"),
     "a number": (lambda: ensemble().sensitivity([1]), "must be a name"),
     "a shape": (lambda: ensemble().pullback(q=np.ones((M, 2))), r"`q` has the shape .*it must be \(20, 2, 1\)"),

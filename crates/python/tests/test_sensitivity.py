@@ -204,6 +204,64 @@ def test_a_kink():
     close(sol.pullback(q=[1.0]).q0, [1 - rest**2 / 2 - 2.5 * rest], 1e-12)
 
 
+BOUNCING = dict(coordinates=["x"], parameters={"e": 0.8, "g": 9.81}, events=hz.Event("x", "falling", reset={"x'": "-e*x'"}))
+
+
+def test_a_loss_of_a_motion_with_a_reset():
+    """A ball from the height 1: it falls in sqrt(2/g), and rises with e sqrt(2 g)."""
+    e, g = 0.8, 9.81
+    value, slopes = hz.value_and_grad("x")("x'^2/2 - g*x", [1.0], [0.0], 1.0, **BOUNCING)
+    since, speed = 1 - np.sqrt(2 / g), np.sqrt(2 * g)
+    close([value], [e * speed * since - g * since**2 / 2], 1e-9)
+    # `e` is used by the reset alone.
+    close([slopes.parameters["e"]], [speed * since], 1e-9)
+    in_g = e * (since / speed + speed / (2 * g) * np.sqrt(2 / g)) - since**2 / 2 - since * np.sqrt(2 / g) / 2
+    close([slopes.parameters["g"]], [in_g], 1e-9)
+    # Coupled to an event, a loss is refused where its motion ends at a time that depends on the variables.
+    with pytest.raises(ValueError, match="terminal event.*fixed time"):
+        hz.value_and_grad("x")("x'^2/2 - x^2/2", [1.0], [0.0], 2.0, coordinates=["x"], events=hz.Event("x", terminal=True))
+
+
+def test_a_loss_of_a_motion_with_a_reset_in_jax():
+    jax = pytest.importorskip("jax")
+    import herglotz.jax as hj
+
+    jax.config.update("jax_enable_x64", True)
+    value, slopes = hz.value_and_grad("x")("x'^2/2 - g*x", [1.0], [0.0], 1.0, **BOUNCING)
+
+    def final(e):
+        given = dict(coordinates=["x"], parameters={"e": e, "g": 9.81}, events=BOUNCING["events"])
+        return hj.solve("x'^2/2 - g*x", [1.0], [0.0], 1.0, **given).q[-1, 0]
+
+    assert jax.value_and_grad(final)(0.8) == (value, slopes.parameters["e"])
+    close(jax.vmap(jax.grad(final))(np.array([0.8, 0.7])), 2 * [slopes.parameters["e"]], 1e-12)
+
+
+COARSE = dict(integrator="gauss_2", step=1.5)
+
+
+def test_gradients_tell_of_steps_that_do_not_resolve_the_motion():
+    sol = hz.solve("pendulum", [2.8], [0.0], 20.0, **COARSE)
+    assert "does not resolve" in sol.unresolved
+    _, slopes = hz.value_and_grad("theta")("pendulum", [2.8], [0.0], 20.0, **COARSE)
+    assert slopes.unresolved == sol.pullback(q=[1.0]).unresolved == sol.unresolved
+    _, slopes = hz.value_and_grad("theta")("pendulum", [2.8], [0.0], 20.0)
+    assert slopes.unresolved is None
+    start = np.array([[2.8]]), np.zeros((1, 1)), 20.0
+    many = hz.ensemble("pendulum", *start, **COARSE)
+    _, slopes = hz.ensemble_value_and_grad("theta")("pendulum", *start, **COARSE)
+    assert many.troubles == slopes.troubles == many.sensitivity("gamma").troubles == {0: sol.unresolved}
+    assert np.isfinite(slopes.q0).all()
+
+
+def test_jax_warns_of_steps_that_do_not_resolve_the_motion():
+    pytest.importorskip("jax")
+    import herglotz.jax as hj
+
+    with pytest.warns(UserWarning, match="does not resolve"):
+        hj.solve("pendulum", [2.8], [0.0], 20.0, **COARSE).q.block_until_ready()
+
+
 @pytest.mark.parametrize("package", ["jax", "torch"])
 def test_a_package_that_is_missing(package):
     code = f"import sys; sys.modules[{package!r}] = None; import herglotz.{package}"

@@ -26,6 +26,8 @@ pub struct Sensitivity {
 pub struct LossGradient {
     /// How the motion ended.
     pub status: Status,
+    /// The first step that was found not to resolve the motion.
+    pub unresolved: Option<UnresolvedStep>,
     /// The value and the gradient; `None` where the motion was not completed.
     pub loss: Option<(f64, Gradient)>,
 }

@@ -204,6 +204,7 @@ class Gradient(NamedTuple):
     t0: float
     t_end: float
     growth: float
+    unresolved: str | None = None
 
 class LyapunovExponents(NamedTuple):
     exponents: Vector

@@ -14,6 +14,7 @@ class Arguments:
         parameters = self._signature.parameters.values()
         self._positional = [x.name for x in parameters if x.kind is x.POSITIONAL_OR_KEYWORD]
         self._defaults = {x.name: x.default for x in parameters}
+        self.names = tuple(self._defaults)
 
     def bind(self, given, named):
         """The arguments of a call, as a dict.

@@ -6,9 +6,9 @@ import numpy as np
 
 from . import _core, _trace
 from ._additions import breaks_of
-from ._events import events_of
-from ._solve import system_and_start
-from ._system import system, with_tables
+from ._events import events_of, texts_of_events
+from ._solve import functions_of, system_and_start
+from ._system import check_used, system_of, with_tables
 
 
 class Geometry(NamedTuple):
@@ -79,7 +79,8 @@ def geometry(
     if q is None:
         raise ValueError("`q` is not given: give the position")
     names = dict(H=H, momenta=momenta, action=action)
-    of = system(L, coordinates, parameters, n=np.size(q), **names)
+    of = system_of(L, coordinates, parameters, n=np.size(q), **names)
+    check_used(of, parameters, None, (L if H is None else H,), ())
     if of.kind[0]:
         if p is None or v is not None:
             raise ValueError("give `p` for a Hamiltonian, and not `v`")
@@ -179,8 +180,9 @@ class Check(NamedTuple):
 
 
 def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=()):
+    force, rayleigh, tables, breaks = more
+    given = L, *functions_of(force, rayleigh)
     L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
-    breaks = more[3]
     if (v0 is None) == (p0 is None):
         raise ValueError("give either `v0` or `p0`")
     start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
@@ -188,9 +190,11 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=())
         raise ValueError("`t` is not given: give the final time")
     if breaks is not None:
         breaks_of(breaks, t)
-    tables = {}
-    events = events_of(events, L, tables) if events else []
-    return L, _core.Motion(with_tables(L, tables), start, t, None, way, events, [], False, False, None)
+    found = {}
+    events = events_of(events, L, found) if events else []
+    L = with_tables(L, found)
+    check_used(L, parameters, tables, given, list(texts_of_events(events)))
+    return L, _core.Motion(L, start, t, None, way, events, [], False, False, None)
 
 
 def check(

@@ -1,5 +1,6 @@
 """Motions as differentiable functions of their start and parameters, for libraries of automatic differentiation."""
 
+import warnings
 
 import numpy as np
 
@@ -7,23 +8,39 @@ from . import _core
 from ._arguments import Arguments
 from ._ensemble import ensemble, request_of
 from ._ensemble_derivatives import pullback_of, sensitivity_of
-from ._solve import solve
-from ._system import check_parameters, system
+from ._events import events_of, texts_of_events
+from ._sensitivity import refuse_of_rows
+from ._solve import functions_of, solve
+from ._system import check_used, system_of, with_tables
+
+_ENSEMBLE = Arguments(ensemble)
+# The arguments of `solve` that belong to the system.
+_OF_SYSTEM = "coordinates", "force", "rayleigh", "tables", "breaks", "action", "constraints"
 
 
 class DifferentiableMotion:
     """The rows of a motion as a function of q0, v0, z0 and of the values of named parameters."""
 
     def __init__(self, L, t, n, names, options):
-        options = dict(options)
+        if refused := {"q0", "v0", "p0", "z0", "H", "momenta"} & set(options):
+            raise ValueError(
+                f"`{min(refused)}` cannot be given here: a differentiable motion is one of a Lagrangian from q0, v0 and z0 "
+                "with rows at `t`"
+            )
+        refuse_of_rows(options, "the rows have q, v and z at the times `t`", "observe", "every", "conformal_factor", "estimate")
+        options = {name: value for name, value in options.items() if value is not None}
         self.threads = options.pop("threads", None)
-        named = {name: options.pop(name) for name in ("coordinates", "force", "rayleigh", "tables", "breaks") if name in options}
-        if refused := {"q0", "v0", "p0", "z0", "events", "observe", "every"} & set(options):
-            raise ValueError(f"`{min(refused)}` cannot be given here: a differentiable motion is one from q0, v0 and z0 with rows at `t`")
+        named = {name: options.pop(name) for name in _OF_SYSTEM if name in options}
         # The values are set before each run.
-        self.system = system(L, parameters=dict.fromkeys(names, 1.0) or None, n=n, **named)
-        check_parameters(self.system, names, (L,), ())
+        of = system_of(L, parameters=dict.fromkeys(names, 1.0) or None, n=n, **named)
+        found = {}
+        events = events_of(options.get("events", ()), of, found)
+        self.system = with_tables(of, found)
+        functions = L, *functions_of(named.get("force"), named.get("rayleigh"))
+        check_used(self.system, names, named.get("tables"), functions, list(texts_of_events(events)))
         self.names, self.options = tuple(names), options
+        # An ensemble has not all arguments of a single motion: with others its members are run by themselves.
+        self.is_alone = not set(options) <= set(_ENSEMBLE.names)
         self.t = np.array(t, dtype=float)
         self.rows = 2 if self.t.ndim == 0 else len(self.t)
         self.n = self.system.dimension
@@ -35,13 +52,14 @@ class DifferentiableMotion:
         sol = solve(of, numbers(q0), numbers(v0), self.t, z0=float(z0), **self.options)
         if not sol.success:
             raise ValueError(f"the motion was not completed: {sol.status}")
+        if sol.unresolved is not None:
+            warnings.warn(f"the motion is not resolved: {sol.unresolved}", stacklevel=2)
         return sol
 
     def gradient(self, sol, q, v, z):
         """The gradient in q0, v0, z0 and the values of the parameters."""
         found = sol.pullback(q=np.asarray(q), v=np.asarray(v), z=np.asarray(z))
         return found.q0, found.v0, found.z0, np.array([found.parameters[name] for name in self.names])
-
 
     def batch_of_rows(self, *start):
         """q, v and z of the rows of motions from arrays with axes of a batch in front, along which they are broadcast."""
@@ -106,12 +124,12 @@ class DifferentiableMotion:
         return np.concatenate([np.broadcast_to(x, (*batch, x.shape[-1])) for x in parts], axis=-1)
 
     def _members(self, start, batch=None):
-        """The starts of the members of a batch, and its shape if they are run as an ensemble, which has no scales."""
+        """The starts of the members of a batch, and its shape if they are run as an ensemble."""
         batch = np.broadcast_shapes(*self._batches(start)) if batch is None else batch
         own = (self.n,), (self.n,), (), (len(self.names),)
         count = int(np.prod(batch))
         members = [np.broadcast_to(numbers(x), (*batch, *shape)).reshape((count, *shape)) for x, shape in zip(start, own)]
-        return (None if len(members[0]) == 1 or "scales" in self.options else batch), members
+        return (None if len(members[0]) == 1 or self.is_alone else batch), members
 
     def _rows_of(self, *start):
         sol = self.run(*start)
@@ -120,9 +138,8 @@ class DifferentiableMotion:
     def _arguments(self, members, t):
         """The arguments of `ensemble`."""
         q0, v0, z0, values = members
-        options = {name: value for name, value in self.options.items() if name not in ("conformal_factor", "estimate")}
         parameters = {name: values[:, i].copy() for i, name in enumerate(self.names)} or None
-        return (self.system, q0, v0, t), dict(z0=z0, parameters=parameters, threads=self.threads, **options)
+        return (self.system, q0, v0, t), dict(z0=z0, parameters=parameters, threads=self.threads, **self.options)
 
     def _request(self, members):
         given, named = self._arguments(members, self.t)
@@ -134,6 +151,7 @@ class DifferentiableMotion:
         if not many.success.all():
             index = int(np.argmin(many.success))
             raise ValueError(f"motion {index} of the batch was not completed: {many.troubles[index]}")
+        _warn(many.troubles)
         return many
 
     def _rows_of_ensemble(self, members):
@@ -146,13 +164,17 @@ class DifferentiableMotion:
         return many.q[:, ::2], many.v[:, ::2], many.z[:, ::2]
 
 
-_ENSEMBLE = Arguments(ensemble)
-
-
 def _completed(found):
     for index, trouble in found.troubles.items():
-        raise ValueError(f"motion {index} of the batch has no derivatives: {trouble}")
+        if np.isnan(found.growth[index]):
+            raise ValueError(f"motion {index} of the batch has no derivatives: {trouble}")
+    _warn(found.troubles)
     return found
+
+
+def _warn(troubles):
+    for index, trouble in troubles.items():
+        warnings.warn(f"motion {index} of the batch is not resolved: {trouble}", stacklevel=2)
 
 
 # Motions by their arguments: for a motion that is made anew in each iteration, JAX would compile its callback again.

@@ -9,7 +9,7 @@ from ._additions import breaks_of
 from ._events import events_of, has_reset, texts_of_events
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
-from ._system import check_parameters, copied, with_tables
+from ._system import check_used, copied, with_tables
 
 
 def ensemble(
@@ -68,14 +68,14 @@ def ensemble(
     Interrupted
         A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
-    system, request, given, columns = request_of(
+    system, request, columns = request_of(
         L, q0, v0, t, p0, z0, accuracy, integrator, step, steps, events, observe, coordinates, parameters, threads, force,
         rayleigh, tables, breaks,
     )  # fmt: skip
-    start, t, way, varied, values, threads = request
+    start, t, way, varied, values, threads, given = request
     record = _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads)
     event_names = tuple(events) if isinstance(events, dict) else len(given)
-    found = Ensemble(system, record, event_names, tuple(observe or ()), given, request)
+    found = Ensemble(system, record, event_names, tuple(observe or ()), request)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(found)
@@ -104,7 +104,7 @@ def request_of(
     tables,
     breaks,
 ):
-    """The system and the request for the arguments of `ensemble`, the events and the columns."""
+    """The system and the request for the arguments of `ensemble`, and the columns."""
     if parameters is not None and not hasattr(parameters, "items"):
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     parameters = dict(parameters or {})
@@ -128,12 +128,13 @@ def request_of(
     given = events_of(events, system, found) if events else []
     columns = columns_of(observe, system, found)
     system = with_tables(system, found)
-    if parameters:
+    if parameters or tables:
         functions = (L, *functions_of(force, rayleigh))
-        check_parameters(system, parameters, functions, [*texts_of_events(given), *columns])
+        check_used(system, parameters, tables, functions, [*texts_of_events(given), *columns])
     start = (copied(q0), copied(v0), False, copied(z0)) if p0 is None else (copied(q0), copied(p0), True, copied(z0))
-    request = start, copied(t), (accuracy, integrator, step, steps), list(varied), list(map(copied, varied.values())), threads
-    return system, request, given, columns
+    values = list(map(copied, varied.values()))
+    request = start, copied(t), (accuracy, integrator, step, steps), list(varied), values, threads, given
+    return system, request, columns
 
 
 class MemberCrossings(NamedTuple):
@@ -183,9 +184,9 @@ class Ensemble:
         The number of members that were advanced together in SIMD lanes.
     """
 
-    def __init__(self, system, record, event_names, observed, events, request):
+    def __init__(self, system, record, event_names, observed, request):
         self.system, self._request = system, request
-        self._changed_by_events = any(event[2] or has_reset(event) for event in events)
+        events = request[6]
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
         count, n = len(record.t), system.dimension
@@ -207,7 +208,7 @@ class Ensemble:
         """The derivatives of the rows of all members with respect to variables, as `Solution.sensitivity` has them.
 
         Each member is run once more, by itself, on several threads; for an accuracy the steps are chosen for each. The
-        result does not depend on the number of threads. With two times or a single one there are two rows: the start
+        result does not depend on the number of threads. Members may have resets, but no terminal events. With two times or a single one there are two rows: the start
         and the end.
 
         Parameters

@@ -7,13 +7,14 @@ import numpy as np
 from . import _core
 from ._arguments import Arguments
 from ._ensemble import ensemble, request_of
-from ._sensitivity import names_of_variables, partials
+from ._sensitivity import names_of_variables, partials, refuse_of_rows
 
 
 class EnsembleSensitivity(NamedTuple):
     """The derivatives of the k rows of M members with respect to a variable, or to m of them; see `Ensemble.sensitivity`.
 
-    A member without derivatives has NaN, and the reason in `troubles`, by its index.
+    A member without derivatives has NaN, and the reason in `troubles`, by its index; there are also the warnings of others, as
+    in `Ensemble.troubles`.
     """
 
     q: np.ndarray  # (M, k, n) or (M, k, n, m)
@@ -28,7 +29,8 @@ class EnsembleGradient(NamedTuple):
     """The gradients of a number of each of M members with respect to its variables; see `Ensemble.pullback`.
 
     As `Gradient`, with a row for each member; that of the sum in a parameter with the same value for all members is the
-    sum of its column. A member without a gradient has NaN, and the reason in `troubles`, by its index.
+    sum of its column. A member without a gradient has NaN, and the reason in `troubles`, by its index; there are also the
+    warnings of others, as in `Ensemble.troubles`.
     """
 
     q0: np.ndarray  # (M, n)
@@ -45,7 +47,6 @@ class EnsembleGradient(NamedTuple):
 def sensitivity(many, variables):
     """See `Ensemble.sensitivity`."""
     names, is_one = names_of_variables(variables)
-    _check(many)
     found = sensitivity_of(many.system, many._request, names)
     if is_one:
         q, v, p, z = (x[..., 0] for x in found[:4])
@@ -55,7 +56,6 @@ def sensitivity(many, variables):
 
 def pullback(many, q=None, v=None, p=None, z=None):
     """See `Ensemble.pullback`."""
-    _check(many)
     return pullback_of(many.system, many._request, q, v, p, z)
 
 
@@ -94,7 +94,7 @@ def ensemble_value_and_grad(loss):
     Returns
     -------
     function
-        It takes the arguments of `ensemble` and returns the values, of shape (M,), and an `EnsembleGradient`. A member
+        It takes the arguments of `ensemble`, except `observe`, and returns the values, of shape (M,), and an `EnsembleGradient`. A member
         that was not completed has NaN, and its status in `troubles`.
 
     Raises
@@ -113,8 +113,9 @@ def ensemble_value_and_grad(loss):
 
     def run(*arguments, **named):
         given = _ENSEMBLE.bind(arguments, named)
+        refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe")
         # As a column it is traced, and its parameters and tables are found.
-        of, request, _, columns = request_of(**given | {"observe": {"loss": loss}, "events": ()})
+        of, request, columns = request_of(**given | {"observe": {"loss": loss}})
         values, *gradients = _core.ensemble_value_and_gradient(of, request, columns[0])
         return values, _gradient(of, request, (values, *gradients))
 
@@ -129,11 +130,3 @@ def _gradient(system, request, found):
     v0, p0 = (None, velocity) if request[0][2] else (velocity, None)
     by_name = dict(zip(system.parameters, parameters.T.copy()))
     return EnsembleGradient(q0, v0, p0, z0, by_name, t0, t_end, growth, dict(troubles))
-
-
-def _check(many):
-    if many._changed_by_events:
-        raise ValueError(
-            "an event of the ensemble is terminal or changes the state, and derivatives of such motions are not implemented; "
-            "remove the event, or differentiate an ensemble to a fixed time"
-        )

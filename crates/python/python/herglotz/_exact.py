@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
-from ._system import system
+from ._system import check_used, system_of
 
 
 class Exponential(NamedTuple):
@@ -49,7 +49,7 @@ def exponential(L, h, q0, v0, z0=0.0, t=0.0, *, coordinates=None, parameters=Non
     -------
     Exponential
     """
-    of = system(L, coordinates, parameters, n=np.size(q0))
+    of = _system(L, q0, coordinates, parameters)
     (q1,), (regularity,) = _core.exponential(of, [h, q0, v0, z0, t])
     return Exponential(np.array(q1), regularity)
 
@@ -68,7 +68,7 @@ def retract(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameters=None):
     -------
     Retraction
     """
-    of = system(L, coordinates, parameters, n=np.size(q0))
+    of = _system(L, q0, coordinates, parameters)
     (v0, v1), (z1, action, sigma) = _core.retract(of, [h, q0, q1, z0, t])
     return Retraction(np.array(v0), np.array(v1), z1, action, sigma)
 
@@ -87,6 +87,12 @@ def exact_lagrangian(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameter
     -------
     DiscreteLagrangian
     """
-    of = system(L, coordinates, parameters, n=np.size(q0))
+    of = _system(L, q0, coordinates, parameters)
     (d1, d2), (value, dz, sigma) = _core.exact_lagrangian(of, [h, q0, q1, z0, t])
     return DiscreteLagrangian(value, np.array(d1), np.array(d2), dz, sigma)
+
+
+def _system(L, q0, coordinates, parameters):
+    of = system_of(L, coordinates, parameters, n=np.size(q0))
+    check_used(of, parameters, None, (L,), ())
+    return of

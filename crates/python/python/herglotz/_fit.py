@@ -199,7 +199,7 @@ def fit(
         raise ValueError(f"the last of the data is at t = {end}, but the motion starts at {t0}; give data at later times")
     of, request, *_ = request_of(
         L, q0, v0, [t0, end], p0, z0, accuracy, integrator, step, steps, None, (), None, False, False, scales,
-        coordinates, parameters, force, rayleigh, tables, breaks,
+        coordinates, parameters, force, rayleigh, tables, breaks, also=[str(name) for name in data],
     )  # fmt: skip
     series = [_series(name, values, times, sigma, data) for name, values in data.items()]
     bounded = _bounds(bounds, unknowns)

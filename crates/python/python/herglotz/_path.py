@@ -3,8 +3,8 @@
 import numpy as np
 
 from . import _core
-from ._solve import system_and_start
-from ._system import copied
+from ._solve import functions_of, system_and_start
+from ._system import check_used, copied
 
 
 class Path:
@@ -109,7 +109,9 @@ def path(
         For an invalid argument; whether a path was found is an attribute of the path.
     """
     more = force, rayleigh, tables, None
+    given = L, *functions_of(force, rayleigh)
     L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters, more)
+    check_used(L, parameters, tables, given, ())
     if np.ndim(t) > 1 or np.size(t) != 2 and np.ndim(t) == 1:
         raise ValueError(f"`t` is {t!r}; it must be the final time, or (t0, t1)")
     t0, t1 = (0.0, t) if np.ndim(t) == 0 else t

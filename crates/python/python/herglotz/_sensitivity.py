@@ -29,7 +29,7 @@ class Gradient(NamedTuple):
     It is the derivative with respect to `v0` where the start was given by its velocity, then `p0` is None, and with
     respect to `p0` where it was given by its momentum. In `t0` the final time is fixed, and in both times the number of
     steps. Round-off is amplified by `growth`, the largest derivative along the motion divided by that at its start, at
-    least one.
+    least one. `unresolved` is that of the motion, as `Solution.unresolved`.
     """
 
     q0: np.ndarray  # (n,)
@@ -40,6 +40,7 @@ class Gradient(NamedTuple):
     t0: float
     t_end: float
     growth: float
+    unresolved: str | None = None
 
 
 class LyapunovExponents(NamedTuple):
@@ -131,7 +132,8 @@ def value_and_grad(loss):
     Returns
     -------
     function
-        It takes the arguments of `solve` and returns the value, a float, and a `Gradient`.
+        It takes the arguments of `solve` that determine a motion, events with resets among them, and returns the value, a
+        float, and a `Gradient`. Of the times `t` it uses the first and the last.
 
     Raises
     ------
@@ -150,8 +152,9 @@ def value_and_grad(loss):
 
     def run(*arguments, **named):
         given = _SOLVE.bind(arguments, named)
+        refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe", "every", "conformal_factor", "estimate")
         # As a column it is traced, and its parameters and tables are found.
-        of, request, *_ = request_of(**given | {"observe": {"loss": loss}, "events": ()})
+        of, request, *_ = request_of(**given | {"observe": {"loss": loss}})
         (text,) = request[5]
         value, slopes = _core.value_and_gradient(_core.Motion(of, *request[:5], [], *request[6:]), text)
         return value, _gradient(of, request, slopes)
@@ -162,11 +165,18 @@ def value_and_grad(loss):
 _SOLVE = Arguments(solve)
 
 
+def refuse_of_rows(given, why, *names):
+    """Refuses arguments that concern rows only, which would have no effect."""
+    for name in names:
+        if given.get(name):
+            raise ValueError(f"`{name}` cannot be given here: {why}; remove it")
+
+
 def _gradient(system, request, slopes):
-    q0, velocity, z0, parameters, t0, t_end, growth = slopes
+    q0, velocity, z0, parameters, t0, t_end, growth, unresolved = slopes
     is_momentum = request[0][2]
     v0, p0 = (None, velocity) if is_momentum else (velocity, None)
-    return Gradient(q0, v0, p0, z0, dict(zip(system.parameters, parameters)), t0, t_end, growth)
+    return Gradient(q0, v0, p0, z0, dict(zip(system.parameters, parameters)), t0, t_end, growth, unresolved)
 
 
 def _check(sol):

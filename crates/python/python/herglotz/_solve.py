@@ -4,7 +4,7 @@ from . import _core
 from ._additions import breaks_of
 from ._events import events_of, texts_of_events
 from ._solution import Interrupted, Solution
-from ._system import check_parameters, copied, expression, system, with_tables
+from ._system import check_used, copied, expression, system_of, with_tables
 
 
 def solve(
@@ -136,12 +136,18 @@ def request_of(
     action=None,
     constraints=None,
     project=False,
+    also=(),
 ):
-    """The system and the request for the arguments of `solve`, with the names of the events and of the columns."""
+    """The system and the request for the arguments of `solve`, with the names of the events and of the columns.
+
+    Parameters and tables may be used in the formulas of `also`.
+    """
     given = (L if H is None else H, *functions_of(force, rayleigh))
     more = force, rayleigh, tables, breaks, constraints
     kind = H, momenta, action
-    if type(L) is not _core.System or parameters is not None or q0 is None or any(x is not None for x in (*more, *kind)):
+    if type(L) is not _core.System or parameters is not None or q0 is None or any(
+        x is not None for x in (coordinates, *more, *kind)
+    ):
         L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more, kind)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or the times of the rows")
@@ -165,8 +171,8 @@ def request_of(
         copied(scales),
         project,
     )
-    if parameters:
-        check_parameters(L, parameters, given, [*texts_of_events(given_events), *columns])
+    if parameters or tables:
+        check_used(L, parameters, tables, given, [*texts_of_events(given_events), *columns, *also])
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
     return L, request, event_names, tuple(observe) if observe else ()
 
@@ -197,7 +203,7 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 5, k
     force, rayleigh, tables, breaks, *constraints = more
     H, momenta, action = kind
     names = dict(H=H, momenta=momenta, action=action, constraints=constraints[0] if constraints else None)
-    of = system(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks, **names)
+    of = system_of(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks, **names)
     return of, q0, v0
 
 

@@ -73,6 +73,31 @@ def system(
     -------
     System
     """
+    made = system_of(
+        L, coordinates, parameters, H=H, momenta=momenta, action=action, n=n, force=force, rayleigh=rayleigh, tables=tables,
+        breaks=breaks, constraints=constraints,
+    )  # fmt: skip
+    if n is not None and n != made.dimension:
+        raise ValueError(f"`n` is {n!r}, but the system has {made.dimension} coordinates: remove it")
+    return made
+
+
+def system_of(
+    L=None,
+    coordinates=None,
+    parameters=None,
+    *,
+    H=None,
+    momenta=None,
+    action=None,
+    n=None,
+    force=None,
+    rayleigh=None,
+    tables=None,
+    breaks=None,
+    constraints=None,
+):
+    """See `system`; here `n` is the number of coordinates without names, and does not matter otherwise."""
     if parameters is not None and not hasattr(parameters, "keys"):
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     if (L is None) == (H is None):
@@ -89,6 +114,9 @@ def system(
     kind = (H is not None, tuple(momenta or ()), "z" if action is None else action)
     is_plain = force is None and rayleigh is None and not tables and breaks is None and constraints is None
     if isinstance(L, _core.System):
+        own = [coordinates] if isinstance(coordinates, str) else coordinates
+        if own is not None and list(own) not in (L.coordinates, L.given_coordinates):
+            raise ValueError(f"a System has its names already, {', '.join(L.coordinates)}: remove `coordinates`")
         if is_plain:
             return L.with_parameters(parameters) if parameters else L
         text, coordinates, known = L.lagrangian, L.given_coordinates, L.parameters
@@ -146,11 +174,24 @@ def with_tables(of, tables):
     """The system with tables of traced events and columns in addition to its own."""
     known = {name for name, _ in of.tables} if tables else ()
     more = {name: table for name, table in tables.items() if name not in known}
-    return system(of, tables=more) if more else of
+    return system_of(of, tables=more) if more else of
 
 
-def check_parameters(system, given, functions, expressions):
-    """Rejects parameters that neither the Lagrangian, a force nor an additional expression uses: most are misspelt."""
+def check_used(system, parameters, tables, functions, expressions):
+    """Rejects parameters and tables that neither the Lagrangian, a force nor an additional expression uses: most are misspelt."""
+    if parameters:
+        _check_parameters(system, parameters, functions, expressions)
+    if tables:
+        texts = [system.lagrangian, *(text for _, text in system.forces), *system.rayleigh, *system.constraints, *expressions]
+        for name in tables:
+            if not any(re.search(rf"\b{re.escape(name)}\s*\(", text) for text in texts):
+                raise ValueError(
+                    f"the table {name!r} is not used in the Lagrangian, a force, an event or a column: write {name}(t) there, "
+                    "or remove the table"
+                )
+
+
+def _check_parameters(system, given, functions, expressions):
     known = system.used_parameters
     codes = [getattr(function, "__code__", None) for function in functions]
     own = [

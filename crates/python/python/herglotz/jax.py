@@ -45,8 +45,8 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     parameters : dict of float, optional
         The values of the parameters by name, which may be traced by JAX.
     options
-        The other arguments of `herglotz.solve`, such as `accuracy`, `integrator`, `step`, `coordinates` and `force`; and
-        `threads`.
+        The other arguments of `herglotz.solve` that determine a motion, such as `accuracy`, `integrator`, `step`,
+        `coordinates`, `force` and `events` with resets; and `threads`.
 
     Returns
     -------

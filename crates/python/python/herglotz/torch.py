@@ -50,7 +50,8 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     parameters : dict of float, optional
         The values of the parameters by name, which may be tensors.
     options
-        The other arguments of `herglotz.solve`, such as `accuracy`, `integrator`, `step`, `coordinates` and `force`.
+        The other arguments of `herglotz.solve` that determine a motion, such as `accuracy`, `integrator`, `step`,
+        `coordinates`, `force` and `events` with resets.
 
     Returns
     -------
@@ -61,6 +62,8 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     ValueError
         For an invalid argument, and for a motion that is not completed, with its status.
     """
+    if "threads" in options:
+        raise ValueError("`threads` cannot be given here: a motion is one computation; run several threads of your own")
     parameters = dict(parameters or {})
     of_double = lambda x: torch.as_tensor(x, dtype=torch.float64, device="cpu")
     q0, v0, z0 = of_double(q0), of_double(v0), of_double(z0)

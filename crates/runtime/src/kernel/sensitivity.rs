@@ -44,7 +44,8 @@ pub(super) fn covector(of: &EndCovector, n: usize, all: usize) -> EndCovector {
 
 pub(super) fn loss_gradient(found: discrete_herglotz::sensitivity::LossGradient, n: usize) -> LossGradient {
     let of = |gradient: Gradient| Gradient { q: first(&gradient.q, n), rate: first(&gradient.rate, n), ..gradient };
-    LossGradient { status: found.outcome.status, loss: found.loss.map(|(value, gradient)| (value, of(gradient))) }
+    let (status, unresolved) = (found.outcome.status, found.outcome.unresolved);
+    LossGradient { status, unresolved, loss: found.loss.map(|(value, gradient)| (value, of(gradient))) }
 }
 
 pub(super) fn sensitivity_of(found: &Tangent, n: usize) -> Sensitivity {

@@ -1,7 +1,7 @@
 //! Derivatives of the motions of a system.
 
 use crate::{
-    EndCovector, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
+    EndCovector, Event, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
     System, velocity_name,
 };
 use discrete_herglotz::sensitivity::Variable;
@@ -36,7 +36,7 @@ impl System {
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
         let variables = variables.iter().map(|name| self.variable(name)).collect::<Result<Vec<_>, _>>()?;
-        check_events(motion)?;
+        check_events(&motion.events)?;
         self.kernel.sensitivity(motion, &variables, times, monitor)
     }
 
@@ -54,7 +54,7 @@ impl System {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
-        check_events(motion)?;
+        check_events(&motion.events)?;
         self.kernel.gradient(motion, times, loss, monitor)
     }
 
@@ -160,14 +160,14 @@ impl System {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
-        check_events(motion)?;
+        check_events(&motion.events)?;
         self.kernel.lyapunov_exponents(motion, monitor)
     }
 }
 
 /// Rejects motions whose end is a time that depends on the variables.
-fn check_events(motion: &Motion) -> Result<(), RuntimeError> {
-    if motion.events.iter().any(|event| event.terminal) {
+pub(super) fn check_events(events: &[Event]) -> Result<(), RuntimeError> {
+    if events.iter().any(|event| event.terminal) {
         let why = "has a terminal event, and derivatives of motions that end at an event are not implemented; remove the \
                    event, or differentiate a motion to a fixed time";
         return Err(RuntimeError::argument("motion", why));

@@ -1,6 +1,6 @@
 //! Derivatives of the members of an ensemble of a system.
 
-use super::derivatives::of_expression;
+use super::derivatives::{check_events, of_expression};
 use crate::{BatchLoss, Ensemble, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, System};
 use formula_lagrangian::Expression;
 use std::sync::{Mutex, PoisonError};
@@ -9,11 +9,11 @@ impl System {
     /// Runs the members of an ensemble on several threads, and computes the value and the gradient of a loss of the
     /// states of each at some times, with respect to its start and its parameters, as [`gradient`](Self::gradient) does
     /// for a motion; in the order of the members. A member that was not completed has a status and no gradient, and one
-    /// that cannot start has an error. The results do not depend on the number of threads. Rows, columns and events of
-    /// the ensemble are ignored.
+    /// that cannot start has an error. The results do not depend on the number of threads. Resets are those of the system;
+    /// rows, columns and other events of the ensemble, which do not change its motions, are ignored.
     ///
     /// # Errors
-    /// No members or threads, and an unknown name of a parameter that varies.
+    /// No members or threads, an unknown name of a parameter that varies, and terminal events.
     pub fn ensemble_gradient(
         &self,
         ensemble: &Ensemble<'_>,
@@ -21,6 +21,7 @@ impl System {
         loss: &BatchLoss<'_>,
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+        check_events(ensemble.events)?;
         self.kernel.ensemble_gradient(ensemble, times, loss, interrupt)
     }
 
@@ -72,6 +73,7 @@ impl System {
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
         let variables = variables.iter().map(|name| self.variable(name)).collect::<Result<Vec<_>, _>>()?;
+        check_events(ensemble.events)?;
         self.kernel.ensemble_sensitivity(ensemble, &variables, times, interrupt)
     }
 }
