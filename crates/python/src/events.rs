@@ -58,6 +58,7 @@ fn with_change(
              remove the direction"
         )));
     }
+    let number_is_given = number.is_some();
     let number = |what: &str| match &number {
         Some(x) => crate::arrays::number(&format!("the {what} of the event {text:?}"), x),
         None => {
@@ -65,6 +66,12 @@ fn with_change(
         }
     };
     let law = match law.as_str() {
+        "elastic" if number_is_given => {
+            return Err(value_error(format!(
+                "the impact \"elastic\" of the event {text:?} takes no number; for an impact that loses energy write \
+                 (\"restitution\", 0.8)"
+            )));
+        }
         "elastic" => Impact::Elastic,
         "restitution" => Impact::Restitution(number("restitution")?),
         "conformal" => Impact::Conformal(number("conformal factor")?),

@@ -8,6 +8,7 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{DiscretePoint, Regularity, VelocityPoint};
 use discrete_herglotz::DiscreteLagrangian;
 use formula_lagrangian::Formula;
+use herglotz_runtime::RuntimeError;
 use pyo3::prelude::*;
 
 /// The map or function to be evaluated.
@@ -17,6 +18,9 @@ enum What {
     Retraction,
     Lagrangian,
 }
+
+/// What is computed here, in messages.
+const EXACT: &str = "exponential maps, their inverses and exact Lagrangians";
 
 /// A time, two vectors and an action, validated.
 struct At {
@@ -64,13 +68,24 @@ fn of_system(
     let [h, first, second, z, t] = arguments;
     let (first, second) = (numbers(names[0], &first)?, numbers(names[1], &second)?);
     let at = At { h: number("h", &h)?, t: number("t", &t)?, first, second, z: number("z0", &z)? };
-    let n = system.inner.dimension();
+    let (formula, n) = (system.inner.formula().clone(), system.inner.dimension());
+    if formula.is_hamiltonian() {
+        return Err(value_error(RuntimeError::OfLagrangians { what: EXACT }));
+    }
+    if formula.constraints() > 0 {
+        return Err(value_error(RuntimeError::WithConstraints { what: EXACT }));
+    }
+    if !system.inner.losses().is_empty() {
+        return Err(value_error(format!(
+            "the system has a force, and {EXACT} are those of a Lagrangian alone; write the force into the Lagrangian, or \
+             use `solve`"
+        )));
+    }
     for (name, x) in names.iter().zip([&at.first, &at.second]) {
         if x.len() != n {
             return Err(value_error(format!("`{name}` has {} numbers, but the system has {n} coordinates", x.len())));
         }
     }
-    let formula = system.inner.formula().clone();
     leaving_at_signals(py, move || match n {
         1 => found::<1>(&formula, what, &at),
         2 => found::<2>(&formula, what, &at),

@@ -65,3 +65,21 @@ def test_bad_input_is_named():
         hz.retract(L, -1.0, Q0, Q0)
     with pytest.raises(ValueError, match="compiled for 1 to 8"):
         hz.exponential("sum(i, 0, n-1, v[i]^2)", H, np.ones(9), np.ones(9))
+
+
+def test_what_has_no_exact_lagrangian_is_refused():
+    """Constraints, forces and Hamiltonians would be ignored."""
+    systems = {
+        "not computed with constraints": hz.system("(x'^2 + y'^2)/2 - 9.81*y", ["x", "y"], constraints="x^2 + y^2 = 1"),
+        "has a force": hz.system("(x'^2 + y'^2)/2", ["x", "y"], force={"x": "-x'"}),
+        "not computed for a Hamiltonian": hz.system(H="(p_x^2 + p_y^2)/2", coordinates=["x", "y"]),
+    }
+    for said, of in systems.items():
+        for call in (
+            lambda: hz.exponential(of, 0.1, [0.0, -1.0], [1.0, 0.0]),
+            lambda: hz.retract(of, 0.1, [0.0, -1.0], [0.1, -0.99]),
+            lambda: hz.exact_lagrangian(of, 0.1, [0.0, -1.0], [0.1, -0.99]),
+        ):
+            with pytest.raises(ValueError, match=said) as caught:
+                call()
+            assert "Formula::" not in str(caught.value)

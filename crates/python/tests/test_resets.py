@@ -233,6 +233,7 @@ WRONG = {
     "a wrong rest": (at_floor({"x'": "-x'"}, rest={"y": "0"}), "the reset of the event \"x\".*y"),
     "an unknown law": (at_floor(None, impact="plastic"), 'the impact "plastic" of the event "x" must be "elastic"'),
     "a law without its number": (at_floor(None, impact="restitution"), 'the impact "restitution".* needs a number'),
+    "a number of a law without one": (at_floor(None, impact=("elastic", 0.5)), 'the impact "elastic" of the event "x" takes no number'),
     "a number as a law": (at_floor(None, impact=0.8), r"the impact 0.8 of the event 'x' must be"),
     "too large a restitution": (at_floor(None, impact=("restitution", 1.5)), "a restitution outside of 0 to 1"),
     "too large a factor": (at_floor(None, impact=("conformal", 2.0)), "a conformal factor that is not positive and at"),
